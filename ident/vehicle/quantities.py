@@ -61,9 +61,7 @@ def read_quantities(table: Mapping[str, Any], units: Mapping[str, str], where: s
 def _refuse_unknown(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:
     for name in table:
         if name not in known:
-            raise DataFileError(
-                f"{where}.{name} is not known.", f"Use only: {', '.join(known)}."
-            )
+            raise DataFileError(f"{where}.{name} is not known.", f"Use only: {', '.join(known)}.")
 
 
 def _read_quantity(table: Mapping[str, Any], name: str, unit: str, where: str) -> Quantity:

@@ -1,0 +1,107 @@
+"""A record as a table of named channels, the form in which files hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.errors import RecordError
+from ident.records.record import Record, Segment, make_segment
+from ident.vehicle.geometry import WHEELS
+
+TORQUES: Final = tuple(f"torque_{wheel}" for wheel in WHEELS)
+COMMANDS: Final = tuple(f"command_torque_{wheel}" for wheel in WHEELS)
+WHEEL_ANGLES: Final = tuple(f"beta_{wheel}" for wheel in WHEELS)
+STEERING_ANGLES: Final = ("alpha_l", "alpha_r")
+
+REQUIRED: Final = ("time", "step", *TORQUES, *WHEEL_ANGLES, *STEERING_ANGLES)
+
+CHANNEL_UNITS: Final = {
+    "time": "s",
+    "step": "",
+    "period": "",
+    **dict.fromkeys((*TORQUES, *COMMANDS), "Nm"),
+    **dict.fromkeys((*WHEEL_ANGLES, *STEERING_ANGLES), "rad"),
+}
+"""Unit of each channel of the contract; other channels state their own."""
+
+Table = Mapping[str, NDArray[Any]]
+
+
+def record_from_table(table: Table, source: str) -> Record:
+    """Record from channels by name, all of one length; a new segment starts wherever `step` changes.
+
+    Raises:
+        RecordError: a channel is missing, lengths differ, or a segment breaks the contract.
+    """
+    _check_channels(table, source)
+    steps = np.asarray(table["step"]).astype(str)
+    starts = np.flatnonzero(np.concatenate([[True], steps[1:] != steps[:-1]]))
+    ends = [*starts[1:].tolist(), len(steps)]
+    segments = [
+        make_segment(_slice(table, slice(int(start), int(end)), str(steps[start])), source)
+        for start, end in zip(starts, ends, strict=True)
+    ]
+    return Record(segments, source)
+
+
+def table_from_record(record: Record) -> dict[str, NDArray[Any]]:
+    """Channels by name of all segments behind each other, the inverse of `record_from_table`."""
+    parts = [_columns(segment) for segment in record.segments]
+    shared = [name for name in parts[0] if all(name in part for part in parts)]
+    return {name: np.concatenate([part[name] for part in parts]) for name in shared}
+
+
+def _check_channels(table: Table, source: str) -> None:
+    missing = [name for name in REQUIRED if name not in table]
+    if missing:
+        raise RecordError(
+            f"{source} lacks the channel{'s' if len(missing) > 1 else ''} {', '.join(missing)}.",
+            f"A record needs {', '.join(REQUIRED)}, in SI units.",
+        )
+    lengths = {name: len(table[name]) for name in table}
+    if len(set(lengths.values())) > 1:
+        raise RecordError(
+            f"{source} has channels of different lengths: {lengths}.", "Write one row a sample."
+        )
+    if not len(table["time"]):
+        raise RecordError(f"{source} holds no samples.", "Record again.")
+
+
+def _stack(table: Table, names: tuple[str, ...], rows: slice) -> NDArray[np.float64]:
+    return np.stack([np.asarray(table[name][rows], dtype=float) for name in names], axis=1)
+
+
+def _slice(table: Table, rows: slice, step: str) -> Segment:
+    time = np.asarray(table["time"][rows], dtype=float)
+    known = {*REQUIRED, *COMMANDS, "period"}
+    period = table["period"][rows] if "period" in table else np.full(len(time), -1)
+    return Segment(
+        step=step,
+        sample_time=0.0,
+        time=time,
+        motor_torques=_stack(table, TORQUES, rows),
+        wheel_angles=_stack(table, WHEEL_ANGLES, rows),
+        steering_angles=_stack(table, STEERING_ANGLES, rows),
+        period=np.asarray(period, dtype=np.int64),
+        command_torques=_stack(table, COMMANDS, rows) if all(name in table for name in COMMANDS) else None,
+        extra={name: np.asarray(table[name][rows], dtype=float) for name in table if name not in known},
+    )
+
+
+def _columns(segment: Segment) -> dict[str, NDArray[Any]]:
+    columns: dict[str, NDArray[Any]] = {
+        "time": segment.time,
+        "step": np.full(len(segment), str(segment.step)),
+        "period": segment.period,
+        **dict(zip(TORQUES, segment.motor_torques.T, strict=True)),
+        **dict(zip(WHEEL_ANGLES, segment.wheel_angles.T, strict=True)),
+        **dict(zip(STEERING_ANGLES, segment.steering_angles.T, strict=True)),
+        **segment.extra,
+    }
+    if segment.command_torques is not None:
+        columns |= dict(zip(COMMANDS, segment.command_torques.T, strict=True))
+    return columns

@@ -1,0 +1,78 @@
+"""The eleven dynamic parameters of (18), by the paper's symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.vehicle.quantities import Quantity, read_quantities, read_toml, require_table
+
+PARAMETER_UNITS: Final = {
+    "C_l": "kg m^2",
+    "d_vl": "Nm s/rad",
+    "d_cl": "Nm",
+    "C_r": "kg m^2",
+    "d_vr": "Nm s/rad",
+    "d_cr": "Nm",
+    "m_ch": "kg",
+    "C_ch": "kg m^2",
+    "d_vw": "Nm s/rad",
+    "d_cw": "Nm",
+    "B_w": "kg m^2",
+}
+PARAMETER_NAMES: Final = tuple(PARAMETER_UNITS)
+"""Order of (18)."""
+
+COULOMB_EPSILON: Final = 0.01
+"""ε of tanh(rate/ε) in (16) [rad/s]; paper, section 7."""
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Values and standard deviations of p (18).
+
+    Attributes:
+        values: (11,) in the order of PARAMETER_NAMES.
+        std: (11,) standard uncertainties, zero where none is known.
+    """
+
+    values: NDArray[np.float64]
+    std: NDArray[np.float64]
+
+    def __getitem__(self, name: str) -> float:
+        """Value of one parameter by its symbol."""
+        return float(self.values[PARAMETER_NAMES.index(name)])
+
+    def std_of(self, name: str) -> float:
+        """Standard uncertainty of one parameter by its symbol."""
+        return float(self.std[PARAMETER_NAMES.index(name)])
+
+    def replaced(self, **values: float) -> Parameters:
+        """A copy with some values changed."""
+        changed = self.values.copy()
+        for name, value in values.items():
+            changed[PARAMETER_NAMES.index(name)] = value
+        return Parameters(changed, self.std)
+
+
+def parameters_from(quantities: Mapping[str, Quantity]) -> Parameters:
+    """Parameters from a mapping of all eleven quantities."""
+    return Parameters(
+        np.array([quantities[name].value for name in PARAMETER_NAMES]),
+        np.array([quantities[name].std for name in PARAMETER_NAMES]),
+    )
+
+
+def read_parameters(path: Path, table: str = "parameters") -> Parameters:
+    """Parameters from the table of that name in a TOML file; other keys of an entry are ignored.
+
+    Raises:
+        DataFileError: the file, the table or an entry is missing, or a unit is another one.
+    """
+    entries: Mapping[str, Any] = require_table(read_toml(path), table, path)
+    return parameters_from(read_quantities(entries, PARAMETER_UNITS, f"{path}: {table}"))
