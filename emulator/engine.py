@@ -1,0 +1,253 @@
+"""The physics engine: PyBullet with an explicit client, the vehicle on a floor or on a jack-stand."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import pybullet
+
+from emulator.prototype import Prototype
+from emulator.urdf import generate_urdf, rolling_joint, steering_joint
+from ident.errors import UserError
+from ident.vehicle.geometry import WHEELS
+
+GRAVITY: Final = 9.80665
+"""Standard gravity [m/s^2]; CGPM 1901."""
+
+STAND_CLEARANCE: Final = 0.05
+"""Height of the wheels above the floor on the jack-stand [m]."""
+
+_FRONT_OF_SIDE: Final = (0, 2)
+_ROLLING: Final = 4
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """Settings of the engine's constraint solver; the defaults are the ones measured in docs/emulator.md.
+
+    Attributes:
+        iterations: sweeps of the solver a step.
+        coupling_erp: share of the front/rear coupling error that a step takes back [-].
+        coupling_force: largest torque in that coupling [Nm].
+        residual_threshold: the solver stops early below it; 0 does all sweeps.
+    """
+
+    iterations: int = 50
+    coupling_erp: float = 0.2
+    coupling_force: float = 1e5
+    residual_threshold: float = 0.0
+
+
+class Engine:
+    """The vehicle in PyBullet: eight joints, steering fl, rl, fr, rr, then rolling fl, rl, fr, rr.
+
+    The engine integrates by semi-implicit Euler: a step's velocities are those of the middle of the step, its
+    positions those of the end. Coulomb friction is a velocity motor with target zero, true dry friction.
+
+    Attributes:
+        client: PyBullet's id of this physics world.
+        body: PyBullet's id of the vehicle in it.
+        joints: engine indices of the eight joints.
+        step_size: [s].
+    """
+
+    client: int
+    body: int
+    joints: list[int]
+
+    def __init__(
+        self,
+        prototype: Prototype,
+        *,
+        step_size: float,
+        gui: bool,
+        settings: SolverSettings | None = None,
+    ) -> None:
+        if gui:
+            _require_display(os.environ)
+        self.step_size = step_size
+        self._prototype = prototype
+        self._settings = settings or SolverSettings()
+        self._urdf = generate_urdf(prototype)
+        truth = prototype.truth
+        self._coulomb = [truth[symbol] / 2 for symbol in ("d_cl", "d_cl", "d_cr", "d_cr")]
+        self._coulomb += [truth["d_cw"]] * 4
+        self.client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
+        self.place(on_stand=False, angles=[0.0] * 8)
+
+    def place(self, *, on_stand: bool, angles: Sequence[float]) -> None:
+        """Put the vehicle at rest at the origin, on the floor or on the jack-stand.
+
+        On the stand the chassis is a fixed base, not a soft constraint: it takes any reaction.
+
+        Args:
+            on_stand: chassis held, wheels in the air.
+            angles: (8,) joint angles [rad].
+        """
+        self._prepare_world()
+        height = self._prototype.body.centre_height + (STAND_CLEARANCE if on_stand else 0.0)
+        self.body = self._load(height, on_stand)
+        by_name = self._joint_indices()
+        names = [steering_joint(wheel) for wheel in WHEELS] + [rolling_joint(wheel) for wheel in WHEELS]
+        self.joints = [by_name[name] for name in names]
+        self._remove_damping()
+        self._couple(0, 1)
+        self._couple(2, 3)
+        for joint, angle in zip(self.joints, angles, strict=True):
+            pybullet.resetJointState(self.body, joint, angle, 0.0, physicsClientId=self.client)
+        pybullet.setJointMotorControlArray(
+            self.body,
+            self.joints,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=[0.0] * 8,
+            forces=self._coulomb,
+            physicsClientId=self.client,
+        )
+        self._states = self._previous = self._read()
+
+    def step(self, torques: Sequence[float]) -> None:
+        """One engine step under the joint torques (8,) [Nm]."""
+        client = self.client
+        pybullet.setJointMotorControlArray(
+            self.body, self.joints, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client
+        )
+        pybullet.stepSimulation(client)
+        self._previous = self._states
+        self._states = pybullet.getJointStates(self.body, self.joints, client)
+
+    def angles(self) -> list[float]:
+        """(8,) joint angles [rad]."""
+        return [state[0] for state in self._states]
+
+    def mean_rates(self) -> list[float]:
+        """(8,) joint rates over the last step, that is half a step ago [rad/s]."""
+        return [state[1] for state in self._states]
+
+    def rates(self) -> list[float]:
+        """(8,) joint rates now [rad/s], extrapolated to second order from the last two steps."""
+        return [
+            1.5 * now[1] - 0.5 * before[1] for now, before in zip(self._states, self._previous, strict=True)
+        ]
+
+    def steering_angle(self, side: int) -> float:
+        """Steering angle of the front wheel of a side (0 left, 1 right) [rad]."""
+        return float(self._states[_FRONT_OF_SIDE[side]][0])
+
+    def wheel_angle(self, wheel: int) -> float:
+        """Rolling angle of a wheel [rad], unbounded."""
+        return float(self._states[_ROLLING + wheel][0])
+
+    def wheel_rate(self, wheel: int) -> float:
+        """Rolling rate of a wheel now [rad/s]."""
+        joint = _ROLLING + wheel
+        return float(1.5 * self._states[joint][1] - 0.5 * self._previous[joint][1])
+
+    def base_pose(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Position [m] and orientation quaternion (x, y, z, w) of the chassis in the world."""
+        position, orientation = pybullet.getBasePositionAndOrientation(self.body, self.client)
+        return position, orientation
+
+    def base_velocity(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Linear [m/s] and angular [rad/s] velocity of the chassis in the world, over the last step."""
+        linear, angular = pybullet.getBaseVelocity(self.body, self.client)
+        return linear, angular
+
+    def close(self) -> None:
+        """Disconnect from the physics world."""
+        if pybullet.isConnected(self.client):
+            pybullet.disconnect(self.client)
+
+    def _read(self) -> Any:
+        return pybullet.getJointStates(self.body, self.joints, self.client)
+
+    def _prepare_world(self) -> None:
+        client = self.client
+        pybullet.resetSimulation(physicsClientId=client)
+        pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=self.step_size,
+            numSolverIterations=self._settings.iterations,
+            solverResidualThreshold=self._settings.residual_threshold,
+            deterministicOverlappingPairs=1,
+            physicsClientId=client,
+        )
+        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
+        floor = pybullet.createMultiBody(baseMass=0, baseCollisionShapeIndex=plane, physicsClientId=client)
+        # The engine multiplies the coefficients of the two surfaces; the wheels have 1.
+        pybullet.changeDynamics(
+            floor,
+            -1,
+            lateralFriction=self._prototype.floor_friction,
+            spinningFriction=0.0,
+            rollingFriction=0.0,
+            restitution=0.0,
+            physicsClientId=client,
+        )
+
+    def _load(self, height: float, fixed: bool) -> int:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "vehicle.urdf"
+            path.write_text(self._urdf, encoding="utf-8")
+            return int(
+                pybullet.loadURDF(
+                    str(path),
+                    basePosition=[0.0, 0.0, height],
+                    useFixedBase=fixed,
+                    flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+                    physicsClientId=self.client,
+                )
+            )
+
+    def _joint_indices(self) -> Mapping[str, int]:
+        count = pybullet.getNumJoints(self.body, self.client)
+        infos = (pybullet.getJointInfo(self.body, index, self.client) for index in range(count))
+        return {info[1].decode(): info[0] for info in infos}
+
+    def _remove_damping(self) -> None:
+        for link in range(-1, pybullet.getNumJoints(self.body, self.client)):
+            pybullet.changeDynamics(
+                self.body,
+                link,
+                lateralFriction=1.0,
+                spinningFriction=0.0,
+                rollingFriction=0.0,
+                restitution=0.0,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                physicsClientId=self.client,
+            )
+
+    def _couple(self, front: int, rear: int) -> None:
+        """Couple the steering of two units of a side: the rear turns against the front."""
+        constraint = pybullet.createConstraint(
+            self.body,
+            self.joints[front],
+            self.body,
+            self.joints[rear],
+            pybullet.JOINT_GEAR,
+            [0.0, 0.0, 1.0],
+            [0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0],
+            physicsClientId=self.client,
+        )
+        pybullet.changeConstraint(
+            constraint,
+            gearRatio=1.0,
+            erp=self._settings.coupling_erp,
+            maxForce=self._settings.coupling_force,
+            physicsClientId=self.client,
+        )
+
+
+def _require_display(environment: Mapping[str, str]) -> None:
+    if sys.platform == "linux" and not environment.get("DISPLAY"):
+        raise UserError(
+            "There is no display to show the vehicle on.", "Run without --gui, or set DISPLAY to an X server."
+        )

@@ -1,0 +1,108 @@
+"""The vehicle as URDF, generated from the prototype.
+
+Frames: x forward, y left, z up. Link `chassis` with its origin at the centre of mass; joint `steering_<wheel>`
+about z at each corner; joint `rolling_<wheel>` about the wheel's axle (y of the knuckle), positive when the
+wheel rolls forward. The wheel touches the floor as a sphere: one contact point, exactly below the wheel's
+centre at distance r whatever the load, which is the point contact that the constraints (1) assume. What one
+sees is a cylinder.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Final
+
+from emulator.prototype import Prototype
+from emulator.rigid_bodies import RigidBody
+from ident.vehicle.geometry import WHEELS
+
+SIDE_SIGN: Final = {"fl": 1.0, "rl": 1.0, "fr": -1.0, "rr": -1.0}
+"""+1 left, -1 right."""
+END_SIGN: Final = {"fl": 1.0, "rl": -1.0, "fr": 1.0, "rr": -1.0}
+"""+1 front, -1 rear."""
+
+TYRE_WIDTH_RATIO: Final = 0.5
+"""Width of the tyre that one sees over the wheel radius."""
+
+_BODY_COLOUR: Final = "0.85 0.45 0.10 1"
+_KNUCKLE_COLOUR: Final = "0.55 0.57 0.60 1"
+_TYRE_COLOUR: Final = "0.12 0.12 0.13 1"
+
+
+def steering_joint(wheel: str) -> str:
+    """Name of the steering joint of a wheel."""
+    return f"steering_{wheel}"
+
+
+def rolling_joint(wheel: str) -> str:
+    """Name of the rolling joint of a wheel."""
+    return f"rolling_{wheel}"
+
+
+def generate_urdf(prototype: Prototype) -> str:
+    """URDF text of the prototype; masses [kg], lengths [m], inertias [kg m^2]."""
+    parts = ['<?xml version="1.0"?>', f'<robot name="{prototype.name}">', *_chassis(prototype)]
+    for index, wheel in enumerate(WHEELS):
+        parts += _knuckle(prototype, wheel, prototype.rigid_bodies.knuckles[index])
+        parts += _wheel(prototype, wheel)
+    return "\n".join([*parts, "</robot>", ""])
+
+
+def _vector(*values: float) -> str:
+    return " ".join(f"{value:.17g}" for value in values)
+
+
+def _inertial(body: RigidBody) -> str:
+    xx, yy, zz = (f"{value:.17g}" for value in body.inertia)
+    return (
+        f'<inertial><origin xyz="{_vector(*body.centre)}"/><mass value="{body.mass:.17g}"/>'
+        f'<inertia ixx="{xx}" ixy="0" ixz="0" iyy="{yy}" iyz="0" izz="{zz}"/></inertial>'
+    )
+
+
+def _visual(shape: str, colour: str, name: str, xyz: str = "0 0 0", rpy: str = "0 0 0") -> str:
+    return (
+        f'<visual><origin xyz="{xyz}" rpy="{rpy}"/><geometry>{shape}</geometry>'
+        f'<material name="{name}"><color rgba="{colour}"/></material></visual>'
+    )
+
+
+def _chassis(prototype: Prototype) -> Iterator[str]:
+    body = prototype.body
+    box = f'<box size="{_vector(body.length, body.width, body.height)}"/>'
+    yield '<link name="chassis">'
+    yield _inertial(prototype.rigid_bodies.chassis)
+    # Seen above the wheels; the mass stays at the link's origin.
+    lift = 2 * prototype.geometry.wheel_radius + body.height / 2 - body.centre_height
+    yield _visual(box, _BODY_COLOUR, "body", xyz=_vector(0, 0, lift))
+    yield "</link>"
+
+
+def _knuckle(prototype: Prototype, wheel: str, body: RigidBody) -> Iterator[str]:
+    geometry = prototype.geometry
+    corner = _vector(
+        END_SIGN[wheel] * geometry.wheelbase / 2,
+        SIDE_SIGN[wheel] * geometry.track_width / 2,
+        geometry.wheel_radius - prototype.body.centre_height,
+    )
+    limit = f"{geometry.steering_limit:.17g}"
+    post = f'<cylinder radius="{_vector(geometry.wheel_radius / 4)}" length="{_vector(2 * geometry.wheel_radius)}"/>'
+    yield f'<link name="knuckle_{wheel}">{_inertial(body)}{_visual(post, _KNUCKLE_COLOUR, "knuckle")}</link>'
+    yield f'<joint name="{steering_joint(wheel)}" type="revolute">'
+    yield f'<parent link="chassis"/><child link="knuckle_{wheel}"/><origin xyz="{corner}"/><axis xyz="0 0 1"/>'
+    yield f'<limit lower="-{limit}" upper="{limit}" effort="0" velocity="0"/></joint>'
+
+
+def _wheel(prototype: Prototype, wheel: str) -> Iterator[str]:
+    geometry = prototype.geometry
+    radius = f"{geometry.wheel_radius:.17g}"
+    width = _vector(TYRE_WIDTH_RATIO * geometry.wheel_radius)
+    tyre = f'<cylinder radius="{radius}" length="{width}"/>'
+    offset = _vector(0, SIDE_SIGN[wheel] * geometry.wheel_offset, 0)
+    yield f'<link name="wheel_{wheel}">{_inertial(prototype.rigid_bodies.wheel)}'
+    yield _visual(tyre, _TYRE_COLOUR, "tyre", rpy=_vector(math.pi / 2, 0, 0))
+    yield f'<collision><geometry><sphere radius="{radius}"/></geometry></collision></link>'
+    yield f'<joint name="{rolling_joint(wheel)}" type="continuous">'
+    yield f'<parent link="knuckle_{wheel}"/><child link="wheel_{wheel}"/>'
+    yield f'<origin xyz="{offset}"/><axis xyz="0 1 0"/></joint>'

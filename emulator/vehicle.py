@@ -1,0 +1,166 @@
+"""The emulated vehicle: what the firmware and the bench see of the physics."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Final, Self
+
+from emulator.drive import Drive
+from emulator.encoder import Encoder
+from emulator.engine import Engine
+from emulator.noise import Disturbances
+from emulator.prototype import Prototype
+
+SETTLING_TIME: Final = 0.25
+"""Simulated time that the suspension-free vehicle gets to come to rest on the floor [s]."""
+
+_STEP_TOLERANCE: Final = 1e-6
+"""Fraction of a step by which a duration may miss a whole number of steps through rounding."""
+
+
+@dataclass(frozen=True)
+class GroundTruth:
+    """What only a simulation knows. For tests and the picture on the screen, never on the bus.
+
+    Attributes:
+        time: [s].
+        pose: x, y, gamma of the chassis in the world [m, m, rad].
+        twist: (x', y', gamma')_ch in the chassis frame [m/s, m/s, rad/s], of half an engine step ago.
+        steering_angles: alpha left, right [rad].
+        wheel_angles: beta fl, rl, fr, rr [rad].
+        steering_rates, wheel_rates: of half an engine step ago [rad/s].
+        coupling_error: front plus rear steering angle of each side, zero for an ideal coupling [rad].
+    """
+
+    time: float
+    pose: tuple[float, float, float]
+    twist: tuple[float, float, float]
+    steering_angles: tuple[float, float]
+    wheel_angles: tuple[float, float, float, float]
+    steering_rates: tuple[float, float]
+    wheel_rates: tuple[float, float, float, float]
+    coupling_error: tuple[float, float]
+
+
+class EmulatedVehicle:
+    """Physics, drives and sensors behind the connector.
+
+    Args:
+        prototype: what to emulate.
+        seed: of all randomness; equal seeds and calls give bit-identical results.
+        gui: show the vehicle in a window.
+        noise_scale: factor on every random source; 0 switches noise off.
+        engine_step: [s].
+
+    Attributes:
+        drives: of the wheels fl, rl, fr, rr.
+        encoders: of the steering, left and right.
+        engine: the physics below, for benchmarks and tests.
+
+    Raises:
+        UserError: a window is asked for where there is no display.
+    """
+
+    drives: tuple[Drive, Drive, Drive, Drive]
+    encoders: tuple[Encoder, Encoder]
+
+    def __init__(
+        self,
+        prototype: Prototype,
+        *,
+        seed: int,
+        gui: bool = False,
+        noise_scale: float = 1.0,
+        engine_step: float = 1e-3,
+    ) -> None:
+        self.engine = Engine(prototype, step_size=engine_step, gui=gui)
+        self._noise = Disturbances(prototype, seed=seed, scale=noise_scale, step=engine_step)
+        ratio = prototype.geometry.gear_ratio
+        fl, rl, fr, rr = (
+            Drive(prototype.drive, wheel, ratio, self.engine, self._noise) for wheel in range(4)
+        )
+        self.drives = (fl, rl, fr, rr)
+        left, right = (Encoder(prototype.encoder, side, self.engine, self._noise) for side in range(2))
+        self.encoders = (left, right)
+        truth = prototype.truth
+        self._viscous = [truth[symbol] / 2 for symbol in ("d_vl", "d_vl", "d_vr", "d_vr")]
+        self._viscous += [truth["d_vw"]] * 4
+        self._steps = 0
+        self._owed = 0.0
+        self._settle()
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._steps * self.engine.step_size
+
+    def advance(self, duration: float) -> None:
+        """Let `duration` [s] pass in whole engine steps; a remainder is carried to the next call."""
+        step = self.engine.step_size
+        self._owed += duration
+        steps = math.floor(self._owed / step + _STEP_TOLERANCE)
+        self._owed -= steps * step
+        for _ in range(steps):
+            self._step()
+        self._steps += steps
+
+    def lift(self) -> None:
+        """Put the vehicle on the jack-stand: chassis held, wheels free in the air, everything at rest."""
+        self.engine.place(on_stand=True, angles=self.engine.angles())
+
+    def lower(self) -> None:
+        """Take the vehicle off the jack-stand: on the floor at the origin, settled and at rest."""
+        self.engine.place(on_stand=False, angles=self.engine.angles())
+        self._settle()
+
+    def ground_truth(self) -> GroundTruth:
+        """The true state now."""
+        (x, y, _), (_, _, qz, qw) = self.engine.base_pose()
+        (vx, vy, _), (_, _, yaw_rate) = self.engine.base_velocity()
+        heading = 2 * math.atan2(qz, qw)
+        cosine, sine = math.cos(heading), math.sin(heading)
+        angles, rates = self.engine.angles(), self.engine.mean_rates()
+        return GroundTruth(
+            time=self.time,
+            pose=(x, y, heading),
+            twist=(cosine * vx + sine * vy, cosine * vy - sine * vx, yaw_rate),
+            steering_angles=(angles[0], angles[2]),
+            wheel_angles=(angles[4], angles[5], angles[6], angles[7]),
+            steering_rates=(rates[0], rates[2]),
+            wheel_rates=(rates[4], rates[5], rates[6], rates[7]),
+            coupling_error=(angles[0] + angles[1], angles[2] + angles[3]),
+        )
+
+    def close(self) -> None:
+        """Release the physics engine."""
+        self.engine.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _settle(self) -> None:
+        idle = [0.0] * 8
+        for _ in range(round(SETTLING_TIME / self.engine.step_size)):
+            self.engine.step(idle)
+
+    def _step(self) -> None:
+        # Leapfrog: the forces of time t act over the step that starts at t, the torque as the drive reports it
+        # at t, viscous friction by the rate at t.
+        load, rates = self._noise.load, self.engine.rates()
+        torques = [extra - d * rate for extra, d, rate in zip(load, self._viscous, rates, strict=True)]
+        for joint, drive in enumerate(self.drives, start=4):
+            torques[joint] += drive.wheel_torque
+        self.engine.step(torques)
+        for drive in self.drives:
+            drive.advance()
+        self._noise.advance()
