@@ -1,0 +1,1 @@
+"""From records to parameters with honest standard deviations (paper, section 6)."""

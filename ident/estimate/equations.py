@@ -1,0 +1,172 @@
+"""Rows of (22): a driven segment becomes regressor, generalized torque and mask."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.estimate.filters import Processing, differentiate, moving_rows, second_derivative, zero_phase
+from ident.records.record import Segment, Step
+from ident.vehicle import dynamics, kinematics
+from ident.vehicle.geometry import WHEELS, Geometry
+from ident.vehicle.modes import Mode
+from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
+
+Array = NDArray[np.float64]
+
+_BETA: Final = slice(5, 9)
+
+
+@dataclass(frozen=True)
+class RowsOfStep:
+    """Which rows of (19) a step contributes.
+
+    Attributes:
+        mode: k, or None for wheels in the air, which are four single axes.
+        coordinates: generalized coordinates whose rows are used, by name.
+        joints: indices into q whose friction acts in those rows; all must move.
+    """
+
+    mode: Mode | None
+    coordinates: tuple[str, ...]
+    joints: tuple[int, ...]
+
+
+ROWS: Final = {
+    Step.STEERING_LEFT: RowsOfStep(Mode.ALIGNMENT, ("alpha_l",), (3, 5, 6)),
+    Step.STEERING_RIGHT: RowsOfStep(Mode.ALIGNMENT, ("alpha_r",), (4, 7, 8)),
+    Step.STRAIGHT: RowsOfStep(Mode.STEERED, ("x",), (5, 6, 7, 8)),
+    Step.ROTATION: RowsOfStep(Mode.ROTATION, ("gamma",), (5, 6, 7, 8)),
+    Step.LATERAL: RowsOfStep(Mode.LATERAL, ("y",), (5, 6, 7, 8)),
+    Step.LANE_CHANGE: RowsOfStep(Mode.STEERED, ("alpha_v", "x"), (3, 4, 5, 6, 7, 8)),
+    Step.WHEEL_LIFTED: RowsOfStep(None, tuple(f"beta_{wheel}" for wheel in WHEELS), (5, 6, 7, 8)),
+}
+"""Steps that the estimator knows; segments of other names are passed over."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Smoothed motion of a segment.
+
+    Attributes:
+        alpha: (N, 2) [rad].
+        rates, accelerations: q̇, q̈ (N, 9), chassis-frame twist first, by odometry (3).
+    """
+
+    alpha: Array
+    rates: Array
+    accelerations: Array
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Filtered rows Θ p = τ of one coordinate of one segment, all samples, with the mask beside them.
+
+    Attributes:
+        step, coordinate: where the rows come from.
+        sample_time: [s].
+        time: (N,) [s].
+        regressor: (N, 11), columns in the order of (18).
+        torque: (N,) generalized torque [Nm or N].
+        moving: (N,) rows to be used; the others are stiction.
+        period: (N,) number of the repeat, -1 outside of any.
+    """
+
+    step: str
+    coordinate: str
+    sample_time: float
+    time: Array
+    regressor: Array
+    torque: Array
+    moving: NDArray[np.bool_]
+    period: NDArray[np.int64]
+
+
+def motion_of(segment: Segment, geometry: Geometry, processing: Processing) -> Motion:
+    """Smoothed angles, rates and accelerations of a segment; the twist by odometry (3)."""
+    dt = segment.sample_time
+    alpha = zero_phase(segment.steering_angles, processing.signal_cutoff, dt)
+    beta = zero_phase(segment.wheel_angles, processing.signal_cutoff, dt)
+    alpha_rate, beta_rate = differentiate(alpha, dt), differentiate(beta, dt)
+    twist = kinematics.odometry(alpha, alpha_rate, beta_rate, geometry)
+    rates = np.hstack([twist, alpha_rate, beta_rate])
+    accelerations = np.hstack(
+        [differentiate(twist, dt), second_derivative(alpha, dt), second_derivative(beta, dt)]
+    )
+    return Motion(alpha, rates, accelerations)
+
+
+def equations_of(
+    segment: Segment, geometry: Geometry, processing: Processing, epsilon: float = COULOMB_EPSILON
+) -> list[Equations]:
+    """Rows that a segment contributes, one `Equations` a coordinate.
+
+    The columns of Θ and τ pass the same zero-phase filter: a regressor built from filtered velocities would
+    not be the filtered regressor, because of tanh.
+
+    Raises:
+        KeyError: the segment's step is none of ROWS.
+    """
+    spec = ROWS[Step(segment.step)]
+    motion = motion_of(segment, geometry, processing)
+    theta, torque, names = _raw_rows(spec, segment, motion, geometry, epsilon)
+    dt = segment.sample_time
+    torque = zero_phase(torque, processing.signal_cutoff, dt)
+    theta, torque = zero_phase(theta, processing.cutoff, dt), zero_phase(torque, processing.cutoff, dt)
+    return [
+        Equations(
+            step=segment.step,
+            coordinate=name,
+            sample_time=dt,
+            time=segment.time,
+            regressor=theta[:, names.index(name)],
+            torque=torque[:, names.index(name)],
+            moving=_moving(spec, name, motion, processing, dt),
+            period=segment.period,
+        )
+        for name in spec.coordinates
+    ]
+
+
+def _raw_rows(
+    spec: RowsOfStep, segment: Segment, motion: Motion, geometry: Geometry, epsilon: float
+) -> tuple[Array, Array, tuple[str, ...]]:
+    if spec.mode is None:
+        theta = dynamics.regressor(motion.rates, motion.accelerations, epsilon)[:, _BETA]
+        return theta, geometry.gear_ratio * segment.motor_torques, spec.coordinates
+    theta = dynamics.projected_regressor(
+        spec.mode, motion.alpha, motion.rates, motion.accelerations, geometry, epsilon
+    )
+    torque = dynamics.generalized_torques(spec.mode, motion.alpha, segment.motor_torques, geometry)
+    return theta, torque, kinematics.GENERALIZED_VELOCITIES[spec.mode]
+
+
+def _moving(
+    spec: RowsOfStep, coordinate: str, motion: Motion, processing: Processing, sample_time: float
+) -> NDArray[np.bool_]:
+    if spec.mode is None:
+        joints: tuple[int, ...] = (5 + WHEELS.index(coordinate.removeprefix("beta_")),)
+    elif coordinate == "x":
+        joints = (5, 6, 7, 8)
+    else:
+        joints = spec.joints
+    return moving_rows(motion.rates[:, joints], processing, sample_time)
+
+
+def usable_equations(segments: list[Segment], geometry: Geometry, processing: Processing) -> list[Equations]:
+    """Rows of all segments whose step the estimator knows."""
+    known = {str(step) for step in ROWS}
+    return [
+        equations
+        for segment in segments
+        if segment.step in known
+        for equations in equations_of(segment, geometry, processing)
+    ]
+
+
+def column(name: str) -> int:
+    """Column of a parameter in every regressor."""
+    return PARAMETER_NAMES.index(name)

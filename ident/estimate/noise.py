@@ -1,0 +1,73 @@
+"""What differs between repeated periods is noise; what repeats is model error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.estimate.equations import Equations
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Rms values of one coordinate of one step over its moving rows, in the unit of its generalized torque.
+
+    Attributes:
+        step, coordinate: where.
+        signal: rms of the measured generalized torque.
+        residual: rms of measured minus modelled.
+        noise: rms of what differs between periods, corrected for the degrees of freedom; NaN without repeats.
+        model_error: rms of what repeats, the noise left in the period mean taken off; NaN without repeats.
+    """
+
+    step: str
+    coordinate: str
+    signal: float
+    residual: float
+    noise: float
+    model_error: float
+
+    @property
+    def nrmse(self) -> float:
+        """Rms error over rms signal [-]."""
+        return self.residual / self.signal
+
+
+def noise_floor(equations: Equations, values: Array) -> NoiseFloor:
+    """Split the residual of one coordinate; `values` are the parameters (11,)."""
+    residual = equations.torque - equations.regressor @ values
+    moving = equations.moving
+    noise, model_error = _split(residual, equations)
+    return NoiseFloor(
+        equations.step,
+        equations.coordinate,
+        _rms(equations.torque[moving]),
+        _rms(residual[moving]),
+        noise,
+        model_error,
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+
+
+def _split(residual: Array, equations: Equations) -> tuple[float, float]:
+    numbers = [number for number in np.unique(equations.period) if number >= 0]
+    if len(numbers) < 2:
+        return float("nan"), float("nan")
+    length = min(int(np.sum(equations.period == number)) for number in numbers)
+    folded = np.stack([residual[equations.period == number][:length] for number in numbers])
+    moving = np.stack([equations.moving[equations.period == number][:length] for number in numbers]).all(
+        axis=0
+    )
+    if not moving.any():
+        return float("nan"), float("nan")
+    folded = folded[:, moving]
+    variance = float(np.mean(folded.var(axis=0, ddof=1)))
+    repeated = float(np.mean(folded.mean(axis=0) ** 2)) - variance / len(numbers)
+    return float(np.sqrt(variance)), float(np.sqrt(max(repeated, 0.0)))

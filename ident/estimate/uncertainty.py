@@ -1,0 +1,139 @@
+"""Standard deviations that stay right under coloured residuals and repeated model error.
+
+The estimate's error is (Θᵀ Θ)⁻¹ Σ xₜ eₜ. Three things make the textbook σ²(Θᵀ Θ)⁻¹ too small: the residual is
+coloured (by the filter, by slow friction), its size differs between steps, and model error repeats with every
+period of the excitation, so that more periods do not average it out. The long-run covariance of the scores
+xₜ eₜ is therefore estimated in two parts: what differs between periods (noise), by a Bartlett kernel with
+Andrews' automatic bandwidth (Andrews 1991, eq. 6.4), and what repeats (model error), from the period means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+Array = NDArray[np.float64]
+
+BLOCK_TIME = 0.02
+"""Scores are summed over blocks of this length first [s], well below the filter's memory."""
+
+
+@dataclass(frozen=True)
+class Scores:
+    """xₜ eₜ of one coordinate of one segment, zero in dropped rows.
+
+    Attributes:
+        values: (N, n).
+        period: (N,) number of the repeat, -1 outside of any.
+        sample_time: [s].
+    """
+
+    values: Array
+    period: NDArray[np.int64]
+    sample_time: float
+
+
+@dataclass(frozen=True)
+class LongRun:
+    """Covariance of a sum of scores, and the degrees of freedom of that estimate."""
+
+    covariance: Array
+    degrees_of_freedom: float
+
+
+def long_run_covariance(parts: Sequence[Scores]) -> LongRun:
+    """Covariance (n, n) of Σ xₜ eₜ over independent parts."""
+    estimates = [estimate for part in parts for estimate in _of_part(part)]
+    total = np.sum([estimate.covariance for estimate in estimates], axis=0)
+    return LongRun(total, _combined_degrees(estimates, total))
+
+
+def parameter_covariance(normal_inverse: Array, scores: LongRun) -> Array:
+    """Sandwich (Θᵀ Θ)⁻¹ S (Θᵀ Θ)⁻¹, (n, n)."""
+    return np.asarray(normal_inverse @ scores.covariance @ normal_inverse)
+
+
+def interval_factor(degrees_of_freedom: float, level: float = 0.95) -> float:
+    """Half-width of a two-sided interval in standard deviations (Student's t)."""
+    return float(stats.t.ppf((1 + level) / 2, max(degrees_of_freedom, 1.0)))
+
+
+def _combined_degrees(estimates: Sequence[LongRun], total: Array) -> float:
+    """Welch-Satterthwaite on the traces, each column in units of its own total variance."""
+    unit = np.maximum(np.diag(total), np.finfo(float).tiny)
+    shares = [float(np.mean(np.diag(estimate.covariance) / unit)) for estimate in estimates]
+    weight = sum(
+        share**2 / estimate.degrees_of_freedom for share, estimate in zip(shares, estimates, strict=True)
+    )
+    return 1.0 / weight if weight > 0 else np.inf
+
+
+def _of_part(part: Scores) -> list[LongRun]:
+    outside = part.values[part.period < 0]
+    folded = _fold(part)
+    if folded is None:
+        return [_bartlett(_block_sums(part.values, part.sample_time))]
+    estimates = _of_periods(folded, part.sample_time)
+    return [*estimates, _bartlett(_block_sums(outside, part.sample_time))] if np.any(outside) else estimates
+
+
+def _fold(part: Scores) -> Array | None:
+    """Scores by period (P, T, n), or None for fewer than two repeats."""
+    numbers = [number for number in np.unique(part.period) if number >= 0]
+    if len(numbers) < 2:
+        return None
+    length = min(int(np.sum(part.period == number)) for number in numbers)
+    return np.stack([part.values[part.period == number][:length] for number in numbers])
+
+
+def _of_periods(folded: Array, sample_time: float) -> list[LongRun]:
+    """Noise from the differences between periods; repeated model error from their mean."""
+    periods = len(folded)
+    mean = folded.mean(axis=0)
+    deviations = np.concatenate([_block_sums(period - mean, sample_time) for period in folded])
+    noise = _bartlett(deviations)
+    noise_total = noise.covariance * periods / (periods - 1)
+    repeated = periods**2 * _bartlett(_block_sums(mean, sample_time)).covariance - noise_total
+    degrees = noise.degrees_of_freedom * (periods - 1) / periods
+    return [LongRun(noise_total, degrees), LongRun(_positive_part(repeated), degrees / periods)]
+
+
+def _positive_part(matrix: Array) -> Array:
+    scale = np.sqrt(np.maximum(np.abs(np.diag(matrix)), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    positive = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    return np.asarray(positive * np.outer(scale, scale))
+
+
+def _block_sums(scores: Array, sample_time: float) -> Array:
+    block = max(1, round(BLOCK_TIME / sample_time))
+    starts = np.arange(0, len(scores), block)
+    return np.asarray(np.add.reduceat(scores, starts, axis=0)) if len(scores) else scores
+
+
+def _bartlett(blocks: Array) -> LongRun:
+    """Newey-West covariance of the sum of the blocks (m, n), automatic bandwidth."""
+    lag = _andrews_lag(blocks)
+    total = blocks.T @ blocks
+    for shift in range(1, lag + 1):
+        product = blocks[shift:].T @ blocks[:-shift]
+        total = total + (1 - shift / (lag + 1)) * (product + product.T)
+    return LongRun(total, 1.5 * len(blocks) / (lag + 1))
+
+
+def _andrews_lag(blocks: Array) -> int:
+    """Bandwidth of the Bartlett kernel by an AR(1) plug-in, all columns in units of their own rms."""
+    power = np.sum(blocks**2, axis=0)
+    active = blocks[:, power > 0] / np.sqrt(power[power > 0])
+    if not active.size or len(active) < 4:
+        return 0
+    correlation = np.clip(np.sum(active[1:] * active[:-1], axis=0), -0.97, 0.97)
+    innovation = (1 - correlation**2) ** 2
+    numerator = np.sum(4 * correlation**2 * innovation / ((1 - correlation) ** 6 * (1 + correlation) ** 2))
+    denominator = np.sum(innovation / (1 - correlation) ** 4)
+    lag = 1.1447 * (numerator / denominator * len(active)) ** (1 / 3)
+    return int(min(np.ceil(lag), len(active) // 4))
