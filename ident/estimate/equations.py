@@ -93,9 +93,7 @@ def motion_of(segment: Segment, geometry: Geometry, processing: Processing) -> M
     alpha_rate, beta_rate = differentiate(alpha, dt), differentiate(beta, dt)
     twist = kinematics.odometry(alpha, alpha_rate, beta_rate, geometry)
     rates = np.hstack([twist, alpha_rate, beta_rate])
-    accelerations = np.hstack(
-        [differentiate(twist, dt), second_derivative(alpha, dt), second_derivative(beta, dt)]
-    )
+    accelerations = np.hstack([differentiate(twist, dt), second_derivative(alpha, dt), second_derivative(beta, dt)])
     return Motion(alpha, rates, accelerations)
 
 
@@ -137,9 +135,7 @@ def _raw_rows(
     if spec.mode is None:
         theta = dynamics.regressor(motion.rates, motion.accelerations, epsilon)[:, _BETA]
         return theta, geometry.gear_ratio * segment.motor_torques, spec.coordinates
-    theta = dynamics.projected_regressor(
-        spec.mode, motion.alpha, motion.rates, motion.accelerations, geometry, epsilon
-    )
+    theta = dynamics.projected_regressor(spec.mode, motion.alpha, motion.rates, motion.accelerations, geometry, epsilon)
     torque = dynamics.generalized_torques(spec.mode, motion.alpha, segment.motor_torques, geometry)
     return theta, torque, kinematics.GENERALIZED_VELOCITIES[spec.mode]
 

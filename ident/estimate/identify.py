@@ -163,9 +163,7 @@ def identify(
     )
 
 
-def _wheel_inertia(
-    equations: Sequence[Equations], known: KnownInertia | None
-) -> tuple[KnownInertia, _Fit | None]:
+def _wheel_inertia(equations: Sequence[Equations], known: KnownInertia | None) -> tuple[KnownInertia, _Fit | None]:
     if known is not None:
         return known, None
     rows = [equation for equation in equations if equation.step == Step.WHEEL_LIFTED]

@@ -62,9 +62,7 @@ def _split(residual: Array, equations: Equations) -> tuple[float, float]:
         return float("nan"), float("nan")
     length = min(int(np.sum(equations.period == number)) for number in numbers)
     folded = np.stack([residual[equations.period == number][:length] for number in numbers])
-    moving = np.stack([equations.moving[equations.period == number][:length] for number in numbers]).all(
-        axis=0
-    )
+    moving = np.stack([equations.moving[equations.period == number][:length] for number in numbers]).all(axis=0)
     if not moving.any():
         return float("nan"), float("nan")
     folded = folded[:, moving]

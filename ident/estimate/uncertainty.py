@@ -66,9 +66,7 @@ def _combined_degrees(estimates: Sequence[LongRun], total: Array) -> float:
     """Welch-Satterthwaite on the traces, each column in units of its own total variance."""
     unit = np.maximum(np.diag(total), np.finfo(float).tiny)
     shares = [float(np.mean(np.diag(estimate.covariance) / unit)) for estimate in estimates]
-    weight = sum(
-        share**2 / estimate.degrees_of_freedom for share, estimate in zip(shares, estimates, strict=True)
-    )
+    weight = sum(share**2 / estimate.degrees_of_freedom for share, estimate in zip(shares, estimates, strict=True))
     return 1.0 / weight if weight > 0 else np.inf
 
 

@@ -78,9 +78,7 @@ def _csv_column(path: Path, name: str, cells: list[str]) -> NDArray[Any]:
     try:
         return np.array(cells, dtype=float)
     except ValueError as error:
-        raise RecordError(
-            f"{path}: channel {name}: {error}.", "Write numbers with a decimal point."
-        ) from error
+        raise RecordError(f"{path}: channel {name}: {error}.", "Write numbers with a decimal point.") from error
 
 
 def _write_csv(table: Mapping[str, NDArray[Any]], path: Path) -> None:
@@ -142,9 +140,7 @@ def _read_mf4(path: Path) -> dict[str, NDArray[Any]]:
     table: dict[str, NDArray[Any]] = {"time": np.asarray(signals[0].timestamps, dtype=float)}
     for signal in signals:
         if len(signal.timestamps) != len(table["time"]):
-            raise RecordError(
-                f"{path}: channel {signal.name} is sampled at another rate.", "Resample to one raster."
-            )
+            raise RecordError(f"{path}: channel {signal.name} is sampled at another rate.", "Resample to one raster.")
         if signal.unit:
             _check_unit(path, signal.name, signal.unit)
         table[signal.name] = np.asarray(signal.samples)

@@ -64,9 +64,7 @@ def _check_channels(table: Table, source: str) -> None:
         )
     lengths = {name: len(table[name]) for name in table}
     if len(set(lengths.values())) > 1:
-        raise RecordError(
-            f"{source} has channels of different lengths: {lengths}.", "Write one row a sample."
-        )
+        raise RecordError(f"{source} has channels of different lengths: {lengths}.", "Write one row a sample.")
     if not len(table["time"]):
         raise RecordError(f"{source} holds no samples.", "Record again.")
 

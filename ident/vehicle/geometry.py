@@ -70,9 +70,7 @@ class Geometry:
 
     def as_vector(self) -> NDArray[np.float64]:
         """(l, b, a, r, i_G), the order of the symbolic model."""
-        return np.array(
-            [self.wheelbase, self.track_width, self.wheel_offset, self.wheel_radius, self.gear_ratio]
-        )
+        return np.array([self.wheelbase, self.track_width, self.wheel_offset, self.wheel_radius, self.gear_ratio])
 
 
 def read_geometry(table: Mapping[str, Any], path: Path) -> Geometry:

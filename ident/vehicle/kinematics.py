@@ -89,9 +89,7 @@ def constraint_matrix(alpha: ArrayLike, geometry: Geometry) -> Array:
     return evaluate(_constraint_function(), (8, 9), angles, geometry.as_vector())
 
 
-def odometry(
-    alpha: ArrayLike, steering_rates: ArrayLike, wheel_rates: ArrayLike, geometry: Geometry
-) -> Array:
+def odometry(alpha: ArrayLike, steering_rates: ArrayLike, wheel_rates: ArrayLike, geometry: Geometry) -> Array:
     """Twist in the chassis frame (N, 3) [m/s, m/s, rad/s] from α (N, 2), α̇ (N, 2), β̇ (N, 4) by (3)."""
     arguments = samples_of(alpha, steering_rates, wheel_rates)
     return evaluate(_odometry_function(), (3,), *arguments, geometry.as_vector())

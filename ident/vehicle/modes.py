@@ -54,6 +54,4 @@ def detect_mode(alpha: ArrayLike, geometry: Geometry, tolerance: float = 0.02) -
     lateral = np.all(np.abs(angles - math.pi / 2 * opposite) < tolerance, axis=-1)
     outside_track = np.abs(virtual_steering(angles, geometry)) < geometry.rotation_angle
     steered = (np.abs(icr_residual(angles, geometry)) < tolerance) & outside_track
-    return np.select(
-        [rotation, lateral, steered], [Mode.ROTATION, Mode.LATERAL, Mode.STEERED], default=Mode.ALIGNMENT
-    )
+    return np.select([rotation, lateral, steered], [Mode.ROTATION, Mode.LATERAL, Mode.STEERED], default=Mode.ALIGNMENT)
