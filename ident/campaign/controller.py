@@ -1,0 +1,124 @@
+"""The controller of a step: feed-forward torques plus one cascade a coordinate, in plain floats for speed.
+
+A loop's coordinate moves along its column h of H_k: its rate is h·β̇ / h·h and its generalized torque τ becomes
+motor torques h τ / (i_G h·h), the minimum-norm distribution. Steering positions come from the steering encoders;
+all rates come from the wheel encoders, which resolve them far better: rolling ties them together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ident.campaign.loops import LoopDesign
+from ident.campaign.reference import STEERING_LOOPS, Reference
+from ident.errors import CampaignError
+
+REST = 1e-9
+"""Reference speed that counts as standstill."""
+
+
+@dataclass(frozen=True)
+class LoopLimits:
+    """Bounds of one loop.
+
+    Attributes:
+        following_error: largest position error before the campaign is stopped [rad or m].
+        integral: largest torque of the integrator.
+        dead_band: position error at standstill that the integrator leaves alone [rad or m], so that stiction
+            does not make it hunt.
+    """
+
+    following_error: float
+    integral: float
+    dead_band: float
+
+
+class _Loop:
+    """State of one cascade."""
+
+    def __init__(self, name: str, reference: Reference, design: LoopDesign, limits: LoopLimits, gear: float) -> None:
+        track = reference.tracks[name]
+        norm = np.sum(track.wheels**2, axis=1, keepdims=True)
+        self.name = name
+        self.side = STEERING_LOOPS.index(name) if name in STEERING_LOOPS else None
+        self.position = track.position.tolist()
+        self.velocity = track.velocity.tolist()
+        self.measure = (track.wheels / norm).tolist()
+        self.distribute = (track.wheels / (norm * gear)).tolist()
+        self.gains = (design.position_gain, design.velocity_gain, design.integral_gain * reference.sample_time)
+        self.limits = limits
+        self.travel = 0.0
+        self.integral = 0.0
+
+    def torque(
+        self, index: int, steps: tuple[float, float, float, float], steering: Sequence[float], rate: float
+    ) -> float:
+        """Generalized torque from wheel angle increments `steps` and steering angles; `rate` is 1/T_s."""
+        m = self.measure[index]
+        moved = m[0] * steps[0] + m[1] * steps[1] + m[2] * steps[2] + m[3] * steps[3]
+        self.travel += moved
+        wanted = self.velocity[index]
+        error = self.position[index] - (self.travel if self.side is None else steering[self.side])
+        if abs(error) > self.limits.following_error:
+            raise FollowingError(self.name, index, error, self.limits.following_error)
+        position_gain, velocity_gain, integral_gain = self.gains
+        velocity_error = wanted + position_gain * error - moved * rate
+        if abs(wanted) > REST or abs(error) > self.limits.dead_band:
+            bound = self.limits.integral
+            self.integral = min(max(self.integral + integral_gain * velocity_error, -bound), bound)
+        return velocity_gain * velocity_error + self.integral
+
+
+class FollowingError(CampaignError):
+    """A coordinate is too far from its reference."""
+
+    def __init__(self, coordinate: str, sample: int, error: float, limit: float) -> None:
+        super().__init__(
+            f"{coordinate} is {error:+.3f} off its reference at sample {sample} (limit {limit:.3f}).",
+            "Look for a blocked or slipping wheel, a wrong direction of rotation or gear ratio in the network "
+            "file, or prior parameters far from the truth in the vehicle file.",
+        )
+        self.coordinate = coordinate
+
+
+class Controller:
+    """Drives one reference; call `torques` once a cycle with fresh measurements."""
+
+    def __init__(
+        self,
+        reference: Reference,
+        designs: Mapping[str, LoopDesign],
+        limits: Mapping[str, LoopLimits],
+        *,
+        gear_ratio: float,
+        peak_torque: float,
+    ) -> None:
+        self._loops = [_Loop(name, reference, designs[name], limits[name], gear_ratio) for name in reference.tracks]
+        self._feed_forward = reference.feed_forward.tolist()
+        self._rate = 1 / reference.sample_time
+        self._peak = peak_torque
+        self._previous: Sequence[float] | None = None
+
+    def torques(self, index: int, wheel_angles: Sequence[float], steering: Sequence[float]) -> list[float]:
+        """Motor torques (4,) [Nm] for sample `index` of the reference, from β (4,) and α (2,) [rad].
+
+        Raises:
+            FollowingError: a coordinate is further from its reference than its limit.
+        """
+        last = self._previous or wheel_angles
+        self._previous = wheel_angles
+        w0, w1, w2, w3 = wheel_angles
+        steps = (w0 - last[0], w1 - last[1], w2 - last[2], w3 - last[3])
+        u0, u1, u2, u3 = self._feed_forward[index]
+        for loop in self._loops:
+            torque = loop.torque(index, steps, steering, self._rate)
+            d = loop.distribute[index]
+            u0 += d[0] * torque
+            u1 += d[1] * torque
+            u2 += d[2] * torque
+            u3 += d[3] * torque
+        peak = self._peak
+        return [min(max(u, -peak), peak) for u in (u0, u1, u2, u3)]

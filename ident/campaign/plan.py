@@ -1,0 +1,180 @@
+"""A campaign before it moves: excitations, loop designs, the room it takes, the limits it keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.campaign.axis import Axis, axis_of
+from ident.campaign.controller import LoopLimits
+from ident.campaign.loops import LoopDesign, design_loop
+from ident.campaign.optimise import Excitation, Problem, optimise
+from ident.campaign.reference import (
+    LIFTED_LOOPS,
+    LaneChange,
+    Reference,
+    alignment_reference,
+    excitation_reference,
+    lane_change_reference,
+)
+from ident.campaign.steps import EXCITATIONS, ORDER, Posture
+from ident.errors import CampaignError
+from ident.estimate.filters import Processing
+from ident.records.record import Step
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.parameters import Parameters
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+FOLLOWING_ERRORS: Final = {"alpha": 0.35, "x": 0.25, "y": 0.25, "gamma": 0.35, "beta": 3.0}
+"""Largest position error before a campaign stops, by coordinate [rad or m]."""
+
+DEAD_BANDS: Final = {"alpha": 5e-4, "x": 5e-4, "y": 5e-4, "gamma": 5e-4, "beta": 5e-3}
+"""Position error at standstill that the integrators leave alone, by coordinate [rad or m]."""
+
+INTEGRAL_SHARE: Final = 3.0
+"""Bound of an integrator in units of the coordinate's Coulomb friction."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """Floor that a campaign covers, from its start [m]: ahead, behind, to the left, to the right."""
+
+    ahead: float
+    behind: float
+    left: float
+    right: float
+
+    @property
+    def length(self) -> float:
+        """Along the vehicle [m]."""
+        return self.ahead + self.behind
+
+    @property
+    def width(self) -> float:
+        """Across the vehicle [m]."""
+        return self.left + self.right
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything that is decided before the vehicle moves.
+
+    Attributes:
+        vehicle: what is known of it.
+        steps: in order, without the alignments between them.
+        excitations: of the excitation steps.
+        designs, limits: of every loop, by coordinate.
+        periods: repeats of an excitation.
+        cycle: T_s [s].
+        manoeuvre: the lane change.
+    """
+
+    vehicle: VehicleDescription
+    steps: tuple[Step, ...]
+    excitations: Mapping[Step, Excitation]
+    designs: Mapping[str, LoopDesign]
+    limits: Mapping[str, LoopLimits]
+    periods: int
+    cycle: float
+    manoeuvre: LaneChange
+
+    def reference(self, step: Step, parameters: Parameters) -> Reference:
+        """The reference of a step, feed-forward by `parameters`."""
+        if step is Step.LANE_CHANGE:
+            return lane_change_reference(self.manoeuvre, self.vehicle, parameters, self.cycle)
+        spec, series = EXCITATIONS[step], self.excitations[step].series
+        return excitation_reference(spec, series, self.periods, self.vehicle, parameters, self.cycle)
+
+    def alignment(self, start: Array, step: Step, parameters: Parameters) -> Reference:
+        """Reference that takes the steering from `start` (2,) to where `step` begins."""
+        return alignment_reference(start, self.posture(step), self.vehicle, parameters, self.cycle)
+
+    def posture(self, step: Step) -> Array:
+        """Steering angles (2,) [rad] at which a step begins."""
+        posture = EXCITATIONS[step].posture if step in EXCITATIONS else Posture.AHEAD
+        return posture.angles(self.vehicle.geometry)
+
+    def room(self) -> Room:
+        """Floor that the planned steps cover, wheels included (paper, section 6.2)."""
+        half = self.vehicle.geometry.footprint[0] / 2
+        reaches = np.vstack([self.reference(step, self.vehicle.prior).path for step in self.steps])
+        low, high = reaches.min(axis=0), reaches.max(axis=0)
+        return Room(high[0] + half, half - low[0], high[1] + half, half - low[1])
+
+
+def make_plan(
+    vehicle: VehicleDescription,
+    generator: np.random.Generator,
+    *,
+    steps: Sequence[Step],
+    periods: int,
+    cycle: float,
+    processing: Processing | None = None,
+    manoeuvre: LaneChange | None = None,
+) -> Plan:
+    """Optimise the excitations and design the loops.
+
+    Raises:
+        CampaignError: a step is unknown, or the steps need more floor than the vehicle file allows.
+    """
+    ordered = tuple(step for step in ORDER if step in steps)
+    if not ordered:
+        raise CampaignError("The campaign has no step.", f"Choose from {', '.join(ORDER)}.")
+    axes = {step: axis_of(spec, vehicle) for step, spec in EXCITATIONS.items()}
+    plan = Plan(
+        vehicle=vehicle,
+        steps=ordered,
+        excitations={
+            step: _excitation(step, axes[step], vehicle, processing or Processing(), generator)
+            for step in ordered
+            if step in EXCITATIONS
+        },
+        designs=_by_loop({step: design_loop(axis, cycle) for step, axis in axes.items()}),
+        limits=_by_loop({step: _limits(step, axis) for step, axis in axes.items()}),
+        periods=periods,
+        cycle=cycle,
+        manoeuvre=manoeuvre or LaneChange(),
+    )
+    _check_room(plan)
+    return plan
+
+
+def _excitation(
+    step: Step, axis: Axis, vehicle: VehicleDescription, processing: Processing, generator: np.random.Generator
+) -> Excitation:
+    spec, geometry = EXCITATIONS[step], vehicle.geometry
+    problem = Problem(spec, axis, vehicle.limits, geometry.gear_ratio, vehicle.prior["m_ch"], processing)
+    return optimise(problem, generator)
+
+
+def _limits(step: Step, axis: Axis) -> LoopLimits:
+    family = EXCITATIONS[step].coordinate.split("_")[0]
+    return LoopLimits(FOLLOWING_ERRORS[family], INTEGRAL_SHARE * axis.coulomb, DEAD_BANDS[family])
+
+
+def _by_loop(by_step: Mapping[Step, T]) -> dict[str, T]:
+    loops = {EXCITATIONS[step].coordinate: value for step, value in by_step.items()}
+    beta = loops.pop("beta")
+    return {**loops, **dict.fromkeys(LIFTED_LOOPS, beta)}
+
+
+def _check_room(plan: Plan) -> None:
+    room, limits = plan.room(), plan.vehicle.limits
+    reach = max(room.ahead, room.behind), max(room.left, room.right)
+    for name, need, have in (
+        ("length", 2 * reach[0], limits.floor_length),
+        ("width", 2 * reach[1], limits.floor_width),
+    ):
+        if need > have:
+            raise CampaignError(
+                f"The campaign reaches {need / 2:.2f} m from its start, but the floor's {name} of {have:.2f} m "
+                f"leaves {have / 2:.2f} m on either side.",
+                "Leave out lane_change or lateral (--skip), or set limits.floor_length and floor_width of the "
+                "vehicle file to the room there is.",
+            )

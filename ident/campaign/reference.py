@@ -1,0 +1,254 @@
+"""References: what every loop shall follow, sample by sample, with the feed-forward torques of (21)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.campaign.excitation import FourierSeries
+from ident.campaign.steps import StepSpec
+from ident.records.record import Step
+from ident.vehicle import dynamics, kinematics
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.geometry import WHEELS, Geometry
+from ident.vehicle.modes import Mode
+from ident.vehicle.parameters import Parameters
+
+Array = NDArray[np.float64]
+
+SETTLING: Final = 1.0
+"""Standstill before and after every motion [s]."""
+
+LIFTED_LOOPS: Final = tuple(f"beta_{wheel}" for wheel in WHEELS)
+STEERING_LOOPS: Final = ("alpha_l", "alpha_r")
+
+
+@dataclass(frozen=True)
+class Track:
+    """What one loop follows.
+
+    Attributes:
+        position, velocity: (N,) of its coordinate.
+        wheels: (N, 4) wheel rates per rate of the coordinate, the coordinate's column of H_k.
+    """
+
+    position: Array
+    velocity: Array
+    wheels: Array
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A step ready to be driven.
+
+    Attributes:
+        step: its name in records.
+        coordinate: what is driven, for messages.
+        sample_time: [s].
+        tracks: by coordinate: alpha_l, alpha_r, and x, y or gamma; or beta_fl ... in the air.
+        feed_forward: motor torques (N, 4) [Nm].
+        period: (N,) number of the repeat, -1 outside of any.
+        path: (N, 3) pose that the chassis is to take, from the start of the step [m, m, rad].
+    """
+
+    step: Step
+    coordinate: str
+    sample_time: float
+    tracks: Mapping[str, Track]
+    feed_forward: Array
+    period: NDArray[np.int64]
+    path: Array = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.feed_forward)
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return len(self) * self.sample_time
+
+
+def excitation_reference(
+    spec: StepSpec,
+    series: FourierSeries,
+    periods: int,
+    vehicle: VehicleDescription,
+    parameters: Parameters,
+    sample_time: float,
+) -> Reference:
+    """An excitation step: standstill, `periods` repeats, standstill."""
+    per_period = round(spec.period / sample_time)
+    motion = series.evaluate(np.arange(per_period) * sample_time)
+    rest = round(SETTLING / sample_time)
+    position, velocity, acceleration = (_padded(np.tile(values, periods), rest) for values in motion)
+    period = np.concatenate([np.full(rest, -1), np.repeat(np.arange(periods), per_period), np.full(rest, -1)])
+    alpha = np.tile(spec.steering(vehicle.geometry), (len(position), 1))
+    if spec.mode is None:
+        tracks, torques = _lifted(position, velocity, acceleration, vehicle.geometry, parameters)
+    else:
+        tracks = _tracks(spec, alpha, position, velocity, vehicle.geometry)
+        torques = _feed_forward(spec, alpha, velocity, acceleration, vehicle.geometry, parameters)
+    path = np.zeros((len(position), 3))
+    if spec.coordinate in ("x", "y", "gamma"):
+        path[:, ("x", "y", "gamma").index(spec.coordinate)] = position
+    return Reference(spec.step, spec.coordinate, sample_time, tracks, torques, period, path)
+
+
+def alignment_reference(
+    start: Array, target: Array, vehicle: VehicleDescription, parameters: Parameters, sample_time: float
+) -> Reference:
+    """Wheel alignment at rest from steering angles `start` to `target` (2,), both sides at once."""
+    move = max(0.5, float(np.abs(target - start).max()) / ALIGNMENT_SPEED)
+    samples = round((move + 2 * SETTLING) / sample_time)
+    time = np.arange(samples) * sample_time - SETTLING / 2
+    shape, rate, curvature = smooth_step(time / move)
+    stroke = target - start
+    alpha = start + shape[:, None] * stroke
+    velocity, acceleration = rate[:, None] * stroke / move, curvature[:, None] * stroke / move**2
+    torques = dynamics.feed_forward(Mode.ALIGNMENT, alpha, velocity, acceleration, parameters.values, vehicle.geometry)
+    tracks = _steering_tracks(alpha, velocity, vehicle.geometry)
+    period = np.full(samples, -1)
+    return Reference(Step.ALIGNMENT, "alpha", sample_time, tracks, torques, period, np.zeros((samples, 3)))
+
+
+ALIGNMENT_SPEED: Final = 0.8
+"""Mean steering speed of an alignment [rad/s]."""
+
+
+@dataclass(frozen=True)
+class LaneChange:
+    """The validation manoeuvre: a steered shift to the left on the move.
+
+    Attributes:
+        speed: of the chassis [m/s].
+        acceleration: mean, at start and end [m/s²].
+        shift: to the left [m].
+        length: of the shift along the path [m].
+    """
+
+    speed: float = 0.9
+    acceleration: float = 0.5
+    shift: float = 1.2
+    length: float = 5.0
+
+
+def lane_change_reference(
+    manoeuvre: LaneChange, vehicle: VehicleDescription, parameters: Parameters, sample_time: float
+) -> Reference:
+    """Speed up, shift the lane with a curvature that starts and ends smoothly, slow down."""
+    geometry = vehicle.geometry
+    travel, velocity, acceleration = _speed_profile(manoeuvre, sample_time)
+    run_in = (travel[-1] - manoeuvre.length) / 2
+    curvature = _curvature_of_shift(manoeuvre)(travel - run_in)
+    alpha_v = np.arctan(curvature * geometry.wheelbase / 2)
+    alpha_v_rate = np.gradient(alpha_v, sample_time)
+    velocities = np.stack([alpha_v_rate, velocity], axis=1)
+    accelerations = np.stack([np.gradient(alpha_v_rate, sample_time), acceleration], axis=1)
+    alpha = kinematics.steering_from_virtual(alpha_v, geometry)
+    torques = dynamics.feed_forward(Mode.STEERED, alpha, velocities, accelerations, parameters.values, geometry)
+    column = kinematics.complement(Mode.STEERED, alpha, geometry)[:, 5:, 1]
+    tracks = {
+        **_steering_tracks(alpha, np.gradient(alpha, sample_time, axis=0), geometry),
+        "x": Track(travel, velocity, column),
+    }
+    twist = np.stack([velocity, np.zeros_like(velocity), curvature * velocity], axis=1)
+    path = kinematics.integrate_pose(twist, sample_time)
+    return Reference(Step.LANE_CHANGE, "x", sample_time, tracks, torques, np.full(len(travel), -1), path)
+
+
+def smooth_step(progress: Array) -> tuple[Array, Array, Array]:
+    """Quintic from 0 to 1 over progress 0 to 1 with its first and second derivative, at rest outside."""
+    t = np.clip(progress, 0.0, 1.0)
+    return t**3 * (10 - 15 * t + 6 * t**2), 30 * t**2 * (1 - t) ** 2, 60 * t * (1 - t) * (1 - 2 * t)
+
+
+def _speed_profile(manoeuvre: LaneChange, sample_time: float) -> tuple[Array, Array, Array]:
+    ramp = manoeuvre.speed / manoeuvre.acceleration
+    run_in = manoeuvre.speed * ramp / 2 + 0.3
+    cruise = (manoeuvre.length + 2 * (run_in - manoeuvre.speed * ramp / 2)) / manoeuvre.speed
+    time = np.arange(round((2 * ramp + cruise + 2 * SETTLING) / sample_time)) * sample_time - SETTLING
+    up, up_rate, _ = smooth_step(time / ramp)
+    down, down_rate, _ = smooth_step((time - ramp - cruise) / ramp)
+    velocity = manoeuvre.speed * (up - down)
+    acceleration = manoeuvre.speed * (up_rate - down_rate) / ramp
+    steps = (velocity[1:] + velocity[:-1]) * sample_time / 2
+    return np.concatenate([[0.0], np.cumsum(steps)]), velocity, acceleration
+
+
+def _curvature_of_shift(manoeuvre: LaneChange) -> _CurvatureOfShift:
+    """Amplitude by the small-angle formula; the heading returns to its start exactly."""
+    unit = _CurvatureOfShift(1.0, manoeuvre.length)
+    arc = np.linspace(0.0, manoeuvre.length, 4001)
+    spacing = arc[1]
+    heading = np.cumsum(unit(arc)) * spacing
+    return _CurvatureOfShift(manoeuvre.shift / (float(heading.sum()) * spacing), manoeuvre.length)
+
+
+@dataclass(frozen=True)
+class _CurvatureOfShift:
+    """κ(s) = A (sin 2πσ - ½ sin 4πσ), σ = s/length: zero with zero slope at both ends."""
+
+    amplitude: float
+    length: float
+
+    def __call__(self, arc: Array) -> Array:
+        phase = 2 * math.pi * np.clip(arc / self.length, 0.0, 1.0)
+        return np.asarray(self.amplitude * (np.sin(phase) - np.sin(2 * phase) / 2))
+
+
+def _padded(values: Array, rest: int) -> Array:
+    return np.concatenate([np.zeros(rest), values, np.zeros(rest)])
+
+
+def _steering_tracks(alpha: Array, velocity: Array, geometry: Geometry) -> dict[str, Track]:
+    columns = kinematics.complement(Mode.ALIGNMENT, alpha[:1], geometry)[0, 5:]
+    shape = (len(alpha), 4)
+    return {
+        name: Track(alpha[:, side], velocity[:, side], np.broadcast_to(columns[:, side], shape))
+        for side, name in enumerate(STEERING_LOOPS)
+    }
+
+
+def _tracks(spec: StepSpec, alpha: Array, position: Array, velocity: Array, geometry: Geometry) -> dict[str, Track]:
+    if spec.coordinate in STEERING_LOOPS:
+        side = STEERING_LOOPS.index(spec.coordinate)
+        moved, rate = alpha.copy(), np.zeros_like(alpha)
+        moved[:, side] += position
+        rate[:, side] = velocity
+        return _steering_tracks(moved, rate, geometry)
+    assert spec.mode is not None
+    row = kinematics.GENERALIZED_VELOCITIES[spec.mode].index(spec.coordinate)
+    column = kinematics.complement(spec.mode, alpha[:1], geometry)[0, 5:, row]
+    wheels = np.broadcast_to(column, (len(alpha), 4))
+    held = _steering_tracks(alpha, np.zeros_like(alpha), geometry)
+    return {**held, spec.coordinate: Track(position, velocity, wheels)}
+
+
+def _feed_forward(
+    spec: StepSpec, alpha: Array, velocity: Array, acceleration: Array, geometry: Geometry, parameters: Parameters
+) -> Array:
+    assert spec.mode is not None
+    names = kinematics.GENERALIZED_VELOCITIES[spec.mode]
+    row = names.index(spec.coordinate)
+    velocities, accelerations = np.zeros((2, len(alpha), len(names)))
+    velocities[:, row], accelerations[:, row] = velocity, acceleration
+    return dynamics.feed_forward(spec.mode, alpha, velocities, accelerations, parameters.values, geometry)
+
+
+def _lifted(
+    position: Array, velocity: Array, acceleration: Array, geometry: Geometry, parameters: Parameters
+) -> tuple[dict[str, Track], Array]:
+    rates, lifted = np.zeros((2, len(position), 9))
+    rates[:, 5:], lifted[:, 5:] = velocity[:, None], acceleration[:, None]
+    torques = (dynamics.regressor(rates, lifted) @ parameters.values)[:, 5:] / geometry.gear_ratio
+    shape = (len(position), 4)
+    tracks = {
+        name: Track(position, velocity, np.broadcast_to(np.eye(4)[wheel], shape))
+        for wheel, name in enumerate(LIFTED_LOOPS)
+    }
+    return tracks, torques
