@@ -1,0 +1,112 @@
+"""Encoder profile CiA 406: scaled absolute position with preset, code sequence, speed, cyclic timer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from emulator.firmware.hardware import EncoderHardware
+from emulator.firmware.nmt import NmtState
+from emulator.firmware.node import Node
+
+_COUNTER_CLOCKWISE = 1 << 0
+_SCALING_ENABLED = 1 << 2
+"""Bits of 6000h."""
+
+
+class EncoderApplication:
+    """The firmware of one absolute encoder.
+
+    Args:
+        node: its CANopen services.
+        hardware: the code disc.
+    """
+
+    def __init__(self, node: Node, hardware: EncoderHardware) -> None:
+        self._node = node
+        self._hardware = hardware
+        self._offset = 0
+        self._units = self._range = hardware.counts_per_revolution
+        self._operating = _SCALING_ENABLED
+        self._last: tuple[float, int] | None = None
+        self._speed = 0
+        self._bind()
+
+    def reset(self) -> None:
+        """Power-on values: the physical resolution, no offset."""
+        read = self._node.object_dictionary.value
+        self._operating = read(0x6000)
+        self._units = read(0x6001)
+        self._range = read(0x6002)
+        self._offset = 0
+        self._last = None
+        self._speed = 0
+
+    def nmt_changed(self, state: NmtState) -> None:
+        """Nothing depends on it."""
+
+    def rpdo_applied(self) -> None:
+        """An encoder has no RPDO."""
+
+    def connection_lost(self) -> None:
+        """Nothing moves by itself that would have to stop."""
+
+    def sample(self) -> None:
+        """Speed is the difference of positions from SYNC to SYNC."""
+        now, position = self._node.timers.now, self._position()
+        if self._last is not None and now > self._last[0]:
+            half = self._range // 2
+            moved = (position - self._last[1] + half) % self._range - half
+            self._speed = round(moved / (now - self._last[0]))
+        self._last = now, position
+
+    def _bind(self) -> None:
+        objects = self._node.object_dictionary
+        counts = self._hardware.counts_per_revolution
+        reads: dict[tuple[int, int], Callable[[], int]] = {
+            (0x6004, 0): self._position,
+            (0x6030, 1): lambda: max(-32768, min(self._speed, 32767)),
+            (0x6500, 0): lambda: self._operating,
+            (0x6501, 0): lambda: counts,
+            (0x6509, 0): lambda: self._offset,
+            (0x650A, 3): lambda: counts - 1,
+        }
+        for (index, subindex), read in reads.items():
+            objects.on_read(index, subindex, read)
+        writes: dict[int, Callable[[int], None]] = {
+            0x6000: self._write_operating,
+            0x6001: self._write_units,
+            0x6002: self._write_range,
+            0x6003: self._preset,
+            0x6200: self._write_cyclic_timer,
+        }
+        for index, write in writes.items():
+            objects.on_write(index, 0, write)
+
+    def _scaled(self) -> int:
+        counts = self._hardware.counts_per_revolution
+        position = self._hardware.position() % counts
+        if self._operating & _COUNTER_CLOCKWISE:
+            position = -position % counts
+        if self._operating & _SCALING_ENABLED:
+            position = position * self._units // counts
+        return position
+
+    def _position(self) -> int:
+        return (self._scaled() + self._offset) % self._range
+
+    def _write_operating(self, value: int) -> None:
+        self._operating = value
+
+    def _write_units(self, value: int) -> None:
+        self._units = value
+
+    def _write_range(self, value: int) -> None:
+        self._range = value
+
+    def _preset(self, value: int) -> None:
+        self._offset = value - self._scaled()
+        self._last = None
+
+    def _write_cyclic_timer(self, value: int) -> None:
+        # 6200h is the event timer of the first TPDO under another name (CiA 406).
+        self._node.object_dictionary.write(0x1800, 5, value, downloaded=True)

@@ -1,0 +1,67 @@
+"""NMT slave (CiA 301, 7.3.2): states, resets and boot-up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+
+from durand.callback_handler import CallbackHandler, FailMode
+from durand.services.nmt import StateEnum as NmtState
+
+__all__ = ["NmtCommand", "NmtSlave", "NmtState"]
+
+
+class NmtCommand(IntEnum):
+    """Command specifiers of the NMT protocol."""
+
+    START = 0x01
+    STOP = 0x02
+    ENTER_PRE_OPERATIONAL = 0x80
+    RESET_NODE = 0x81
+    RESET_COMMUNICATION = 0x82
+
+
+_TARGETS = {
+    NmtCommand.START: NmtState.OPERATIONAL,
+    NmtCommand.STOP: NmtState.STOPPED,
+    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+}
+
+
+class NmtSlave:
+    """NMT state of one node; `state_callbacks` is what durand's SDO server subscribes to.
+
+    Args:
+        node_id: whom commands address, besides everybody (0).
+        initialise: called in a reset, with True when the application is reset too; sends nothing.
+        boot_up: sends the boot-up message.
+    """
+
+    def __init__(self, node_id: int, initialise: Callable[[bool], None], boot_up: Callable[[], None]) -> None:
+        self._node_id = node_id
+        self._initialise = initialise
+        self._boot_up = boot_up
+        self.state = NmtState.INITIALISATION
+        self.state_callbacks = CallbackHandler(FailMode.FIRST_FAIL)
+
+    def receive(self, data: bytes) -> None:
+        """Take an NMT message; one of a wrong length, to others or unknown is ignored."""
+        if len(data) != 2 or data[1] not in (0, self._node_id):
+            return
+        if data[0] in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
+            self.reset(application=data[0] == NmtCommand.RESET_NODE)
+        elif data[0] in _TARGETS:
+            self.enter(_TARGETS[NmtCommand(data[0])])
+
+    def reset(self, application: bool) -> None:
+        """Initialise, say so by the boot-up message, and become pre-operational."""
+        self.enter(NmtState.INITIALISATION)
+        self._initialise(application)
+        self._boot_up()
+        self.enter(NmtState.PRE_OPERATIONAL)
+
+    def enter(self, state: NmtState) -> None:
+        """Change the state and tell the services, if it is another one."""
+        if state is not self.state:
+            self.state = state
+            self.state_callbacks.call(state)
