@@ -24,6 +24,7 @@ class Axis:
         motor_torque: largest motor torque per generalized torque.
         wheel_rate: largest wheel rate per rate of the coordinate.
         wheel_load: wheel torque per contact force [m], the wheel radius; zero in the air.
+        slipping_inertia: what is left of J when the wheels lose their grip.
     """
 
     inertia: float
@@ -32,6 +33,7 @@ class Axis:
     motor_torque: float
     wheel_rate: float
     wheel_load: float
+    slipping_inertia: float
 
     def torque(self, velocity: Array, acceleration: Array) -> Array:
         """Generalized torque of a motion."""
@@ -43,7 +45,7 @@ def axis_of(spec: StepSpec, vehicle: VehicleDescription) -> Axis:
     """The axis that a step drives, from equation (19) with the prior parameters."""
     prior, geometry = vehicle.prior, vehicle.geometry
     if spec.mode is None:
-        return Axis(prior["B_w"], prior["d_vw"], prior["d_cw"], 1 / geometry.gear_ratio, 1.0, 0.0)
+        return Axis(prior["B_w"], prior["d_vw"], prior["d_cw"], 1 / geometry.gear_ratio, 1.0, 0.0, prior["B_w"])
     alpha = np.tile(spec.steering(geometry), (3, 1))
     row = kinematics.GENERALIZED_VELOCITIES[spec.mode].index(spec.coordinate)
     velocity, acceleration = np.zeros((2, 3, len(kinematics.GENERALIZED_VELOCITIES[spec.mode])))
@@ -60,4 +62,5 @@ def axis_of(spec: StepSpec, vehicle: VehicleDescription) -> Axis:
         motor_torque=float(np.abs(inverse[:, row]).max()),
         wheel_rate=float(np.abs(rates[1, 5:]).max()),
         wheel_load=geometry.wheel_radius,
+        slipping_inertia=float(prior["B_w"] * np.sum(rates[1, 5:] ** 2)),
     )

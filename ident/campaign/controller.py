@@ -1,8 +1,8 @@
 """The controller of a step: feed-forward torques plus one cascade a coordinate, in plain floats for speed.
 
 A loop's coordinate moves along its column h of H_k: its rate is h·β̇ / h·h and its generalized torque τ becomes
-motor torques h τ / (i_G h·h), the minimum-norm distribution. Steering positions come from the steering encoders;
-all rates come from the wheel encoders, which resolve them far better: rolling ties them together.
+motor torques h τ / (i_G h·h), the minimum-norm distribution. Steering angles and rates come from the steering
+encoders: the wheels would resolve them better, but only as long as they roll.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ident.campaign.loops import LoopDesign
+from ident.campaign.loops import STEERING_RATE_CYCLES, LoopDesign
 from ident.campaign.reference import STEERING_LOOPS, Reference
 from ident.errors import CampaignError
 
@@ -29,11 +29,14 @@ class LoopLimits:
         integral: largest torque of the integrator.
         dead_band: position error at standstill that the integrator leaves alone [rad or m], so that stiction
             does not make it hunt.
+        holding_band: the same for a coordinate that stands still throughout the step. Wider: friction holds a
+            steering angle, and torque spent on its last tenth of a degree only presses the wheels against the floor.
     """
 
     following_error: float
     integral: float
     dead_band: float
+    holding_band: float
 
 
 class _Loop:
@@ -44,32 +47,46 @@ class _Loop:
         norm = np.sum(track.wheels**2, axis=1, keepdims=True)
         self.name = name
         self.side = STEERING_LOOPS.index(name) if name in STEERING_LOOPS else None
-        self.position = track.position.tolist()
-        self.velocity = track.velocity.tolist()
-        self.measure = (track.wheels / norm).tolist()
-        self.distribute = (track.wheels / (norm * gear)).tolist()
+        self.position: list[float] = track.position.tolist()
+        self.velocity: list[float] = track.velocity.tolist()
+        self.measure: list[list[float]] = (track.wheels / norm).tolist()
+        self.distribute: list[list[float]] = (track.wheels / (norm * gear)).tolist()
         self.gains = (design.position_gain, design.velocity_gain, design.integral_gain * reference.sample_time)
         self.limits = limits
+        moves = bool(np.any(np.abs(track.velocity) > REST))
+        self.dead_band = limits.dead_band if moves else limits.holding_band
         self.travel = 0.0
         self.integral = 0.0
+        self.past: list[float] = []
 
-    def torque(
-        self, index: int, steps: tuple[float, float, float, float], steering: Sequence[float], rate: float
-    ) -> float:
-        """Generalized torque from wheel angle increments `steps` and steering angles; `rate` is 1/T_s."""
-        m = self.measure[index]
-        moved = m[0] * steps[0] + m[1] * steps[1] + m[2] * steps[2] + m[3] * steps[3]
-        self.travel += moved
+    def torque(self, index: int, steps: Sequence[float], steering: Sequence[float], cycle: float) -> float:
+        """Generalized torque from wheel angle increments `steps` (4,) and steering angles (2,)."""
+        position, rate = self._measured(index, steps, steering, cycle)
         wanted = self.velocity[index]
-        error = self.position[index] - (self.travel if self.side is None else steering[self.side])
+        error = self.position[index] - position
         if abs(error) > self.limits.following_error:
             raise FollowingError(self.name, index, error, self.limits.following_error)
         position_gain, velocity_gain, integral_gain = self.gains
-        velocity_error = wanted + position_gain * error - moved * rate
-        if abs(wanted) > REST or abs(error) > self.limits.dead_band:
+        velocity_error = wanted + position_gain * error - rate
+        if abs(wanted) > REST or abs(error) > self.dead_band:
             bound = self.limits.integral
             self.integral = min(max(self.integral + integral_gain * velocity_error, -bound), bound)
         return velocity_gain * velocity_error + self.integral
+
+    def _measured(
+        self, index: int, steps: Sequence[float], steering: Sequence[float], cycle: float
+    ) -> tuple[float, float]:
+        if self.side is None:
+            m = self.measure[index]
+            moved = m[0] * steps[0] + m[1] * steps[1] + m[2] * steps[2] + m[3] * steps[3]
+            self.travel += moved
+            return self.travel, moved / cycle
+        angle = steering[self.side]
+        past = self.past
+        past.append(angle)
+        if len(past) <= STEERING_RATE_CYCLES:
+            return angle, (angle - past[0]) / (STEERING_RATE_CYCLES * cycle)
+        return angle, (angle - past.pop(0)) / (STEERING_RATE_CYCLES * cycle)
 
 
 class FollowingError(CampaignError):
@@ -98,7 +115,7 @@ class Controller:
     ) -> None:
         self._loops = [_Loop(name, reference, designs[name], limits[name], gear_ratio) for name in reference.tracks]
         self._feed_forward = reference.feed_forward.tolist()
-        self._rate = 1 / reference.sample_time
+        self._cycle = reference.sample_time
         self._peak = peak_torque
         self._previous: Sequence[float] | None = None
 
@@ -114,7 +131,7 @@ class Controller:
         steps = (w0 - last[0], w1 - last[1], w2 - last[2], w3 - last[3])
         u0, u1, u2, u3 = self._feed_forward[index]
         for loop in self._loops:
-            torque = loop.torque(index, steps, steering, self._rate)
+            torque = loop.torque(index, steps, steering, self._cycle)
             d = loop.distribute[index]
             u0 += d[0] * torque
             u1 += d[1] * torque

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ident.campaign.axis import Axis, axis_of
 from ident.campaign.controller import LoopLimits
-from ident.campaign.loops import LoopDesign, design_loop
+from ident.campaign.loops import STEERING_RATE_CYCLES, LoopDesign, design_loop
 from ident.campaign.optimise import Excitation, Problem, optimise
 from ident.campaign.reference import (
     LIFTED_LOOPS,
+    STEERING_LOOPS,
     LaneChange,
     Reference,
     alignment_reference,
@@ -34,8 +35,11 @@ T = TypeVar("T")
 FOLLOWING_ERRORS: Final = {"alpha": 0.35, "x": 0.25, "y": 0.25, "gamma": 0.35, "beta": 3.0}
 """Largest position error before a campaign stops, by coordinate [rad or m]."""
 
-DEAD_BANDS: Final = {"alpha": 5e-4, "x": 5e-4, "y": 5e-4, "gamma": 5e-4, "beta": 5e-3}
+DEAD_BANDS: Final = {"alpha": 3e-4, "x": 5e-4, "y": 5e-4, "gamma": 5e-4, "beta": 5e-3}
 """Position error at standstill that the integrators leave alone, by coordinate [rad or m]."""
+
+HOLDING_BAND: Final = 3e-3
+"""The same for a coordinate that stands still throughout a step [rad or m]."""
 
 INTEGRAL_SHARE: Final = 3.0
 """Bound of an integrator in units of the coordinate's Coulomb friction."""
@@ -135,7 +139,7 @@ def make_plan(
             for step in ordered
             if step in EXCITATIONS
         },
-        designs=_by_loop({step: design_loop(axis, cycle) for step, axis in axes.items()}),
+        designs=_by_loop({step: _design(step, axis, cycle) for step, axis in axes.items()}),
         limits=_by_loop({step: _limits(step, axis) for step, axis in axes.items()}),
         periods=periods,
         cycle=cycle,
@@ -153,9 +157,14 @@ def _excitation(
     return optimise(problem, generator)
 
 
+def _design(step: Step, axis: Axis, cycle: float) -> LoopDesign:
+    steered = EXCITATIONS[step].coordinate in STEERING_LOOPS
+    return design_loop(axis, cycle, STEERING_RATE_CYCLES if steered else 1)
+
+
 def _limits(step: Step, axis: Axis) -> LoopLimits:
     family = EXCITATIONS[step].coordinate.split("_")[0]
-    return LoopLimits(FOLLOWING_ERRORS[family], INTEGRAL_SHARE * axis.coulomb, DEAD_BANDS[family])
+    return LoopLimits(FOLLOWING_ERRORS[family], INTEGRAL_SHARE * axis.coulomb, DEAD_BANDS[family], HOLDING_BAND)
 
 
 def _by_loop(by_step: Mapping[Step, T]) -> dict[str, T]:
@@ -166,15 +175,13 @@ def _by_loop(by_step: Mapping[Step, T]) -> dict[str, T]:
 
 def _check_room(plan: Plan) -> None:
     room, limits = plan.room(), plan.vehicle.limits
-    reach = max(room.ahead, room.behind), max(room.left, room.right)
     for name, need, have in (
-        ("length", 2 * reach[0], limits.floor_length),
-        ("width", 2 * reach[1], limits.floor_width),
+        ("long", room.length, limits.floor_length),
+        ("wide", room.width, limits.floor_width),
     ):
         if need > have:
             raise CampaignError(
-                f"The campaign reaches {need / 2:.2f} m from its start, but the floor's {name} of {have:.2f} m "
-                f"leaves {have / 2:.2f} m on either side.",
+                f"The campaign needs a floor {need:.2f} m {name}, {have:.2f} m are there.",
                 "Leave out lane_change or lateral (--skip), or set limits.floor_length and floor_width of the "
                 "vehicle file to the room there is.",
             )

@@ -83,7 +83,7 @@ def excitation_reference(
 ) -> Reference:
     """An excitation step: standstill, `periods` repeats, standstill."""
     per_period = round(spec.period / sample_time)
-    motion = series.evaluate(np.arange(per_period) * sample_time)
+    motion = series.evaluate(sample_times(per_period, sample_time))
     rest = round(SETTLING / sample_time)
     position, velocity, acceleration = (_padded(np.tile(values, periods), rest) for values in motion)
     period = np.concatenate([np.full(rest, -1), np.repeat(np.arange(periods), per_period), np.full(rest, -1)])
@@ -102,19 +102,38 @@ def excitation_reference(
 def alignment_reference(
     start: Array, target: Array, vehicle: VehicleDescription, parameters: Parameters, sample_time: float
 ) -> Reference:
-    """Wheel alignment at rest from steering angles `start` to `target` (2,), both sides at once."""
-    move = max(0.5, float(np.abs(target - start).max()) / ALIGNMENT_SPEED)
-    samples = round((move + 2 * SETTLING) / sample_time)
-    time = np.arange(samples) * sample_time - SETTLING / 2
-    shape, rate, curvature = smooth_step(time / move)
-    stroke = target - start
-    alpha = start + shape[:, None] * stroke
-    velocity, acceleration = rate[:, None] * stroke / move, curvature[:, None] * stroke / move**2
-    torques = dynamics.feed_forward(Mode.ALIGNMENT, alpha, velocity, acceleration, parameters.values, vehicle.geometry)
-    tracks = _steering_tracks(alpha, velocity, vehicle.geometry)
-    period = np.full(samples, -1)
-    return Reference(Step.ALIGNMENT, "alpha", sample_time, tracks, torques, period, np.zeros((samples, 3)))
+    """Wheel alignment at rest from steering angles `start` to `target` (2,), both sides at once.
 
+    A stroke to just short of the target, then a creep onto it. The creep leaves Coulomb friction to the integrators
+    (no feed-forward): when it ends, they hold the torque at which the wheel is about to move, and what is left of
+    the error needs little more.
+    """
+    approach = target - np.where(target < start, -CREEP, CREEP)
+    stroke_time = max(0.5, float(np.abs(approach - start).max()) / ALIGNMENT_SPEED)
+    times = np.cumsum([SETTLING / 4, stroke_time, CREEP / CREEP_SPEED, SETTLING])
+    time = sample_times(round(times[-1] / sample_time), sample_time)
+    stroke = _shaped_move((time - times[0]) / stroke_time, approach - start, stroke_time)
+    creep = _shaped_move((time - times[1]) / (times[2] - times[1]), target - approach, times[2] - times[1])
+    position, velocity, acceleration = (first + second for first, second in zip(stroke, creep, strict=True))
+    alpha = start + position
+    smooth = parameters.replaced(d_cl=0.0, d_cr=0.0, d_cw=0.0)
+    torques = dynamics.feed_forward(Mode.ALIGNMENT, alpha, velocity, acceleration, smooth.values, vehicle.geometry)
+    tracks = _steering_tracks(alpha, velocity, vehicle.geometry)
+    period = np.full(len(time), -1)
+    return Reference(Step.ALIGNMENT, "alpha", sample_time, tracks, torques, period, np.zeros((len(time), 3)))
+
+
+def _shaped_move(progress: Array, stroke: Array, duration: float) -> tuple[Array, Array, Array]:
+    """Position, velocity and acceleration (N, 2) of a quintic move by `stroke` (2,)."""
+    shape, rate, curvature = (values[:, None] for values in smooth_step(progress))
+    return shape * stroke, rate * stroke / duration, curvature * stroke / duration**2
+
+
+CREEP: Final = 0.08
+"""Last part of an alignment [rad]."""
+
+CREEP_SPEED: Final = 0.04
+"""Mean speed of it [rad/s]."""
 
 ALIGNMENT_SPEED: Final = 0.8
 """Mean steering speed of an alignment [rad/s]."""
@@ -161,6 +180,11 @@ def lane_change_reference(
     return Reference(Step.LANE_CHANGE, "x", sample_time, tracks, torques, np.full(len(travel), -1), path)
 
 
+def sample_times(samples: int, sample_time: float) -> Array:
+    """Times of a number of samples from zero (N,) [s]."""
+    return np.asarray(np.arange(samples) * sample_time, dtype=np.float64)
+
+
 def smooth_step(progress: Array) -> tuple[Array, Array, Array]:
     """Quintic from 0 to 1 over progress 0 to 1 with its first and second derivative, at rest outside."""
     t = np.clip(progress, 0.0, 1.0)
@@ -171,7 +195,8 @@ def _speed_profile(manoeuvre: LaneChange, sample_time: float) -> tuple[Array, Ar
     ramp = manoeuvre.speed / manoeuvre.acceleration
     run_in = manoeuvre.speed * ramp / 2 + 0.3
     cruise = (manoeuvre.length + 2 * (run_in - manoeuvre.speed * ramp / 2)) / manoeuvre.speed
-    time = np.arange(round((2 * ramp + cruise + 2 * SETTLING) / sample_time)) * sample_time - SETTLING
+    samples = round((2 * ramp + cruise + 2 * SETTLING) / sample_time)
+    time = sample_times(samples, sample_time) - SETTLING
     up, up_rate, _ = smooth_step(time / ramp)
     down, down_rate, _ = smooth_step((time - ramp - cruise) / ramp)
     velocity = manoeuvre.speed * (up - down)

@@ -112,7 +112,6 @@ def equations_of(
     motion = motion_of(segment, geometry, processing)
     theta, torque, names = _raw_rows(spec, segment, motion, geometry, epsilon)
     dt = segment.sample_time
-    torque = zero_phase(torque, processing.signal_cutoff, dt)
     theta, torque = zero_phase(theta, processing.cutoff, dt), zero_phase(torque, processing.cutoff, dt)
     return [
         Equations(

@@ -11,8 +11,8 @@ from scipy import ndimage, signal
 
 Array = NDArray[np.float64]
 
-FILTER_ORDER = 4
-"""Of the Butterworth prototype; run forwards and backwards."""
+FILTER_ORDER = 2
+"""Of the Butterworth prototype; run forwards and backwards. A higher order rings longer than `guard`."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Processing:
     """
 
     cutoff: float = 40.0
-    signal_cutoff: float = 200.0
+    signal_cutoff: float = 500.0
     moving: float = 0.05
     guard: float = 0.1
 
