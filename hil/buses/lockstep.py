@@ -7,6 +7,7 @@ sent, while its time stamp says when its last bit would have left the wire.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from typing import Protocol
@@ -102,6 +103,14 @@ class LockstepHub:
         self.clock.wait_until(target)
         return event <= deadline
 
+    def catch_up(self, stamp: float) -> None:
+        """Let time pass, in whole cycle periods, when frames queue up on the bus for longer than one of them.
+
+        Without this a burst of SDO transfers, each answered in the instant it is asked, would take no time at all.
+        """
+        if stamp - self.clock.now() > self._cycle_period:
+            self.clock.wait_until(round(math.ceil(stamp / self._cycle_period) * self._cycle_period, 9))
+
     def _pace(self) -> None:
         if self._last_sync is not None:
             # Rounded so that the grid of cycles does not drift by the sum of rounding errors.
@@ -188,6 +197,7 @@ class LockstepBus(can.BusABC):
     def _next(self) -> can.Message | None:
         while self._queue:
             message = self._queue.popleft()
+            self._hub.catch_up(message.timestamp)
             if self._filters is None or self._matches_filters(message):
                 return message
         return None
