@@ -20,7 +20,7 @@ class Drive:
 
     Attributes:
         rated_torque, peak_torque: at the motor shaft [Nm].
-        rated_current: rms [A].
+        rated_current, peak_current: rms [A].
         counts_per_revolution: motor increments per turn of the shaft.
         torque: actual torque at the motor shaft at the present time [Nm], drive's sign.
         wheel_torque: the same torque at the wheel [Nm], positive rolls the vehicle forward.
@@ -37,6 +37,7 @@ class Drive:
         self.rated_torque = data.rated_torque
         self.peak_torque = data.peak_torque
         self.rated_current = data.rated_current
+        self.peak_current = data.peak_current
         self.counts_per_revolution = data.counts_per_revolution
         self.torque = 0.0
         self.wheel_torque = 0.0
@@ -71,7 +72,7 @@ class Drive:
         self._steps_left = 0
 
     def command(self, torque: float) -> None:
-        """Set-point at the motor shaft [Nm], drive's sign, limited to the peak torque; void while disabled."""
+        """Set-point at the motor shaft [Nm], drive's sign, limited to peak torque; void while disabled."""
         if self._enabled:
             self._target = min(max(torque, -self.peak_torque), self.peak_torque)
             self._steps_left = self._ramp_steps

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import tempfile
@@ -44,6 +45,9 @@ class SolverSettings:
     residual_threshold: float = 0.0
 
 
+DEFAULT_SOLVER: Final = SolverSettings()
+
+
 class Engine:
     """The vehicle in PyBullet: eight joints, steering fl, rl, fr, rr, then rolling fl, rl, fr, rr.
 
@@ -67,18 +71,19 @@ class Engine:
         *,
         step_size: float,
         gui: bool,
-        settings: SolverSettings | None = None,
+        settings: SolverSettings = DEFAULT_SOLVER,
     ) -> None:
         if gui:
             _require_display(os.environ)
         self.step_size = step_size
         self._prototype = prototype
-        self._settings = settings or SolverSettings()
+        self._settings = settings
         self._urdf = generate_urdf(prototype)
         truth = prototype.truth
         self._coulomb = [truth[symbol] / 2 for symbol in ("d_cl", "d_cl", "d_cr", "d_cr")]
         self._coulomb += [truth["d_cw"]] * 4
         self.client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
+        pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self.client)
         self.place(on_stand=False, angles=[0.0] * 8)
 
     def place(self, *, on_stand: bool, angles: Sequence[float]) -> None:
@@ -91,12 +96,12 @@ class Engine:
             angles: (8,) joint angles [rad].
         """
         self._prepare_world()
-        height = self._prototype.body.centre_height + (STAND_CLEARANCE if on_stand else 0.0)
-        self.body = self._load(height, on_stand)
+        lift = STAND_CLEARANCE if on_stand else -self._deflection()
+        self.body = self._load(self._prototype.body.centre_height + lift, on_stand)
         by_name = self._joint_indices()
         names = [steering_joint(wheel) for wheel in WHEELS] + [rolling_joint(wheel) for wheel in WHEELS]
         self.joints = [by_name[name] for name in names]
-        self._remove_damping()
+        self._set_surfaces()
         self._couple(0, 1)
         self._couple(2, 3)
         for joint, angle in zip(self.joints, angles, strict=True):
@@ -131,9 +136,7 @@ class Engine:
 
     def rates(self) -> list[float]:
         """(8,) joint rates now [rad/s], extrapolated to second order from the last two steps."""
-        return [
-            1.5 * now[1] - 0.5 * before[1] for now, before in zip(self._states, self._previous, strict=True)
-        ]
+        return [1.5 * now[1] - 0.5 * before[1] for now, before in zip(self._states, self._previous, strict=True)]
 
     def steering_angle(self, side: int) -> float:
         """Steering angle of the front wheel of a side (0 left, 1 right) [rad]."""
@@ -209,7 +212,25 @@ class Engine:
         infos = (pybullet.getJointInfo(self.body, index, self.client) for index in range(count))
         return {info[1].decode(): info[0] for info in infos}
 
-    def _remove_damping(self) -> None:
+    def _deflection(self) -> float:
+        """What a tyre gives way under a quarter of the weight [m]."""
+        return self._prototype.truth["m_ch"] * GRAVITY / 4 / self._prototype.tyre.stiffness
+
+    def _set_surfaces(self) -> None:
+        """Make the bodies free of damping and the tyres radially elastic.
+
+        On rigid wheels the four loads are indeterminate: the solver then puts most of the weight on one
+        diagonal, and the wheels of the other slip at moderate acceleration.
+        """
+        quarter_mass, tyre = self._prototype.truth["m_ch"] / 4, self._prototype.tyre
+        for wheel in self.joints[_ROLLING:]:
+            pybullet.changeDynamics(
+                self.body,
+                wheel,
+                contactStiffness=tyre.stiffness,
+                contactDamping=2 * tyre.damping_ratio * math.sqrt(tyre.stiffness * quarter_mass),
+                physicsClientId=self.client,
+            )
         for link in range(-1, pybullet.getNumJoints(self.body, self.client)):
             pybullet.changeDynamics(
                 self.body,

@@ -81,9 +81,7 @@ class Disturbances:
         )
         coulomb = np.array([truth["d_cl"], truth["d_cr"], *[truth["d_cw"]] * 4])
         dither = noise.encoder_dither * scale
-        self._torque = WhiteNoise(
-            sensor, np.full(4, noise.torque_sensor * prototype.drive.rated_torque * scale)
-        )
+        self._torque = WhiteNoise(sensor, np.full(4, noise.torque_sensor * prototype.drive.rated_torque * scale))
         self._motor = WhiteNoise(motor, np.full(4, dither))
         self._steering = WhiteNoise(steering, np.full(2, dither))
         self._load = OrnsteinUhlenbeck(

@@ -21,6 +21,7 @@ TABLE_UNITS: Final[Mapping[str, Mapping[str, str]]] = {
     "units": {"wheel_mass": "kg", "knuckle_mass": "kg"},
     "body": {"length": "m", "width": "m", "height": "m", "centre_height": "m"},
     "floor": {"friction": "1"},
+    "tyre": {"stiffness": "N/m", "damping_ratio": "1"},
     "drive": {
         "rated_torque": "Nm",
         "peak_torque": "Nm",
@@ -112,6 +113,19 @@ class Body:
 
 
 @dataclass(frozen=True)
+class Tyre:
+    """Radial compliance of a wheel.
+
+    Attributes:
+        stiffness: [N/m].
+        damping_ratio: of the vehicle's heave on its four tyres [-].
+    """
+
+    stiffness: float
+    damping_ratio: float
+
+
+@dataclass(frozen=True)
 class Prototype:
     """The vehicle behind the connector.
 
@@ -120,8 +134,9 @@ class Prototype:
         geometry: lengths, gear ratio, steering stops.
         truth: the eleven parameters an identification should find.
         body: outer shape of the chassis.
-        rigid_bodies: masses and inertias of chassis, knuckles and wheels, derived so that the totals are `truth`.
+        rigid_bodies: masses and inertias of chassis, knuckles, wheels; their totals are `truth`.
         floor_friction: adhesion between wheel and floor [-].
+        tyre: radial compliance of the wheels.
         drive, encoder, noise: data sheets.
     """
 
@@ -131,6 +146,7 @@ class Prototype:
     body: Body
     rigid_bodies: RigidBodies
     floor_friction: float
+    tyre: Tyre
     drive: DriveData
     encoder: EncoderData
     noise: NoiseData
@@ -158,6 +174,7 @@ def load_prototype(name_or_path: str | Path = "prototype") -> Prototype:
             geometry, truth, (body.length, body.width, body.height), path, **tables["units"]
         ),
         floor_friction=tables["floor"]["friction"],
+        tyre=Tyre(**tables["tyre"]),
         drive=_drive(tables["drive"], path),
         encoder=_encoder(tables["steering_encoder"], path),
         noise=NoiseData(**tables["noise"]),
@@ -201,18 +218,14 @@ def _directions(table: dict[str, float], names: tuple[str, ...], where: str) -> 
 def _whole(table: dict[str, float], key: str, where: str) -> int:
     value = table.pop(key)
     if not value.is_integer():
-        raise DataFileError(
-            f"{where}.{key} = {value} cannot be.", "It counts increments: give a whole number."
-        )
+        raise DataFileError(f"{where}.{key} = {value} cannot be.", "It counts increments: give a whole number.")
     return int(value)
 
 
 def _drive(table: dict[str, float], path: Path) -> DriveData:
     where = f"{path}: drive"
     if table["peak_torque"] < table["rated_torque"] or table["peak_current"] < table["rated_current"]:
-        raise DataFileError(
-            f"{where}: peak torque or current is below the rated one.", "Check the data sheet."
-        )
+        raise DataFileError(f"{where}: peak torque or current is below the rated one.", "Check the data sheet.")
     directions = _directions(table, WHEELS, where)
     return DriveData(
         counts_per_revolution=_whole(table, "counts_per_revolution", where), directions=directions, **table

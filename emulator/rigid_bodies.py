@@ -25,7 +25,7 @@ KNUCKLE_TRANSVERSE_RATIO: Final = 0.6
 
 @dataclass(frozen=True)
 class RigidBody:
-    """Mass [kg], centre of mass in the frame of the body's joint [m], principal inertias about it [kg m^2]."""
+    """Mass [kg], centre of mass in the frame of the body's joint [m], inertias about it on the axes [kg m^2]."""
 
     mass: float
     centre: tuple[float, float, float]
@@ -90,9 +90,7 @@ def _knuckle(
     return RigidBody(mass, (0.0, -side * counterweight, 0.0), (lying, lying, yaw))
 
 
-def _chassis(
-    geometry: Geometry, truth: Parameters, size: tuple[float, float, float], unit_mass: float
-) -> RigidBody:
+def _chassis(geometry: Geometry, truth: Parameters, size: tuple[float, float, float], unit_mass: float) -> RigidBody:
     """Chassis: total less the four units, which count as point masses on their steering axes."""
     length, width, height = size
     mass = truth["m_ch"] - 4 * unit_mass

@@ -9,12 +9,12 @@ from typing import Final, Self
 
 from emulator.drive import Drive
 from emulator.encoder import Encoder
-from emulator.engine import Engine
+from emulator.engine import DEFAULT_SOLVER, Engine, SolverSettings
 from emulator.noise import Disturbances
 from emulator.prototype import Prototype
 
-SETTLING_TIME: Final = 0.25
-"""Simulated time that the suspension-free vehicle gets to come to rest on the floor [s]."""
+SETTLING_TIME: Final = 0.5
+"""Time that the vehicle gets to come to rest on the floor [s]; it does not count as simulated time."""
 
 _STEP_TOLERANCE: Final = 1e-6
 """Fraction of a step by which a duration may miss a whole number of steps through rounding."""
@@ -53,6 +53,7 @@ class EmulatedVehicle:
         gui: show the vehicle in a window.
         noise_scale: factor on every random source; 0 switches noise off.
         engine_step: [s].
+        solver: settings of the engine's constraint solver.
 
     Attributes:
         drives: of the wheels fl, rl, fr, rr.
@@ -74,13 +75,12 @@ class EmulatedVehicle:
         gui: bool = False,
         noise_scale: float = 1.0,
         engine_step: float = 1e-3,
+        solver: SolverSettings = DEFAULT_SOLVER,
     ) -> None:
-        self.engine = Engine(prototype, step_size=engine_step, gui=gui)
+        self.engine = Engine(prototype, step_size=engine_step, gui=gui, settings=solver)
         self._noise = Disturbances(prototype, seed=seed, scale=noise_scale, step=engine_step)
         ratio = prototype.geometry.gear_ratio
-        fl, rl, fr, rr = (
-            Drive(prototype.drive, wheel, ratio, self.engine, self._noise) for wheel in range(4)
-        )
+        fl, rl, fr, rr = (Drive(prototype.drive, wheel, ratio, self.engine, self._noise) for wheel in range(4))
         self.drives = (fl, rl, fr, rr)
         left, right = (Encoder(prototype.encoder, side, self.engine, self._noise) for side in range(2))
         self.encoders = (left, right)
@@ -107,11 +107,17 @@ class EmulatedVehicle:
         self._steps += steps
 
     def lift(self) -> None:
-        """Put the vehicle on the jack-stand: chassis held, wheels free in the air, everything at rest."""
+        """Put the vehicle on the jack-stand: chassis held, wheels free in the air, everything at rest.
+
+        Angles and the state of the drives stay.
+        """
         self.engine.place(on_stand=True, angles=self.engine.angles())
 
     def lower(self) -> None:
-        """Take the vehicle off the jack-stand: on the floor at the origin, settled and at rest."""
+        """Take the vehicle off the jack-stand: on the floor at the origin, settled and at rest.
+
+        Angles and the state of the drives stay.
+        """
         self.engine.place(on_stand=False, angles=self.engine.angles())
         self._settle()
 
@@ -154,8 +160,8 @@ class EmulatedVehicle:
             self.engine.step(idle)
 
     def _step(self) -> None:
-        # Leapfrog: the forces of time t act over the step that starts at t, the torque as the drive reports it
-        # at t, viscous friction by the rate at t.
+        # Leapfrog: the forces of time t act over the step that starts at t: the torque that the drive reports
+        # at t, and viscous friction by the rate at t.
         load, rates = self._noise.load, self.engine.rates()
         torques = [extra - d * rate for extra, d, rate in zip(load, self._viscous, rates, strict=True)]
         for joint, drive in enumerate(self.drives, start=4):
