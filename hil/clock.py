@@ -13,8 +13,8 @@ class Clock(Protocol):
     def now(self) -> float:
         """Time [s]; on a real bus seconds since the Unix epoch, in simulation since its start."""
 
-    def wait_until(self, instant: float) -> None:
-        """Return when `instant` [s] has come; at once when it has passed."""
+    def wait_until(self, instant: float) -> float:
+        """Return when `instant` [s] has come, at once when it has passed; gives the lateness [s], at least 0."""
 
 
 class SimulatedClock:
@@ -34,13 +34,13 @@ class SimulatedClock:
         """Simulated time [s]."""
         return self._now
 
-    def wait_until(self, instant: float) -> None:
-        """Move simulated time to `instant` [s] unless it has passed."""
-        if instant <= self._now:
-            return
-        if self._on_advance is not None:
-            self._on_advance(instant)
-        self._now = instant
+    def wait_until(self, instant: float) -> float:
+        """Move simulated time to `instant` [s] unless it has passed; gives the lateness [s]."""
+        if instant > self._now:
+            if self._on_advance is not None:
+                self._on_advance(instant)
+            self._now = instant
+        return self._now - instant
 
 
 class WallClock:
@@ -73,23 +73,23 @@ class WallClock:
         """Seconds since the Unix epoch."""
         return self._origin + self._monotonic()
 
-    def wait_until(self, instant: float) -> None:
+    def wait_until(self, instant: float) -> float:
         """Sleep, then poll, until `instant` [s]; lateness beyond the tolerance is counted in `overruns`."""
         remaining = instant - self.now()
         if remaining > self.SPIN:
             self._sleep(remaining - self.SPIN)
         while self.now() < instant:
             pass
-        self._count(self.now() - instant)
-
-    def _count(self, lateness: float) -> None:
+        lateness = self.now() - instant
         self.waits += 1
         self.overruns += lateness > self._tolerance
         self.worst_lateness = max(self.worst_lateness, lateness)
+        return lateness
 
 
 class FreeRunningClock(WallClock):
     """Wall time that waits for nothing: for a master whose SYNC drives the time of the other side."""
 
-    def wait_until(self, instant: float) -> None:
-        """Return at once: the SYNC that follows moves the other side's time."""
+    def wait_until(self, instant: float) -> float:
+        """Return at once and never late: the SYNC that follows moves the other side's time."""
+        return 0.0

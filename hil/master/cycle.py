@@ -102,12 +102,12 @@ class Cycle:
             self._origin = self._due = self._clock.now()
         else:
             self._due = round(self._due + self._period, 9)
-        self._clock.wait_until(self._due)
+        lateness = self._clock.wait_until(self._due)
         self._link.drain()
-        if self._clock.now() - self._due > self._period:
+        if lateness > self._period:
             # The grid is moved rather than caught up with: a burst of SYNCs would be worse than a gap.
             self.overruns += 1
-            self._due = self._clock.now()
+            self._due += lateness
 
     def _collect(self) -> list[Fields]:
         layout = self._layout
