@@ -73,8 +73,6 @@ class Engine:
         gui: bool,
         settings: SolverSettings = DEFAULT_SOLVER,
     ) -> None:
-        if gui:
-            _require_display(os.environ)
         self.step_size = step_size
         self._prototype = prototype
         self._settings = settings
@@ -82,8 +80,7 @@ class Engine:
         truth = prototype.truth
         self._coulomb = [truth[symbol] / 2 for symbol in ("d_cl", "d_cl", "d_cr", "d_cr")]
         self._coulomb += [truth["d_cw"]] * 4
-        self.client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
-        pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self.client)
+        self.client = _open_window() if gui else pybullet.connect(pybullet.DIRECT)
         self.place(on_stand=False, angles=[0.0] * 8)
 
     def place(self, *, on_stand: bool, angles: Sequence[float]) -> None:
@@ -267,7 +264,20 @@ class Engine:
         )
 
 
-def _require_display(environment: Mapping[str, str]) -> None:
+def _open_window() -> int:
+    require_display(os.environ)
+    client = int(pybullet.connect(pybullet.GUI))
+    pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=client)
+    pybullet.resetDebugVisualizerCamera(3.0, 40.0, -35.0, [0.0, 0.0, 0.0], physicsClientId=client)
+    return client
+
+
+def require_display(environment: Mapping[str, str]) -> None:
+    """Refuse a window where the environment names no display; the engine would end the whole process.
+
+    Raises:
+        UserError: Linux without DISPLAY.
+    """
     if sys.platform == "linux" and not environment.get("DISPLAY"):
         raise UserError(
             "There is no display to show the vehicle on.", "Run without --gui, or set DISPLAY to an X server."

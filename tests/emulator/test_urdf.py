@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,8 +55,8 @@ def prototype(request: pytest.FixtureRequest) -> Prototype:
 
 
 @pytest.fixture(scope="module")
-def bodies(prototype: Prototype) -> Iterator[ReadBack]:
-    yield read_back(prototype)
+def bodies(prototype: Prototype) -> ReadBack:
+    return read_back(prototype)
 
 
 def steering_axis(prototype: Prototype, wheel: str) -> np.ndarray:
@@ -121,8 +120,10 @@ def test_wheels_stand_outside_their_steering_axes_by_a(prototype: Prototype, bod
     geometry = prototype.geometry
     for wheel in ("fl", "rl", "fr", "rr"):
         outward = np.sign(steering_axis(prototype, wheel)[1]) * geometry.wheel_offset
-        expected = [*(steering_axis(prototype, wheel) + [0.0, outward]), geometry.wheel_radius]
-        assert bodies.centre[f"wheel_{wheel}"] == pytest.approx(expected, abs=1e-12)
+        from_axis = bodies.centre[f"wheel_{wheel}"][:2] - steering_axis(prototype, wheel)
+        assert from_axis == pytest.approx([0.0, outward], abs=1e-12)
+        below_centre = bodies.centre["chassis"][2] - bodies.centre[f"wheel_{wheel}"][2]
+        assert below_centre == pytest.approx(prototype.body.centre_height - geometry.wheel_radius)
 
 
 def test_the_centre_of_mass_is_the_geometric_centre(bodies: ReadBack) -> None:
