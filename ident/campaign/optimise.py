@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize
+from scipy import ndimage, optimize
 
 from ident.campaign.axis import Axis
 from ident.campaign.excitation import FourierSeries, motion_basis, resting_projection, series_of
@@ -29,6 +29,9 @@ ADHESION_RESERVE = 0.5
 
 INFORMATION_WEIGHT = 0.15
 """Weight of the information content beside the condition number: a well-shaped whisper is no excitation."""
+
+MASK_STEEPNESS = 2.0
+"""How decidedly a stuck sample nearby drops a row in the smooth image of the mask."""
 
 STARTS = 6
 GRAVITY = 9.81
@@ -81,10 +84,16 @@ class Problem:
         """Mean outer product of the columns (s̈, ṡ, sgn ṡ) over moving samples, in units of their torques."""
         _, velocity, acceleration = motion
         threshold = 2 * self.processing.moving / self.axis.wheel_rate
-        moving = 1 / (1 + np.exp(-6 * (np.abs(velocity) / threshold - 1).clip(-10, 10)))
-        columns = np.stack([acceleration, velocity, np.tanh(velocity / threshold * 3)]) * np.sqrt(moving)
+        columns = np.stack([acceleration, velocity, np.tanh(3 * velocity / threshold)])
         columns *= np.array([[self.axis.inertia], [self.axis.viscous], [self.axis.coulomb]])
+        columns *= np.sqrt(self._kept(np.abs(velocity) / threshold))
         return np.asarray(columns @ columns.T / len(velocity))
+
+    def _kept(self, speed: Array) -> Array:
+        """Smooth image of the mask: rows that the estimator keeps, `speed` in units of the threshold."""
+        stuck = 1 / (1 + np.exp(6 * np.clip(speed - 1, -5, 5)))
+        width = 2 * round(self.processing.guard / self.spec.period * len(speed)) + 1
+        return np.asarray(np.exp(-MASK_STEEPNESS * width * ndimage.uniform_filter1d(stuck, width, mode="wrap")))
 
 
 def condition_number(normal: Array) -> float:
