@@ -6,14 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from durand.services.sdo import SDOServer
-
 from emulator.firmware.dictionary import Dictionary
 from emulator.firmware.emergency import Emergency, ErrorCode, ErrorRegister
 from emulator.firmware.event_pdo import EventSender
 from emulator.firmware.heartbeat import HeartbeatConsumer, HeartbeatProducer
 from emulator.firmware.nmt import NmtSlave, NmtState
 from emulator.firmware.pdo import PdoIndices, Rpdo, Tpdo
+from emulator.firmware.sdo import SdoServer
 from emulator.firmware.timers import Timers
 
 _PDOS = 4
@@ -94,7 +93,7 @@ class Node:
         self.object_dictionary = Dictionary(eds, node_id)
         self.nmt = NmtSlave(node_id, self._initialise, self._send_boot_up)
         self.nmt.state_callbacks.add(self._nmt_changed)
-        self.sdo_server = SDOServer(self)
+        self.sdo_server = SdoServer(self)
         self.emergency = Emergency(self.object_dictionary, self._send_emergency)
         self.producer = HeartbeatProducer(self.object_dictionary, timers, self._send_heartbeat)
         self.consumer = HeartbeatConsumer(self.object_dictionary, timers, self._heartbeat_lost)
