@@ -20,12 +20,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.errors import RecordError
+from ident.records.checks import refuse_nonfinite, refuse_short, uniform_sample_time
+from ident.vehicle.geometry import WHEELS
 
 Array = NDArray[np.float64]
-
-UNIFORMITY = 0.02
-"""Largest deviation of a sample interval from the median one, as a fraction of it."""
 
 
 class Step(enum.StrEnum):
@@ -114,39 +112,16 @@ def make_segment(segment: Segment, source: str) -> Segment:
         RecordError: fewer than ten samples, a value that is not finite, or time that is not uniform.
     """
     where = f"{source}, step {segment.step!r}"
-    if len(segment) < 10:
-        raise RecordError(f"{where} holds {len(segment)} samples.", "A step needs at least ten.")
-    _refuse_nonfinite(segment, where)
-    return replace(segment, sample_time=_uniform_sample_time(segment.time, where))
+    refuse_short(len(segment), where)
+    for name, values in _measured_channels(segment):
+        refuse_nonfinite(name, values, where)
+    return replace(segment, sample_time=uniform_sample_time(segment.time, where))
 
 
-def _refuse_nonfinite(segment: Segment, where: str) -> None:
-    channels: dict[str, Array] = {
-        "time": segment.time,
-        "torque": segment.motor_torques,
-        "beta": segment.wheel_angles,
-        "alpha": segment.steering_angles,
-    }
-    for name, values in channels.items():
-        bad = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
-        if bad.size:
-            raise RecordError(
-                f"{where}: channel {name} has {bad.size} samples that are not numbers, "
-                f"the first at sample {bad[0]} of the step.",
-                "Cut that part out, or record it again.",
-            )
-
-
-def _uniform_sample_time(time: Array, where: str) -> float:
-    intervals = np.diff(time)
-    sample_time = float(np.median(intervals))
-    if sample_time <= 0:
-        raise RecordError(f"{where}: time does not increase.", "Give time in seconds, increasing.")
-    worst = int(np.argmax(np.abs(intervals - sample_time)))
-    if abs(intervals[worst] - sample_time) > UNIFORMITY * sample_time:
-        raise RecordError(
-            f"{where}: time is not uniform: {intervals[worst] * 1e3:.3f} ms after t = {time[worst]:.4f} s "
-            f"where {sample_time * 1e3:.3f} ms are usual.",
-            "Resample the record, or give the gap's sides different step names.",
-        )
-    return float((time[-1] - time[0]) / (len(time) - 1))
+def _measured_channels(segment: Segment) -> Iterator[tuple[str, Array]]:
+    yield "time", segment.time
+    for column, wheel in enumerate(WHEELS):
+        yield f"torque_{wheel}", segment.motor_torques[:, column]
+        yield f"beta_{wheel}", segment.wheel_angles[:, column]
+    for column, side in enumerate("lr"):
+        yield f"alpha_{side}", segment.steering_angles[:, column]

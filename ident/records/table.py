@@ -38,6 +38,7 @@ def record_from_table(table: Table, source: str) -> Record:
         RecordError: a channel is missing, lengths differ, or a segment breaks the contract.
     """
     _check_channels(table, source)
+    _check_period(table, source)
     steps = np.asarray(table["step"]).astype(str)
     starts = np.flatnonzero(np.concatenate([[True], steps[1:] != steps[:-1]]))
     ends = [*starts[1:].tolist(), len(steps)]
@@ -67,6 +68,15 @@ def _check_channels(table: Table, source: str) -> None:
         raise RecordError(f"{source} has channels of different lengths: {lengths}.", "Write one row a sample.")
     if not len(table["time"]):
         raise RecordError(f"{source} holds no samples.", "Record again.")
+
+
+def _check_period(table: Table, source: str) -> None:
+    period = np.asarray(table.get("period", -1), dtype=float)
+    if not np.all(period == np.round(period)):  # NaN equals nothing
+        raise RecordError(
+            f"{source}: channel period holds values that are no whole numbers.",
+            "Number the repeats 0, 1, 2 ... and write -1 outside of them, or leave the channel out.",
+        )
 
 
 def _stack(table: Table, names: tuple[str, ...], rows: slice) -> NDArray[np.float64]:

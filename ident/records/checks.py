@@ -1,0 +1,63 @@
+"""Checks that every record passes: finite values, uniform time."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.errors import RecordError
+
+Array = NDArray[np.float64]
+
+UNIFORMITY: Final = 0.02
+"""Largest deviation of a sample interval from the median one, as a fraction of it."""
+
+SHORTEST: Final = 10
+"""Samples that a record, or a step of it, must have."""
+
+
+def refuse_short(samples: int, where: str) -> None:
+    """Refuse what is too short to be anything.
+
+    Raises:
+        RecordError: fewer than SHORTEST samples.
+    """
+    if samples < SHORTEST:
+        raise RecordError(f"{where} holds {samples} samples.", f"It needs at least {SHORTEST}.")
+
+
+def refuse_nonfinite(name: str, values: Array, where: str) -> None:
+    """Refuse NaN and infinity in one channel (N,).
+
+    Raises:
+        RecordError: with the channel, the number of such samples and the first of them.
+    """
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise RecordError(
+            f"{where}: channel {name} has {bad.size} samples that are not numbers, the first at sample {bad[0]}.",
+            "Cut that part out, or record it again.",
+        )
+
+
+def uniform_sample_time(time: Array, where: str) -> float:
+    """Mean sample interval of a uniform time channel (N,) [s].
+
+    Raises:
+        RecordError: time does not increase, or an interval differs from the usual one by more than UNIFORMITY.
+    """
+    intervals = np.diff(time)
+    sample_time = float(np.median(intervals))
+    if sample_time <= 0:
+        raise RecordError(f"{where}: time does not increase.", "Give time in seconds, increasing.")
+    worst = int(np.argmax(np.abs(intervals - sample_time)))
+    if abs(intervals[worst] - sample_time) > UNIFORMITY * sample_time:
+        raise RecordError(
+            f"{where}: time is not uniform: {intervals[worst] * 1e3:.3f} ms after t = {time[worst]:.4f} s "
+            f"where {sample_time * 1e3:.3f} ms are usual.",
+            "Resample the record, or cut it at the gap; the steps of a vehicle record may also be given other names "
+            "on its two sides.",
+        )
+    return float((time[-1] - time[0]) / (len(time) - 1))
