@@ -129,12 +129,14 @@ class Recorder:
 
 def finished_steps(directory: Path) -> list[tuple[str, Path]]:
     """Names and files of the finished steps in a directory, in their order, without the interludes."""
-    steps = []
-    for path in sorted(directory.glob("*")):
-        match = _FINISHED.fullmatch(path.name)
-        if match and match["step"] != INTERLUDE and f".{match['suffix']}" in tuple(LogFormat):
-            steps.append((match["step"], path))
-    return steps
+    named = [(step_of(path), path) for path in sorted(directory.glob("*"))]
+    return [(step, path) for step, path in named if step is not None and step != INTERLUDE]
+
+
+def step_of(path: Path) -> str | None:
+    """The step that a finished log holds by its name, None when the name is not one of a `Recorder`'s."""
+    match = _FINISHED.fullmatch(path.name)
+    return match["step"] if match and f".{match['suffix']}" in tuple(LogFormat) else None
 
 
 def _next_number(directory: Path) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
@@ -22,7 +22,7 @@ from ident.campaign.reference import (
     excitation_reference,
     lane_change_reference,
 )
-from ident.campaign.steps import EXCITATIONS, ORDER, Posture
+from ident.campaign.steps import EXCITATIONS, ORDER, PERIODS, Posture
 from ident.errors import CampaignError
 from ident.estimate.filters import Processing
 from ident.records.record import Step
@@ -120,40 +120,72 @@ def make_plan(
     periods: int,
     cycle: float,
     processing: Processing | None = None,
-    manoeuvre: LaneChange | None = None,
+    progress: Callable[[Step], None] | None = None,
 ) -> Plan:
-    """Optimise the excitations and design the loops.
+    """Optimise the excitations of the steps, then assemble the plan.
+
+    Args:
+        vehicle: what is known of it.
+        generator: of the random starts of the optimisation.
+        steps: to drive, in any order.
+        periods: repeats of every excitation.
+        cycle: T_s [s].
+        processing: of the estimate, whose mask the excitation takes into account.
+        progress: called with every excitation that is ready.
 
     Raises:
-        CampaignError: a step is unknown, or the steps need more floor than the vehicle file allows.
+        CampaignError: there is no step, or the steps need more floor than the vehicle file allows.
     """
-    ordered = tuple(step for step in ORDER if step in steps)
-    if not ordered:
+    excitations = {}
+    for step in ORDER:
+        if step in steps and step in EXCITATIONS:
+            excitations[step] = _excitation(step, vehicle, processing or Processing(), generator)
+            if progress is not None:
+                progress(step)
+    return assemble_plan(vehicle, excitations, steps=steps, periods=periods, cycle=cycle)
+
+
+def assemble_plan(
+    vehicle: VehicleDescription,
+    excitations: Mapping[Step, Excitation],
+    *,
+    steps: Sequence[Step],
+    periods: int,
+    cycle: float,
+) -> Plan:
+    """A plan from excitations that are given; designs the loops and checks the room.
+
+    Raises:
+        CampaignError: there is no step, too few periods, or too little floor.
+    """
+    if not steps:
         raise CampaignError("The campaign has no step.", f"Choose from {', '.join(ORDER)}.")
+    if periods < PERIODS:
+        raise CampaignError(
+            f"{periods} periods a step do not separate noise from model error.", f"Drive at least {PERIODS}."
+        )
     axes = {step: axis_of(spec, vehicle) for step, spec in EXCITATIONS.items()}
     plan = Plan(
         vehicle=vehicle,
-        steps=ordered,
-        excitations={
-            step: _excitation(step, axes[step], vehicle, processing or Processing(), generator)
-            for step in ordered
-            if step in EXCITATIONS
-        },
+        steps=tuple(step for step in ORDER if step in steps),
+        excitations=excitations,
         designs=_by_loop({step: _design(step, axis, cycle) for step, axis in axes.items()}),
         limits=_by_loop({step: _limits(step, axis) for step, axis in axes.items()}),
         periods=periods,
         cycle=cycle,
-        manoeuvre=manoeuvre or LaneChange(),
+        manoeuvre=LaneChange(),
     )
     _check_room(plan)
     return plan
 
 
 def _excitation(
-    step: Step, axis: Axis, vehicle: VehicleDescription, processing: Processing, generator: np.random.Generator
+    step: Step, vehicle: VehicleDescription, processing: Processing, generator: np.random.Generator
 ) -> Excitation:
     spec, geometry = EXCITATIONS[step], vehicle.geometry
-    problem = Problem(spec, axis, vehicle.limits, geometry.gear_ratio, vehicle.prior["m_ch"], processing)
+    problem = Problem(
+        spec, axis_of(spec, vehicle), vehicle.limits, geometry.gear_ratio, vehicle.prior["m_ch"], processing
+    )
     return optimise(problem, generator)
 
 

@@ -1,0 +1,99 @@
+"""Records from whatever a run left behind: run folder, folder of logs, single logs, or plain record files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.campaign.folder import RunFolder, open_run
+from hil.frames import decode_log
+from hil.network import Network
+from hil.recorder import LogFormat, finished_steps, step_of
+from ident.campaign.plan import Plan
+from ident.campaign.steps import EXCITATIONS
+from ident.errors import RecordError
+from ident.records.files import read_record
+from ident.records.record import Record, Segment, Step, make_segment
+
+
+def read_run(path: Path) -> Record:
+    """Record of the finished steps of a run folder, decoded from its frames.
+
+    Raises:
+        DataFileError, RecordError: the folder or a log in it cannot be used.
+    """
+    run = open_run(path)
+    logs = finished_steps(RunFolder(path).frames)
+    if not logs:
+        raise RecordError(f"{path} holds no finished step.", "Drive the campaign, or go on with it (--resume).")
+    segments = [_segment(step, log, run.network, run.plan) for step, log in logs]
+    return Record(segments, str(path))
+
+
+def read_logs(paths: Sequence[Path], network: Network) -> Record:
+    """Record from logs named `NNN_step.blf` (or another format); the repeats of the excitation are not known.
+
+    Raises:
+        RecordError: a name does not tell the step, or a log cannot be used.
+    """
+    segments = []
+    for path in paths:
+        step = step_of(path)
+        if step is None:
+            raise RecordError(f"{path} does not tell which step it holds.", "Name it like 003_straight.blf.")
+        segments.append(_segment(step, path, network, None))
+    return Record(segments, ", ".join(str(path) for path in paths))
+
+
+def read_any(path: Path, network: Network) -> Record:
+    """Record from a run folder, a folder of logs, a log, or a CSV, Parquet or MF4 record.
+
+    Raises:
+        DataFileError, RecordError: there is nothing usable at the path.
+    """
+    if path.is_dir():
+        if RunFolder(path).manifest.is_file():
+            return read_run(path)
+        folder = RunFolder(path).frames if RunFolder(path).frames.is_dir() else path
+        logs = [log for _, log in finished_steps(folder)]
+        if not logs:
+            raise RecordError(f"{path} holds no logs of finished steps.", "Name a run folder or a record.")
+        return read_logs(logs, network)
+    if path.suffix in tuple(LogFormat) and (path.suffix != LogFormat.MF4 or step_of(path) is not None):
+        if not path.is_file():
+            raise RecordError(f"{path} does not exist.", "Name an existing log.")
+        return read_logs([path], network)
+    return read_record(path)
+
+
+def join(records: Sequence[Record]) -> Record:
+    """All segments of several records behind each other."""
+    segments = [segment for record in records for segment in record.segments]
+    return Record(segments, ", ".join(record.source for record in records))
+
+
+def _segment(step: str, path: Path, network: Network, plan: Plan | None) -> Segment:
+    log = decode_log(path, network)
+    return make_segment(
+        Segment(
+            step=step,
+            sample_time=network.cycle_period,
+            time=log.time + log.start,
+            motor_torques=log.motor_torques,
+            wheel_angles=log.wheel_angles,
+            steering_angles=log.steering_angles,
+            period=_periods(step, len(log.time), plan),
+            command_torques=log.command_torques,
+        ),
+        str(path),
+    )
+
+
+def _periods(step: str, samples: int, plan: Plan | None) -> NDArray[np.int64]:
+    if plan is None or step not in {str(known) for known in EXCITATIONS}:
+        return np.full(samples, -1, dtype=np.int64)
+    planned = plan.reference(Step(step), plan.vehicle.prior).period
+    return np.asarray(planned[:samples], dtype=np.int64)

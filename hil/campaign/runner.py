@@ -1,0 +1,151 @@
+"""Drives the steps of a plan through a master, one log a step, and goes on where a killed run stopped.
+
+The same code drives the emulator and a real vehicle: it sees a bus, a clock and an operator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from typing import Final, Protocol
+
+import can
+import numpy as np
+
+from hil.campaign.folder import Run
+from hil.campaign.reading import read_run
+from hil.clock import Clock
+from hil.master.master import Master
+from hil.recorder import Recorder, finished_steps
+from ident.campaign.controller import Controller
+from ident.campaign.reference import Reference
+from ident.errors import CampaignError
+from ident.estimate.identify import FIT_STEPS, identify
+from ident.records.record import Step
+from ident.vehicle.parameters import Parameters
+
+MISALIGNED: Final = 0.01
+"""Steering error after an alignment with which no step is begun [rad]."""
+
+PROGRESS_CYCLES: Final = 100
+_STANDSTILL: Final = (0.0, 0.0, 0.0, 0.0)
+
+Progress = Callable[[str, int, int], None]
+"""Called with step, cycles driven and cycles to drive."""
+
+
+class Operator(Protocol):
+    """Hands beside the vehicle; called while its drives are without power."""
+
+    def lift(self) -> None:
+        """Put the vehicle on the jack-stand, wheels free, and return when it is there."""
+
+    def lower(self) -> None:
+        """Put the vehicle on the floor, wheels about straight ahead, and return when it is there."""
+
+
+class CampaignRunner:
+    """Drives a run.
+
+    Args:
+        run: what to drive.
+        bus: of the vehicle.
+        clock: time of that bus.
+        recorder: takes every frame.
+        operator: lifts and lowers the vehicle.
+        progress: shown to people.
+    """
+
+    def __init__(
+        self, run: Run, bus: can.BusABC, clock: Clock, recorder: Recorder, operator: Operator, progress: Progress
+    ) -> None:
+        self._run = run
+        self._plan = run.plan
+        self._bus = bus
+        self._clock = clock
+        self._recorder = recorder
+        self._operator = operator
+        self._progress = progress
+        self.overruns = 0
+
+    def check(self) -> None:
+        """See that all nodes are the ones described; nothing moves.
+
+        Raises:
+            BusError: a node is missing, another device, in other units, or without the mode.
+        """
+        self._master().check()
+
+    def drive(self) -> None:
+        """Drive all steps that are not finished yet.
+
+        Raises:
+            BusError: the network fails on the way; the drives are stopped.
+            CampaignError: a coordinate leaves its reference or cannot be aligned; the drives are stopped.
+        """
+        finished = {step for step, _ in finished_steps(self._run.folder.frames)}
+        steps = [step for step in self._plan.steps if step not in finished]
+        lifted = [step for step in steps if step is Step.WHEEL_LIFTED]
+        floor = [step for step in steps if step is not Step.WHEEL_LIFTED]
+        if lifted:
+            self._operator.lift()
+            self._drive_steps(lifted)
+            self._operator.lower()
+        if floor:
+            self._drive_steps(floor)
+
+    def _master(self) -> Master:
+        return Master(self._bus, self._clock, self._run.network, self._recorder)
+
+    def _drive_steps(self, steps: Collection[Step]) -> None:
+        with self._master() as master:
+            master.boot()
+            master.enable()
+            for step in steps:
+                if step is not Step.WHEEL_LIFTED:
+                    self._align(master, step)
+                self._drive(master, self._plan.reference(step, self._parameters(step)))
+        self.overruns += master.overruns
+
+    def _align(self, master: Master, step: Step) -> None:
+        start = np.array(master.exchange(_STANDSTILL).steering_angles)
+        reached = self._drive(master, self._plan.alignment(start, step, self._plan.vehicle.prior))
+        error = float(np.abs(np.array(reached) - self._plan.posture(step)).max())
+        if error > MISALIGNED:
+            raise CampaignError(
+                f"The wheels stand {error:.3f} rad off the angles of {step} after their alignment.",
+                "Look for a blocked steering unit, or give its friction in the vehicle file's [prior].",
+            )
+
+    def _drive(self, master: Master, reference: Reference) -> Sequence[float]:
+        """Drive one reference into a log of its own; gives the steering angles at its end."""
+        vehicle = self._plan.vehicle
+        controller = Controller(
+            reference,
+            self._plan.designs,
+            self._plan.limits,
+            gear_ratio=vehicle.geometry.gear_ratio,
+            peak_torque=vehicle.limits.peak_torque,
+        )
+        total, torques = len(reference), controller.torques
+        with self._recorder.step(reference.step):
+            sample = master.exchange(_STANDSTILL)
+            for index in range(total - 1):
+                sample = master.exchange(torques(index, sample.wheel_angles, sample.steering_angles))
+                if index % PROGRESS_CYCLES == 0:
+                    self._progress(reference.step, index, total)
+        self._progress(reference.step, total, total)
+        return sample.steering_angles
+
+    def _parameters(self, step: Step) -> Parameters:
+        """Feed-forward by the guesses, and for the validation by what the steps before it have shown."""
+        vehicle = self._plan.vehicle
+        if step is not Step.LANE_CHANGE or not self._identifiable():
+            return vehicle.prior
+        record = read_run(self._run.folder.path)
+        result = identify(record, vehicle.geometry, known_inertia=self._run.known_inertia)
+        return Parameters(result.values, np.array([estimate.std for estimate in result.estimates]))
+
+    def _identifiable(self) -> bool:
+        finished = {step for step, _ in finished_steps(self._run.folder.frames)}
+        needed = {str(step) for step in FIT_STEPS if step is not Step.LATERAL}
+        return needed <= finished and (self._run.known_inertia is not None or Step.WHEEL_LIFTED in finished)

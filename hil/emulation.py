@@ -1,0 +1,85 @@
+"""The emulated side as the command line composes it: bench in this process, or server for other processes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import can
+import numpy as np
+
+from emulator.prototype import load_prototype
+from emulator.vehicle import EmulatedVehicle
+from hil.bench import LockstepBench
+from hil.buses.opening import open_bus
+from hil.buses.unix import UnixHub
+from hil.clock import Clock
+from hil.network import Network
+from hil.serving import VehicleServer
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+
+
+@dataclass(frozen=True)
+class BenchOperator:
+    """Lifts and lowers the emulated vehicle."""
+
+    vehicle: EmulatedVehicle
+
+    def lift(self) -> None:
+        """On the jack-stand."""
+        self.vehicle.lift()
+
+    def lower(self) -> None:
+        """On the floor."""
+        self.vehicle.lower()
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What a campaign needs of the emulated side: bus, clock and hands."""
+
+    bus: can.BusABC
+    clock: Clock
+    operator: BenchOperator
+
+
+@contextmanager
+def vehicle(prototype: str, seed: int, gui: bool) -> Iterator[EmulatedVehicle]:
+    """The emulated prototype, closed at the end."""
+    with EmulatedVehicle(load_prototype(prototype), seed=seed, gui=gui) as emulated:
+        yield emulated
+
+
+@contextmanager
+def bench(prototype: str, seed: int, gui: bool, network: Path) -> Iterator[Bench]:
+    """The emulated prototype behind an in-process bus in lockstep."""
+    with vehicle(prototype, seed, gui) as emulated, LockstepBench(emulated, network) as lockstep:
+        yield Bench(lockstep.bus, lockstep.clock, BenchOperator(emulated))
+
+
+@contextmanager
+def server_bus(name: str, network: Network) -> Iterator[can.BusABC]:
+    """The bus that an emulator serves: the hub of a `unix:` bus, a member of any other.
+
+    Raises:
+        BusError: the bus cannot be opened.
+    """
+    interface, _, channel = name.partition(":")
+    bus: can.BusABC = UnixHub(Path(channel)) if interface == "unix" else open_bus(name, network.bit_rate)
+    try:
+        yield bus
+    finally:
+        bus.shutdown()
+
+
+def server(emulated: EmulatedVehicle, bus: can.BusABC, clock: Clock, network: Path, lockstep: bool) -> VehicleServer:
+    """A server of an emulated vehicle on a bus."""
+    return VehicleServer(emulated, bus, clock, network, lockstep)
+
+
+def truth(prototype: str) -> Parameters:
+    """The parameters that the prototype was built with."""
+    values = load_prototype(prototype).truth
+    return Parameters(np.array([values[name] for name in PARAMETER_NAMES]), np.zeros(len(PARAMETER_NAMES)))
