@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,21 @@ def refuse_nonfinite(name: str, values: Array, where: str) -> None:
             f"{where}: channel {name} has {bad.size} samples that are not numbers, the first at sample {bad[0]}.",
             "Cut that part out, or record it again.",
         )
+
+
+def period_numbers(channel: NDArray[Any] | None, samples: int, where: str) -> NDArray[np.int64]:
+    """The optional channel `period` as whole numbers (samples,), -1 throughout where there is none.
+
+    Raises:
+        RecordError: a value is no whole number.
+    """
+    period = np.full(samples, -1.0) if channel is None else np.asarray(channel, dtype=float)
+    if not np.all(np.isfinite(period) & (period == np.round(period))):
+        raise RecordError(
+            f"{where}: channel period holds values that are no whole numbers.",
+            "Number the repeats 0, 1, 2 ... and write -1 outside of them, or leave the channel out.",
+        )
+    return period.astype(np.int64)
 
 
 def uniform_sample_time(time: Array, where: str) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.errors import RecordError
+from ident.records.checks import period_numbers
 from ident.records.record import Record, Segment, make_segment
 from ident.vehicle.geometry import WHEELS
 
@@ -38,12 +39,12 @@ def record_from_table(table: Table, source: str) -> Record:
         RecordError: a channel is missing, lengths differ, or a segment breaks the contract.
     """
     _check_channels(table, source)
-    _check_period(table, source)
+    period = period_numbers(table.get("period"), len(table["time"]), source)
     steps = np.asarray(table["step"]).astype(str)
     starts = np.flatnonzero(np.concatenate([[True], steps[1:] != steps[:-1]]))
     ends = [*starts[1:].tolist(), len(steps)]
     segments = [
-        make_segment(_slice(table, slice(int(start), int(end)), str(steps[start])), source)
+        make_segment(_slice(table, slice(int(start), int(end)), str(steps[start]), period), source)
         for start, end in zip(starts, ends, strict=True)
     ]
     return Record(segments, source)
@@ -70,23 +71,13 @@ def _check_channels(table: Table, source: str) -> None:
         raise RecordError(f"{source} holds no samples.", "Record again.")
 
 
-def _check_period(table: Table, source: str) -> None:
-    period = np.asarray(table.get("period", -1), dtype=float)
-    if not np.all(period == np.round(period)):  # NaN equals nothing
-        raise RecordError(
-            f"{source}: channel period holds values that are no whole numbers.",
-            "Number the repeats 0, 1, 2 ... and write -1 outside of them, or leave the channel out.",
-        )
-
-
 def _stack(table: Table, names: tuple[str, ...], rows: slice) -> NDArray[np.float64]:
     return np.stack([np.asarray(table[name][rows], dtype=float) for name in names], axis=1)
 
 
-def _slice(table: Table, rows: slice, step: str) -> Segment:
+def _slice(table: Table, rows: slice, step: str, period: NDArray[np.int64]) -> Segment:
     time = np.asarray(table["time"][rows], dtype=float)
     known = {*REQUIRED, *COMMANDS, "period"}
-    period = table["period"][rows] if "period" in table else np.full(len(time), -1)
     return Segment(
         step=step,
         sample_time=0.0,
@@ -94,7 +85,7 @@ def _slice(table: Table, rows: slice, step: str) -> Segment:
         motor_torques=_stack(table, TORQUES, rows),
         wheel_angles=_stack(table, WHEEL_ANGLES, rows),
         steering_angles=_stack(table, STEERING_ANGLES, rows),
-        period=np.asarray(period, dtype=np.int64),
+        period=period[rows],
         command_torques=_stack(table, COMMANDS, rows) if all(name in table for name in COMMANDS) else None,
         extra={name: np.asarray(table[name][rows], dtype=float) for name in table if name not in known},
     )
