@@ -28,6 +28,7 @@ class LockstepBench:
         bus: the master's endpoint.
         clock: simulated time of the bench.
         vehicle: the hardware given.
+        devices: the nodes on it, for tests that break something.
 
     Raises:
         DataFileError: the network file is missing or malformed.
@@ -42,7 +43,8 @@ class LockstepBench:
         description = read_network_description(network)
 
         def make(send: Callable[[int, bytes], None]) -> DeviceNetwork:
-            return DeviceNetwork(vehicle, description, send)
+            self.devices = DeviceNetwork(vehicle, description, send)
+            return self.devices
 
         self._hub.attach(make)
 

@@ -16,7 +16,9 @@ from ident.errors import RecordError
 INTERLUDE = "interlude"
 """Name of the files that hold what was sent between steps: commissioning, enabling, shut-down."""
 
-_PARTIAL = ".part"
+PARTIAL = ".part"
+"""Mark in the name of a file whose step is not finished."""
+
 _FINISHED = re.compile(r"(?P<number>\d{3})_(?P<step>\w+)\.(?P<suffix>\w+)")
 _FLUSH_PERIOD = 0.5
 
@@ -105,7 +107,7 @@ class Recorder:
 
     def _open(self, name: str) -> None:
         self._name = name
-        self._path = self._directory / f"{self._number:03d}_{name}{_PARTIAL}{self._format}"
+        self._path = self._directory / f"{self._number:03d}_{name}{PARTIAL}{self._format}"
         try:
             self._writer = _make_writer(self._path, self._format)
         except OSError as error:

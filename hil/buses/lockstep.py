@@ -7,7 +7,6 @@ sent, while its time stamp says when its last bit would have left the wire.
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Callable
 from typing import Protocol
@@ -109,7 +108,7 @@ class LockstepHub:
         Without this a burst of SDO transfers, each answered in the instant it is asked, would take no time at all.
         """
         if stamp - self.clock.now() > self._cycle_period:
-            self.clock.wait_until(round(math.ceil(stamp / self._cycle_period) * self._cycle_period, 9))
+            self.clock.wait_until(round(stamp // self._cycle_period * self._cycle_period, 9))
 
     def _pace(self) -> None:
         if self._last_sync is not None:

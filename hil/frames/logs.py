@@ -12,7 +12,7 @@ import numpy as np
 
 from hil.frames.blf import read_blf
 from hil.frames.table import NOT_DATA, FrameTable
-from hil.recorder import LogFormat
+from hil.recorder import PARTIAL, LogFormat
 from ident.errors import RecordError
 
 _READ_ERRORS = (ValueError, OSError, EOFError, KeyError, IndexError, struct.error, zlib.error, can.CanError)
@@ -40,6 +40,8 @@ def read_log(path: Path, accept_truncated: bool = False) -> FrameTable:
         raise RecordError(f"{path} is damaged: {error}.", "Drive the step again, or use another copy.") from error
     if not len(table):
         raise RecordError(f"{path} holds no frames.", "Drive the step again.")
+    # A candump log that was cut between two lines shows it by its name only.
+    whole = whole and PARTIAL not in path.suffixes
     if not whole and not accept_truncated:
         raise RecordError(
             f"{path} is truncated after {len(table)} frames, {table.time[-1] - table.time[0]:.3f} s.",

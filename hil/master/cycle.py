@@ -115,17 +115,16 @@ class Cycle:
         receive = self._link.receive
         frames: list[Fields | None] = [None] * len(structs)
         missing = len(structs)
-        deadline = None
+        timeout = self._timeout
+        deadline = self._clock.now() + timeout
         while missing:
-            message = receive(self._timeout)
+            message = receive(timeout) if timeout > 0.0 else None
             if message is None:
                 raise self._lost(frames)
             slot = slots.get(message.arbitration_id)
             if slot is None or frames[slot] is not None:
                 self._link.dispatch(message)
-                deadline = deadline or self._clock.now() + self._timeout
-                if self._clock.now() > deadline:
-                    raise self._lost(frames)
+                timeout = deadline - self._clock.now()
                 continue
             try:
                 frames[slot] = structs[slot].unpack(message.data)
