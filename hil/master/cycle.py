@@ -62,14 +62,16 @@ class Cycle:
         self._position = [(*field(node, POSITION_ACTUAL), Counter(node)) for node in network.drives]
         self._encoder = [(*field(node, ENCODER_POSITION), Counter(node)) for node in network.encoders]
         self._origin: float | None = None
-        self._due = 0.0
+        self._number = 0
+        self._shift = 0.0
         self.statuswords: tuple[int, ...] = (0, 0, 0, 0)
         self.overruns = 0
 
     @property
     def time(self) -> float:
         """Instant of the present cycle, since the first SYNC [s]."""
-        return 0.0 if self._origin is None else self._due - self._origin
+        # From the count, not from the clock: sums of periods at the size of Unix time lose 50 us a second.
+        return self._number * self._period + self._shift
 
     def exchange(self, motor_torques: Sequence[float]) -> Sample:
         """Send the commands, wait for the next cycle, send SYNC, and collect what was sampled at it.
@@ -99,15 +101,15 @@ class Cycle:
 
     def _pace(self) -> None:
         if self._origin is None:
-            self._origin = self._due = self._clock.now()
+            self._origin = self._clock.now()
         else:
-            self._due = round(self._due + self._period, 9)
-        lateness = self._clock.wait_until(self._due)
+            self._number += 1
+        lateness = self._clock.wait_until(round(self._origin + self.time, 9))
         self._link.drain()
         if lateness > self._period:
             # The grid is moved rather than caught up with: a burst of SYNCs would be worse than a gap.
             self.overruns += 1
-            self._due += lateness
+            self._shift += lateness
 
     def _collect(self) -> list[Fields]:
         layout = self._layout

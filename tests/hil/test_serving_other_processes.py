@@ -1,0 +1,101 @@
+"""The emulated nodes in a process of their own, a master in this one, frames and nothing else between them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from hil.buses import open_bus
+from hil.clock import FreeRunningClock, WallClock
+from hil.master import Master
+from hil.network import Network
+from ident.errors import BusError
+
+SERVER = """
+import sys
+from pathlib import Path
+from emulator.firmware.flywheels import Flywheels
+from hil.buses import UnixHub
+from hil.clock import WallClock
+from hil.serving import VehicleServer
+with UnixHub(Path(sys.argv[1])) as hub:
+    server = VehicleServer(Flywheels(), hub, WallClock(), lockstep=sys.argv[2] == "lockstep")
+    print("ready", flush=True)
+    server.serve(lambda: False)
+"""
+
+
+@contextmanager
+def emulator(path: Path, pacing: str) -> Iterator[subprocess.Popen[str]]:
+    process = subprocess.Popen(
+        [sys.executable, "-c", SERVER, str(path), pacing], stdout=subprocess.PIPE, text=True, stderr=subprocess.PIPE
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def drive_for_ever(master: Master) -> None:
+    while True:
+        master.exchange((0.0,) * 4)
+
+
+def test_in_lockstep_simulated_seconds_pass_faster_than_real_ones(tmp_path: Path, network: Network) -> None:
+    with (
+        emulator(tmp_path / "bus", "lockstep"),
+        open_bus(f"unix:{tmp_path / 'bus'}") as bus,
+        Master(bus, FreeRunningClock(), network) as master,
+    ):
+        master.boot()
+        master.enable()
+        first = master.exchange((0.1,) * 4)
+        start = time.perf_counter()
+        for _ in range(1000):
+            sample = master.exchange((0.1,) * 4)
+        real = time.perf_counter() - start
+    assert sample.time - first.time == pytest.approx(2.0)
+    assert real < 2.0
+    torque, t = round(100 / 1.27) * 1.27e-3, 2.0
+    expected = torque / 1e-3 * (t - (1 - 2.718281828459045 ** (-t)) / 1.0) / 20
+    assert sample.wheel_angles[0] - first.wheel_angles[0] == pytest.approx(expected, rel=1e-4)
+
+
+def test_in_real_time_a_simulated_second_takes_a_second(tmp_path: Path, network: Network) -> None:
+    with (
+        emulator(tmp_path / "bus", "realtime"),
+        open_bus(f"unix:{tmp_path / 'bus'}") as bus,
+        Master(bus, WallClock(), network) as master,
+    ):
+        master.boot()
+        master.enable()
+        start, first = time.perf_counter(), master.exchange((0.1,) * 4)
+        for _ in range(500):
+            sample = master.exchange((0.1,) * 4)
+        real = time.perf_counter() - start
+    assert real == pytest.approx(1.0, rel=0.2)
+    torque, t = round(100 / 1.27) * 1.27e-3, real
+    expected = torque / 1e-3 * (t - (1 - 2.718281828459045 ** (-t)) / 1.0) / 20
+    assert sample.wheel_angles[0] - first.wheel_angles[0] == pytest.approx(expected, rel=0.1)
+
+
+def test_the_death_of_the_other_side_is_an_error_and_not_a_hang(tmp_path: Path, network: Network) -> None:
+    with emulator(tmp_path / "bus", "lockstep") as process, open_bus(f"unix:{tmp_path / 'bus'}") as bus:
+        master = Master(bus, FreeRunningClock(), network)
+        master.boot()
+        master.enable()
+        process.kill()
+        process.wait()
+        start = time.perf_counter()
+        with pytest.raises(BusError):
+            drive_for_ever(master)
+        assert time.perf_counter() - start < 2.0
