@@ -1,0 +1,55 @@
+"""How numbers are written: as many digits as their standard deviation supports (GUM, 7.2.6)."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+SIGNIFICANT: Final = 2
+"""Significant digits of a standard deviation."""
+
+MISSING: Final = "–"
+"""Stands where there is no number."""
+
+_SUPERSCRIPTS: Final = {"^2": "²", "^3": "³"}
+
+
+def digits(value: float, std: float) -> str:
+    """A value with the decimals of its standard deviation; four significant digits where there is none."""
+    if not math.isfinite(value):
+        return MISSING
+    if not (std > 0 and math.isfinite(std)):
+        return f"{value:.4g}"
+    decimals = max(0, SIGNIFICANT - 1 - math.floor(math.log10(std)))
+    return f"{value:.{decimals}f}"
+
+
+def with_std(value: float, std: float) -> str:
+    """`value ± std`, or the value alone where there is no std."""
+    return f"{digits(value, std)} ± {digits(std, std)}" if std > 0 else digits(value, std)
+
+
+def percent(share: float, *, signed: bool = False) -> str:
+    """A share as a percentage of two significant digits, from 0.01 % upwards."""
+    if not math.isfinite(share):
+        return MISSING
+    size = abs(100 * share)
+    decimals = 2 if size < 1 else 1 if size < 10 else 0
+    return f"{100 * share:{'+' if signed else ''}.{decimals}f} %"
+
+
+def significant(value: float, count: int = 3) -> str:
+    """A number of `count` significant digits, without exponent for the sizes that occur here."""
+    if not math.isfinite(value):
+        return MISSING
+    if value == 0:
+        return "0"
+    decimals = max(0, count - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:.{decimals}f}"
+
+
+def unit_text(unit: str) -> str:
+    """A unit with real superscripts."""
+    for plain, raised in _SUPERSCRIPTS.items():
+        unit = unit.replace(plain, raised)
+    return unit

@@ -1,0 +1,263 @@
+"""One self-contained HTML file: what was identified, how well, and everything needed to doubt it."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import jinja2
+from markupsafe import Markup, escape
+from plotly import offline
+
+from ident.campaign.plan import Plan
+from ident.errors import UserError
+from ident.estimate.identify import Identification
+from ident.records.record import Record
+from ident.report import digits, figures
+from ident.report.comparison import Comparison, comparisons, folded
+from ident.report.driven_path import Leg, covered_floor, driven_legs
+from ident.report.excitation import phase_planes
+from ident.report.paper import load_paper_result
+from ident.report.rows import Role, loop_rows, parameter_rows, step_rows
+from ident.report.summary import summarise
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+
+_SYMBOL: Final = re.compile(r"(?P<letter>[A-Za-z])_(?P<index>\w+)")
+
+
+@dataclass(frozen=True)
+class ReportContent:
+    """What a report is made of.
+
+    Attributes:
+        title: heading of the page.
+        identification: the result.
+        record: what it was found from.
+        vehicle: geometry, priors and limits.
+        truth: true parameters, where they are known.
+        plan: of the campaign, where there was one; shows loops, excitation limits and room.
+        provenance: what the reader must know to repeat it: run, versions, files, seed, by name.
+        warnings: to be shown in front of those that the report finds itself.
+        paper: whether Table 2 of the paper stands beside the result.
+    """
+
+    title: str
+    identification: Identification
+    record: Record
+    vehicle: VehicleDescription
+    truth: Parameters | None
+    plan: Plan | None
+    provenance: Mapping[str, str]
+    warnings: Sequence[str]
+    paper: bool = True
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """A figure with its heading and what it shows, in words."""
+
+    key: str
+    heading: str
+    caption: str
+    figure: figures.Figure
+
+
+def render_report(content: ReportContent) -> str:
+    """The whole page as a string; scripts, styles and data inline, nothing is loaded from anywhere."""
+    panels = {name: make(content) for name, make in _SECTIONS.items()}
+    drawn = {panel.key: panel.figure for section in panels.values() for panel in section}
+    paper = load_paper_result()
+    rows = parameter_rows(content.identification, content.truth, paper.parameters if content.paper else None)
+    steps = step_rows(content.identification)
+    summary = summarise(content.vehicle.name, content.identification, content.record, rows, steps)
+    return (
+        _environment()
+        .get_template("report.html.j2")
+        .render(
+            content=content,
+            identification=content.identification,
+            summary=summary,
+            warnings=[*content.warnings, *summary.warnings],
+            rows=rows,
+            steps=steps,
+            checks=[row for row in steps if row.role is Role.VALIDATION],
+            panels=panels,
+            names=PARAMETER_NAMES,
+            paper=paper if content.paper else None,
+            loops=loop_rows(content.plan.designs) if content.plan else [],
+            room=content.plan.room() if content.plan else None,
+            settings=_settings(content),
+            figures=_json(drawn),
+            plotly=Markup(offline.get_plotlyjs()),
+        )
+    )
+
+
+def write_report(content: ReportContent, path: Path) -> None:
+    """Write the page; a reader of `path` sees the old file or the new one, never half of it.
+
+    Raises:
+        UserError: the folder cannot be made or written.
+    """
+    page = render_report(content)
+    part = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(page, encoding="utf-8")
+        os.replace(part, path)
+    except OSError as error:
+        raise UserError(
+            f"The report cannot be written to {path}: {error.strerror}.", "Name a place that can be written."
+        ) from error
+
+
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("ident.report", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(
+        digits=digits.digits,
+        percent=digits.percent,
+        significant=digits.significant,
+        unit=digits.unit_text,
+        with_std=digits.with_std,
+        symbol=_symbol,
+        symbols=_symbols,
+    )
+    return environment
+
+
+def _symbol(name: str) -> Markup:
+    """C_l as C with its index set low; d_vl with the comma of the paper."""
+    letter, _, index = name.partition("_")
+    if letter == "d":
+        index = f"{index[0]},{index[1:]}"
+    return Markup("<var>{}<sub>{}</sub></var>").format(letter, index)
+
+
+def _symbols(text: str) -> Markup:
+    """A sentence with the names of (18) in it set as symbols."""
+
+    def typeset(match: re.Match[str]) -> str:
+        return str(_symbol(match.group())) if match.group() in PARAMETER_NAMES else match.group()
+
+    return Markup(_SYMBOL.sub(typeset, str(escape(text))))
+
+
+def _settings(content: ReportContent) -> dict[str, str]:
+    """Filters and thresholds of the estimate, and where B_w comes from."""
+    processing = content.identification.processing
+    inertia = content.identification["B_w"]
+    return {
+        "Record": content.record.source,
+        "Filter on Θ and τ": f"zero-phase Butterworth, {processing.cutoff:g} rad/s",
+        "Filter on positions": f"zero-phase Butterworth, {processing.signal_cutoff:g} rad/s",
+        "Stiction": f"rows with a joint slower than {processing.moving:g} rad/s are left out, "
+        f"and {processing.guard:g} s around them",
+        "Source of B_w": f"{inertia.method}: {digits.with_std(inertia.value, inertia.std)} kg m²",
+    }
+
+
+def _json(value: Any) -> Markup:
+    """JSON that cannot end the script element it stands in."""
+    return Markup(json.dumps(value, separators=(",", ":")).replace("<", "\\u003c"))
+
+
+def _torque_panels(content: ReportContent, roles: Sequence[Role]) -> list[_Panel]:
+    processing = content.identification.processing
+    return [
+        _Panel(
+            key=f"torque-{index}",
+            heading=f"{comparison.step} · {comparison.coordinate}",
+            caption=_torque_caption(comparison),
+            figure=figures.torque_figure(comparison, processing),
+        )
+        for index, comparison in enumerate(comparisons(content.identification))
+        if comparison.role in roles
+    ]
+
+
+def _torque_caption(comparison: Comparison) -> str:
+    duration = len(comparison.time) * comparison.sample_time
+    return f"{duration:.1f} s, {digits.percent(float(comparison.moving.mean()))} of the rows outside of stiction."
+
+
+def _identification_panels(content: ReportContent) -> list[_Panel]:
+    return _torque_panels(content, (Role.FIT,))
+
+
+def _validation_panels(content: ReportContent) -> list[_Panel]:
+    return _torque_panels(content, (Role.VALIDATION,))
+
+
+def _lifted_panels(content: ReportContent) -> list[_Panel]:
+    return _torque_panels(content, (Role.INERTIA, Role.SHOWN))
+
+
+def _folded_panels(content: ReportContent) -> list[_Panel]:
+    identification = content.identification
+    panels = []
+    for index, (comparison, floor) in enumerate(zip(comparisons(identification), identification.floors, strict=True)):
+        fold = folded(comparison) if comparison.role is Role.FIT else None
+        if fold is None:
+            continue
+        unit = "N" if comparison.coordinate in ("x", "y") else "Nm"
+        panels.append(
+            _Panel(
+                key=f"folded-{index}",
+                heading=f"{comparison.step} · {comparison.coordinate}",
+                caption=f"Noise {digits.significant(floor.noise)} {unit}, "
+                f"model error {digits.significant(floor.model_error)} {unit} rms.",
+                figure=figures.folded_figure(comparison, fold, identification.processing),
+            )
+        )
+    return panels
+
+
+def _excitation_panels(content: ReportContent) -> list[_Panel]:
+    identification = content.identification
+    planes = phase_planes(content.record, identification.equations, content.vehicle.geometry, identification.processing)
+    return [
+        _Panel(f"excitation-{index}", f"{plane.step} · {plane.coordinate}", "", figures.excitation_figure(plane))
+        for index, plane in enumerate(planes)
+    ]
+
+
+def _path_panels(content: ReportContent) -> list[_Panel]:
+    legs = driven_legs(content.record, content.vehicle.geometry, content.identification.processing)
+    if not legs:
+        return []
+    figure = figures.path_figure(legs, content.vehicle.geometry)
+    return [_Panel("driven-path", "Centre of the chassis", _path_caption(legs), figure)]
+
+
+def _path_caption(legs: Sequence[Leg]) -> str:
+    along, across = covered_floor(legs)
+    return f"The centre moved over {along:.2f} m along and {across:.2f} m across the heading at the start."
+
+
+def _interval_panels(content: ReportContent) -> list[_Panel]:
+    rows = parameter_rows(content.identification, content.truth)
+    return [_Panel("intervals", "", "", figures.interval_figure(rows))]
+
+
+_SECTIONS: Final = {
+    "intervals": _interval_panels,
+    "identification": _identification_panels,
+    "validation": _validation_panels,
+    "lifted": _lifted_panels,
+    "folded": _folded_panels,
+    "excitation": _excitation_panels,
+    "path": _path_panels,
+}
+"""Figures of every section of the page."""

@@ -1,0 +1,144 @@
+"""The result in plain words, and what a reader must be warned of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from ident.estimate.identify import Identification
+from ident.records.record import Record
+from ident.report.digits import percent, significant
+from ident.report.rows import LEAST_SQUARES, ParameterRow, Role, StepRow
+
+NRMSE_LIMITS: Final = {"x": 0.05, "alpha_v": 0.15}
+"""Largest NRMSE of a lane change that counts as validated, drive force and steering torque."""
+
+COORDINATE_WORDS: Final = {"x": "drive force", "alpha_v": "steering torque"}
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What stands on top of the report.
+
+    Attributes:
+        sentences: what was identified, how well, and what was validated.
+        warnings: what to know before building on it.
+    """
+
+    sentences: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def summarise(
+    vehicle: str,
+    identification: Identification,
+    record: Record,
+    parameters: Sequence[ParameterRow],
+    steps: Sequence[StepRow],
+) -> Summary:
+    """Sentences and warnings from the numbers of an identification."""
+    sentences = [
+        _what(vehicle, record, steps),
+        _inertia(identification),
+        _how_well(parameters),
+        *_against_truth(parameters),
+        *_validation(steps),
+    ]
+    warnings = [*_poor(parameters), *_exact_inertia(identification), *_model_errors(steps), *_not_validated(steps)]
+    return Summary(tuple(sentences), tuple(warnings))
+
+
+def _what(vehicle: str, record: Record, steps: Sequence[StepRow]) -> str:
+    names = list(dict.fromkeys(row.floor.step for row in steps if row.role is Role.FIT))
+    return (
+        f"The dynamic parameters of the vehicle “{vehicle}” were identified from {len(names)} steps "
+        f"({', '.join(names)}). The record holds {record.duration:.0f} s of driving at "
+        f"{1 / record.sample_time:.0f} Hz, all steps counted."
+    )
+
+
+def _inertia(identification: Identification) -> str:
+    estimate = identification["B_w"]
+    if estimate.method == LEAST_SQUARES:
+        return "B_w, which no motion on the floor can show, was identified with the wheels in the air."
+    return f"B_w, which no motion on the floor can show, was given: {estimate.method}."
+
+
+def _how_well(parameters: Sequence[ParameterRow]) -> str:
+    ranked = sorted(parameters, key=lambda row: row.half_width)
+    best, worst = ranked[0], ranked[-1]
+    return (
+        f"The 95 % intervals reach from ±{percent(best.half_width)} ({best.estimate.name}) to "
+        f"±{percent(worst.half_width)} ({worst.estimate.name}) of the value."
+    )
+
+
+def _against_truth(parameters: Sequence[ParameterRow]) -> list[str]:
+    known = [row for row in parameters if row.error is not None]
+    if not known:
+        return []
+    covered = sum(row.covered is True for row in known)
+    worst = max(known, key=lambda row: abs(row.error or 0.0))
+    return [
+        f"The truth is known here: {covered} of {len(known)} intervals hold it, and the largest error is "
+        f"{percent(worst.error or 0.0, signed=True)} ({worst.estimate.name})."
+    ]
+
+
+def _validation(steps: Sequence[StepRow]) -> list[str]:
+    rows = [row for row in steps if row.role is Role.VALIDATION]
+    if not rows:
+        return []
+    parts = [
+        f"the {COORDINATE_WORDS.get(row.floor.coordinate, row.floor.coordinate)} with an NRMSE of "
+        f"{percent(row.floor.nrmse)}"
+        for row in rows
+    ]
+    return [
+        f"On the lane change, which the fit has not seen, the model meets {' and '.join(parts)} "
+        "(rms error over rms signal, outside of stiction)."
+    ]
+
+
+def _poor(parameters: Sequence[ParameterRow]) -> list[str]:
+    return [
+        f"{row.estimate.name} is poorly excited: its 95 % interval is ±{percent(row.half_width)} of its value."
+        for row in parameters
+        if row.estimate.poor
+    ]
+
+
+def _exact_inertia(identification: Identification) -> list[str]:
+    if identification["B_w"].std > 0:
+        return []
+    return ["B_w was given without uncertainty: the intervals of m_ch, C_ch, C_l and C_r are too narrow by its share."]
+
+
+def _model_errors(steps: Sequence[StepRow]) -> list[str]:
+    fitted = [row for row in steps if row.role is Role.FIT]
+    unrepeated = [row.floor.step for row in fitted if not row.floor.noise >= 0]
+    above = [row for row in fitted if row.floor.model_error > row.floor.noise]
+    warnings = [
+        f"In {row.floor.step}, what repeats from period to period ({significant(row.floor.model_error)} {row.unit} "
+        f"rms) exceeds the noise ({significant(row.floor.noise)} {row.unit} rms): the model leaves something out there "
+        "that more periods will not average out. The intervals account for it."
+        for row in above
+    ]
+    if unrepeated:
+        warnings.append(
+            f"No repeated periods in {', '.join(unrepeated)}: noise and model error cannot be told apart there."
+        )
+    return warnings
+
+
+def _not_validated(steps: Sequence[StepRow]) -> list[str]:
+    rows = [row for row in steps if row.role is Role.VALIDATION]
+    if not rows:
+        return ["No lane change in the record: nothing outside of the fit has been checked."]
+    return [
+        f"The {COORDINATE_WORDS[row.floor.coordinate]} of the lane change is off by {percent(row.floor.nrmse)} NRMSE "
+        f"(limit {percent(NRMSE_LIMITS[row.floor.coordinate])})."
+        for row in rows
+        if not row.floor.nrmse <= NRMSE_LIMITS[row.floor.coordinate]
+    ]
