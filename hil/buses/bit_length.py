@@ -60,6 +60,12 @@ def _header(can_id: int, extended: bool, remote: bool, dlc: int) -> tuple[int, i
     return width + stuffed + 15 + UNSTUFFED_TAIL_BITS, state << 8, _crc_bits(0, value, width)
 
 
+def longest_frame_bits(length: int) -> int:
+    """Bit times of the longest standard data frame with `length` bytes: a stuff bit after 5 and then every 4 bits."""
+    stuffable = 19 + 8 * length + 15
+    return stuffable + (stuffable - 1) // 4 + UNSTUFFED_TAIL_BITS
+
+
 def frame_bits(can_id: int, data: bytes, extended: bool = False, remote: bool = False, dlc: int = -1) -> int:
     """Bit times that a data or remote frame occupies the bus, from start of frame to end of intermission.
 

@@ -73,6 +73,11 @@ class Cycle:
         # From the count, not from the clock: sums of periods at the size of Unix time lose 50 us a second.
         return self._number * self._period + self._shift
 
+    def resume(self) -> None:
+        """The next cycle begins now, however long ago the last one was; that is no overrun."""
+        if self._origin is not None:
+            self._shift = self._clock.now() - self._origin - (self._number + 1) * self._period
+
     def exchange(self, motor_torques: Sequence[float]) -> Sample:
         """Send the commands, wait for the next cycle, send SYNC, and collect what was sampled at it.
 

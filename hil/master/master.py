@@ -92,6 +92,9 @@ class Master:
     def boot(self) -> None:
         """Check, configure PDOs, heartbeats and mode by SDO, and start all nodes; the drives stay without power.
 
+        From here on `exchange` has to be called every cycle: nodes that miss the master's heartbeat trip. For a
+        pause, `shut_down` and `boot` again.
+
         Raises:
             BusError: as `check`, and when a node refuses its configuration.
         """
@@ -101,6 +104,7 @@ class Master:
         for node in self._network.drives:
             commissioning.select_mode(self._access[node.node_id])
         self._command_nmt(_NMT_START)
+        self._cycle.resume()
         self._supervision.start(self._cycle.time)
         self._started = True
         self._exchange(_STANDSTILL)

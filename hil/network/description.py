@@ -10,6 +10,7 @@ from pathlib import Path
 
 import canopen
 
+from hil.buses.bit_length import longest_frame_bits
 from ident.vehicle.quantities import Quantity
 
 
@@ -140,6 +141,16 @@ class Network:
     sync_cob_id: int
     times: Mapping[str, float]
     nodes: tuple[Node, ...]
+
+    @property
+    def worst_bus_load(self) -> float:
+        """Largest share of the bus that SYNC and PDOs can take, with every possible stuff bit."""
+        bits = float(longest_frame_bits(0))
+        for node in self.nodes:
+            for pdo in node.pdos:
+                length = sum(item.bits for item in pdo.objects) // 8
+                bits += longest_frame_bits(length) / pdo.transmission_type
+        return bits / (self.bit_rate * self.cycle_period)
 
     def node(self, role: Role) -> Node:
         """The node with this role."""

@@ -49,7 +49,7 @@ def load_network(path: Path = DEFAULT_NETWORK) -> Network:
     devices = require_table(document, "devices", path)
     nodes = tuple(_read_node(entry, devices, path) for entry in document.get("nodes", ()))
     _check_complete(nodes, path)
-    return Network(
+    network = Network(
         name=str(document.get("name", path.stem)),
         path=path,
         bit_rate=bus["bit_rate"].value,
@@ -59,6 +59,12 @@ def load_network(path: Path = DEFAULT_NETWORK) -> Network:
         times={name: quantity.value for name, quantity in times.items()},
         nodes=nodes,
     )
+    if network.worst_bus_load > 1.0:
+        raise DataFileError(
+            f"{path}: the PDOs of a cycle need up to {network.worst_bus_load:.0%} of the bus.",
+            "Map fewer objects, make the cycle longer, or raise the bit rate.",
+        )
+    return network
 
 
 def _check_complete(nodes: Sequence[Node], path: Path) -> None:

@@ -144,6 +144,20 @@ def test_nodes_are_left_without_faults_when_the_master_has_gone(bench, network, 
     assert emergencies == []
 
 
+def test_a_master_can_pause_for_long_and_go_on(bench, network, flywheels) -> None:
+    master = enabled(bench, network)
+    drive(master, 50, torque=0.2)
+    before = master.exchange((0.0,) * 4)
+    master.shut_down()
+    bench.clock.wait_until(bench.clock.now() + 30.0)
+    master.boot()
+    master.enable()
+    after = master.exchange((0.0,) * 4)
+    assert after.time - before.time == pytest.approx(30.0, abs=0.5)
+    assert after.wheel_angles[0] > before.wheel_angles[0]
+    assert master.overruns == 0
+
+
 def test_an_error_in_the_program_stops_the_drives(bench, network, flywheels) -> None:
     master = enabled(bench, network)
     drive(master, 1, torque=1.0)

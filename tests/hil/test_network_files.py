@@ -86,6 +86,15 @@ def test_a_pdo_of_more_than_eight_bytes_is_refused(rewritten_network) -> None:
         )
 
 
+def test_the_default_cycle_takes_sixty_per_cent_of_the_bus_at_worst() -> None:
+    assert load_network().worst_bus_load == pytest.approx(0.6, abs=0.03)
+
+
+def test_a_cycle_that_cannot_fit_on_the_bus_is_refused(rewritten_network) -> None:
+    with pytest.raises(DataFileError, match="116% of the bus"):
+        rewritten_network(("bit_rate = { value = 1e6", "bit_rate = { value = 5e5"))
+
+
 EDS_FILES = sorted(DEFAULT_NETWORK.parent.glob("*.eds"))
 
 
