@@ -10,7 +10,7 @@ from typing import Final
 
 from ident.errors import DataFileError
 from ident.vehicle.geometry import Geometry, read_geometry
-from ident.vehicle.parameters import Parameters, read_parameters
+from ident.vehicle.parameters import PARAMETER_UNITS, Parameters, read_parameters
 from ident.vehicle.quantities import read_quantities, read_toml, require_table
 
 LIMIT_UNITS: Final = {
@@ -79,12 +79,25 @@ def load_vehicle(name_or_path: str | Path = "prototype") -> VehicleDescription:
     quantities = read_quantities(require_table(document, "limits", path), LIMIT_UNITS, f"{path}: limits")
     limits = Limits(**{name: quantity.value for name, quantity in quantities.items()})
     _check_limits(limits, path)
+    prior = read_parameters(path, "prior")
+    _check_prior(prior, path)
     return VehicleDescription(
         name=str(document.get("name", path.stem)),
         geometry=read_geometry(require_table(document, "geometry", path), path),
-        prior=read_parameters(path, "prior"),
+        prior=prior,
         limits=limits,
     )
+
+
+def _check_prior(prior: Parameters, path: Path) -> None:
+    """Mass and inertias must be positive, friction may be zero: the excitation is planned with them."""
+    for name, unit in PARAMETER_UNITS.items():
+        inertial = unit.startswith("kg")
+        if prior[name] < 0 or (inertial and prior[name] == 0):
+            raise DataFileError(
+                f"{path}: prior.{name} = {prior[name]} cannot be.",
+                "It must be positive." if inertial else "It must not be negative.",
+            )
 
 
 def _check_limits(limits: Limits, path: Path) -> None:

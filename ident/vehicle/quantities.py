@@ -72,6 +72,12 @@ def _read_quantity(table: Mapping[str, Any], name: str, unit: str, where: str) -
     if entry["unit"] != unit:
         raise DataFileError(f"{where}.{name} is given in {entry['unit']!r}.", f"Give it in {unit!r}.")
     value, std = entry["value"], entry.get("std", 0.0)
-    if not all(isinstance(number, int | float) and math.isfinite(number) for number in (value, std)):
+    if not (_is_finite_number(value) and _is_finite_number(std)):
         raise DataFileError(f"{where}.{name} is not a finite number.", f"Write {example}.")
+    if std < 0:
+        raise DataFileError(f"{where}.{name} has a negative std.", f"Write {example}.")
     return Quantity(float(value), unit, str(entry["source"]), float(std))
+
+
+def _is_finite_number(number: object) -> bool:
+    return isinstance(number, int | float) and not isinstance(number, bool) and math.isfinite(number)

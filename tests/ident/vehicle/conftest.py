@@ -38,7 +38,7 @@ def wheel_pose(q: Array, wheel: int, geometry: Geometry) -> tuple[Array, Array]:
 
 def contact_velocity(q: Array, rates: Array, wheel: int, geometry: Geometry) -> Array:
     """World velocity of the wheel's material point on the floor: v + omega x (0, 0, -r), by central differences."""
-    centre, orientation = wheel_pose(q, wheel, geometry)
+    _, orientation = wheel_pose(q, wheel, geometry)
     ahead, turned = wheel_pose(q + STEP * rates, wheel, geometry)
     behind, turned_back = wheel_pose(q - STEP * rates, wheel, geometry)
     velocity = (ahead - behind) / (2 * STEP)
