@@ -7,6 +7,7 @@ encoders: the wheels would resolve them better, but only as long as they roll.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,10 @@ import numpy as np
 from ident.campaign.loops import STEERING_RATE_CYCLES, LoopDesign
 from ident.campaign.reference import STEERING_LOOPS, Reference
 from ident.errors import CampaignError
+
+LEAK_TIME = 0.1
+"""Time in which an integrator gives up its torque once its coordinate stands inside the dead band [s]: friction
+then holds it, far from the edge at which a disturbance would move it on."""
 
 REST = 1e-9
 """Reference speed that counts as standstill."""
@@ -55,6 +60,7 @@ class _Loop:
         self.limits = limits
         moves = bool(np.any(np.abs(track.velocity) > REST))
         self.dead_band = limits.dead_band if moves else limits.holding_band
+        self.leak = math.exp(-reference.sample_time / LEAK_TIME)
         self.travel = 0.0
         self.integral = 0.0
         self.past: list[float] = []
@@ -71,6 +77,8 @@ class _Loop:
         if abs(wanted) > REST or abs(error) > self.dead_band:
             bound = self.limits.integral
             self.integral = min(max(self.integral + integral_gain * velocity_error, -bound), bound)
+        else:
+            self.integral *= self.leak
         return velocity_gain * velocity_error + self.integral
 
     def _measured(

@@ -18,20 +18,20 @@ from scipy import optimize
 
 from ident.campaign.axis import Axis
 
-VELOCITY_MARGIN = math.radians(65)
+VELOCITY_MARGIN = math.radians(55)
 """Phase margin that the velocity loop is designed for."""
 
 SLIPPING_MARGIN = math.radians(30)
 """Phase margin that the velocity loop keeps when the wheels lose their grip."""
 
-POSITION_RATIO = 5.0
+POSITION_RATIO = 3.5
 """Crossover of the velocity loop over that of the position loop."""
 
-RESET_RATIO = 5.0
+RESET_RATIO = 4.0
 """Crossover of the velocity loop over the corner of its integrator."""
 
-HOLD_CYCLES = 1.5
-"""Dead time of latching a torque at the next SYNC and holding it for a cycle."""
+HOLD_CYCLES = 2.0
+"""Dead time of latching a torque at the next SYNC, moving to it over a cycle (the drives interpolate), holding it."""
 
 STEERING_RATE_CYCLES = 3
 """Cycles over which a steering rate is taken: at 17 bit one cycle resolves only 0.024 rad/s."""

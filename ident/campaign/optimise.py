@@ -27,7 +27,7 @@ TORQUE_RESERVE = 0.7
 ADHESION_RESERVE = 0.5
 """Share of the adhesion that a planned motion may use."""
 
-INFORMATION_WEIGHT = 0.15
+INFORMATION_WEIGHT = 0.3
 """Weight of the information content beside the condition number: a well-shaped whisper is no excitation."""
 
 MASK_STEEPNESS = 2.0

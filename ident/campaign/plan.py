@@ -136,7 +136,7 @@ def make_plan(
     Raises:
         CampaignError: there is no step, or the steps need more floor than the vehicle file allows.
     """
-    excitations = {}
+    excitations: dict[Step, Excitation] = {}
     for step in ORDER:
         if step in steps and step in EXCITATIONS:
             excitations[step] = _excitation(step, vehicle, processing or Processing(), generator)
