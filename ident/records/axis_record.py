@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import enum
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -209,7 +210,7 @@ def _read_emps(path: Path) -> Channels:
         raise RecordError(f"{path} does not exist.", "Name an existing record.")
     try:
         content = io.loadmat(path)
-    except (ValueError, NotImplementedError, OSError, TypeError) as error:
+    except (io.matlab.MatReadError, zlib.error, ValueError, NotImplementedError, OSError, TypeError) as error:
         raise RecordError(
             f"{path} is not a readable MATLAB file: {error}.", "Save it with '-v7', or write CSV, Parquet or MF4."
         ) from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import importlib
+import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -148,7 +149,7 @@ def _read_mf4(path: Path) -> Channels:
     try:
         with MDF(path) as mdf:
             signals = list(mdf.iter_channels(skip_master=True))
-    except (MdfException, OSError, ValueError) as error:
+    except (MdfException, OSError, ValueError, struct.error) as error:
         raise RecordError(f"{path} is not a readable MF4 file: {error}.", "Record again.") from error
     if not signals:
         raise RecordError(f"{path} holds no channels.", "Record again.")

@@ -1,0 +1,151 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import io
+
+from ident.errors import RecordError
+from ident.records.axis_record import (
+    AxisKind,
+    AxisRecord,
+    AxisSignals,
+    axis_record_from_channels,
+    read_axis_record,
+    write_axis_record,
+)
+from ident.records.channels import Channels
+
+SAMPLES = 40
+
+
+def two_axes() -> AxisRecord:
+    generator = np.random.default_rng(0)
+    axes = tuple(
+        AxisSignals(name, kind, *generator.normal(size=(2, SAMPLES)))
+        for name, kind in (("1", AxisKind.LINEAR), ("2", AxisKind.ROTARY))
+    )
+    time = 1.0 + 0.001 * np.arange(SAMPLES)
+    return AxisRecord(axes, 0.001, time, np.repeat([-1, 0, 1, -1], SAMPLES // 4))
+
+
+def single(**changes: NDArray) -> dict[str, NDArray]:
+    time = 0.001 * np.arange(SAMPLES)
+    return {"time": time, "position": np.sin(time), "effort": np.cos(time), **changes}
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mf4"])
+def test_two_axes_come_back_from_a_file_to_the_last_bit(tmp_path: Path, suffix: str) -> None:
+    record = two_axes()
+    write_axis_record(record, tmp_path / f"axes{suffix}")
+    found = read_axis_record(tmp_path / f"axes{suffix}")
+    assert [axis.name for axis in found.axes] == ["1", "2"]
+    np.testing.assert_array_equal(found.time, record.time)
+    np.testing.assert_array_equal(found.period, record.period)
+    assert found.sample_time == pytest.approx(0.001)
+    for one, other in zip(record.axes, found.axes, strict=True):
+        np.testing.assert_array_equal(one.position, other.position)
+        np.testing.assert_array_equal(one.effort, other.effort)
+        if suffix != ".csv":
+            assert one.kind is other.kind
+
+
+def test_a_csv_file_states_no_units_and_is_what_the_reader_says(tmp_path: Path) -> None:
+    write_axis_record(two_axes(), tmp_path / "axes.csv")
+    for kind in AxisKind:
+        assert {axis.kind for axis in read_axis_record(tmp_path / "axes.csv", kind).axes} == {kind}
+
+
+def test_a_single_axis_has_no_name_and_need_not_be_named() -> None:
+    record = axis_record_from_channels(Channels(single()), "record")
+    assert record.axis() is record.axis("") is record.axes[0]
+    assert set(record.period.tolist()) == {-1}
+
+
+def test_of_several_axes_one_must_be_named() -> None:
+    record = two_axes()
+    assert record.axis("2") is record.axes[1]
+    for name in (None, "3"):
+        with pytest.raises(RecordError) as caught:
+            record.axis(name)
+        assert "'1', '2'" in caught.value.remedy
+
+
+def with_value(values: NDArray, index: int, value: float) -> NDArray:
+    changed = values.copy()
+    changed[index] = value
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("values", "units", "named"),
+    [
+        ({"time": single()["time"]}, {}, "position, effort"),
+        ({"position": np.zeros(40), "effort": np.zeros(40)}, {}, "time"),
+        ({**single(), "position_2": np.zeros(40)}, {}, "effort_2"),
+        (single(effort=np.zeros(39)), {}, "different lengths"),
+        (single(effort=with_value(np.ones(40), 3, np.nan)), {}, "channel effort has 1 samples"),
+        (single(position=with_value(np.ones(40), 7, np.inf)), {}, "channel position has 1 samples"),
+        (single(time=with_value(single()["time"], 20, 0.0205)), {}, "not uniform"),
+        (single(period=with_value(np.zeros(40), 20, 0.5)), {}, "channel period"),
+        ({name: values[:9] for name, values in single().items()}, {}, "9 samples"),
+        (single(), {"position": "mm", "effort": "N"}, "'mm'"),
+        (single(), {"position": "m", "effort": "Nm"}, "'m' and 'Nm'"),
+        (single(), {"time": "ms"}, "'ms'"),
+    ],
+)
+def test_a_broken_contract_is_named(values: Mapping[str, NDArray], units: Mapping[str, str], named: str) -> None:
+    with pytest.raises(RecordError) as caught:
+        axis_record_from_channels(Channels(values, units), "run.csv")
+    assert caught.value.what.startswith("run.csv")
+    assert named in caught.value.what
+    assert caught.value.remedy
+
+
+def test_a_unit_left_out_follows_from_the_other() -> None:
+    record = axis_record_from_channels(Channels(single(), {"effort": "Nm"}), "record")
+    assert record.axes[0].kind is AxisKind.ROTARY
+
+
+def emps_like(**changes: NDArray | float) -> dict[str, NDArray | float]:
+    time = (0.001 * np.arange(SAMPLES))[:, None]
+    return {"t": time, "qm": np.sin(time), "qg": np.sin(time), "vir": np.cos(time), "gtau": 35.0, **changes}
+
+
+def test_the_matlab_file_of_the_benchmark_gives_force_by_voltage(tmp_path: Path) -> None:
+    content = emps_like()
+    io.savemat(tmp_path / "emps.mat", content)
+    record = read_axis_record(tmp_path / "emps.mat")
+    time = 0.001 * np.arange(SAMPLES)
+    np.testing.assert_allclose(record.axes[0].effort, 35.0 * np.cos(time))
+    np.testing.assert_allclose(record.axes[0].position, np.sin(time))
+    assert record.axes[0].kind is AxisKind.LINEAR
+
+
+def test_another_matlab_file_is_refused_with_what_it_lacks(tmp_path: Path) -> None:
+    content = emps_like()
+    del content["gtau"]
+    io.savemat(tmp_path / "other.mat", content)
+    with pytest.raises(RecordError, match="lacks the variable gtau"):
+        read_axis_record(tmp_path / "other.mat")
+
+
+@pytest.mark.parametrize("content", [b"", b"MATLAB 7.3 MAT-file", bytes(range(256)) * 4])
+def test_what_is_no_matlab_file_is_refused(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "broken.mat").write_bytes(content)
+    with pytest.raises(RecordError, match=r"broken\.mat"):
+        read_axis_record(tmp_path / "broken.mat")
+
+
+@pytest.mark.parametrize("name", ["none.mat", "none.csv"])
+def test_a_missing_file_is_named(tmp_path: Path, name: str) -> None:
+    with pytest.raises(RecordError, match="does not exist"):
+        read_axis_record(tmp_path / name)
+
+
+def test_an_unknown_ending_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match=r"\.txt"):
+        read_axis_record(tmp_path / "axes.txt")
