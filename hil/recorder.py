@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
@@ -73,14 +73,20 @@ class Recorder:
         self.frames = 0
 
     def __call__(self, message: can.Message) -> None:
-        """Write a frame."""
-        if self._writer is None:
-            self._open(INTERLUDE)
-        assert self._writer is not None
-        self._writer.on_message_received(message)
+        """Write a frame.
+
+        Raises:
+            RecordError: the disk is full or gone.
+        """
+        writer = self._writer or self._open(INTERLUDE)
+        try:
+            writer.on_message_received(message)
+            if message.timestamp > self._next_flush:
+                writer.file.flush()
+                self._next_flush = message.timestamp + _FLUSH_PERIOD
+        except OSError as error:
+            raise _unwritable(self._path, error) from error
         self.frames += 1
-        if message.timestamp > self._next_flush:
-            self._flush(message.timestamp)
 
     @contextmanager
     def step(self, name: str) -> Iterator[Path]:
@@ -94,7 +100,9 @@ class Recorder:
         try:
             yield final
         except BaseException:
-            self._stop()
+            # The error that is on its way out is the one to report.
+            with suppress(RecordError):
+                self._stop()
             raise
         self.close()
 
@@ -105,28 +113,28 @@ class Recorder:
             self._stop()
             partial.rename(final)
 
-    def _open(self, name: str) -> None:
+    def _open(self, name: str) -> _Writer:
         self._name = name
         self._path = self._directory / f"{self._number:03d}_{name}{PARTIAL}{self._format}"
         try:
-            self._writer = _make_writer(self._path, self._format)
+            self._writer = writer = _make_writer(self._path, self._format)
         except OSError as error:
             raise _unwritable(self._path, error) from error
         self._next_flush = float("-inf")
+        return writer
 
     def _final_path(self) -> Path:
         return self._directory / f"{self._number:03d}_{self._name}{self._format}"
 
     def _stop(self) -> None:
-        if self._writer is not None:
-            self._writer.stop()
-            self._writer = None
-            self._number += 1
-
-    def _flush(self, now: float) -> None:
-        assert self._writer is not None
-        self._writer.file.flush()
-        self._next_flush = now + _FLUSH_PERIOD
+        writer, self._writer = self._writer, None
+        if writer is None:
+            return
+        self._number += 1
+        try:
+            writer.stop()
+        except OSError as error:
+            raise _unwritable(self._path, error) from error
 
 
 def finished_steps(directory: Path) -> list[tuple[str, Path]]:

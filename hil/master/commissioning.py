@@ -36,6 +36,8 @@ def await_boot_up(link: Link, nodes: Iterable[Node], timeout: float) -> None:
         if bytes(data) == b"\x00":
             waiting.pop(can_id - 0x700, None)
 
+    # What has been waiting in the interface may hold the boot-up message of an earlier start.
+    link.drain()
     heartbeats = [0x700 + node_id for node_id in waiting]
     for can_id in heartbeats:
         link.subscribe(can_id, booted)

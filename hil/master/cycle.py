@@ -19,7 +19,7 @@ from hil.master.codec import (
     CycleLayout,
 )
 from hil.master.errors import ConfigurationError, NodeLostError
-from hil.master.link import Link
+from hil.master.link import Link, is_data_frame
 from hil.network import Network
 
 Fields = tuple[int, ...]
@@ -128,7 +128,7 @@ class Cycle:
             message = receive(timeout) if timeout > 0.0 else None
             if message is None:
                 raise self._lost(frames)
-            slot = slots.get(message.arbitration_id)
+            slot = slots.get(message.arbitration_id) if is_data_frame(message) else None
             if slot is None or frames[slot] is not None:
                 self._link.dispatch(message)
                 timeout = deadline - self._clock.now()

@@ -14,6 +14,11 @@ Tap = Callable[[can.Message], None]
 """Sees every frame, sent (`is_rx` False) and received, with its time stamp."""
 
 
+def is_data_frame(message: can.Message) -> bool:
+    """A data frame with an 11-bit identifier: the only kind that CANopen uses here."""
+    return not (message.is_extended_id or message.is_error_frame or message.is_remote_frame)
+
+
 class Link(canopen.Network):
     """A canopen network without a receiving thread: frames are taken from the bus when the master waits for them.
 
@@ -63,7 +68,7 @@ class Link(canopen.Network):
 
     def dispatch(self, message: can.Message) -> None:
         """Hand a frame to whoever subscribed to its identifier."""
-        if not (message.is_error_frame or message.is_remote_frame or message.is_extended_id):
+        if is_data_frame(message):
             self.notify(message.arbitration_id, message.data, message.timestamp)
 
     def pump(self, duration: float, done: Callable[[], bool] = lambda: False) -> bool:

@@ -286,7 +286,7 @@ def test_a_node_that_falls_silent_is_named_within_the_time_out(bench, network, f
     start = bench.clock.now()
     with pytest.raises(NodeLostError, match=r"node 6 \(encoder_right\)"):
         master.exchange(STILL)
-    assert bench.clock.now() - start < 0.1
+    assert bench.clock.now() - start == pytest.approx(network.times["sample_timeout"], abs=0.003)
 
 
 def test_a_node_that_somebody_stopped_is_noticed_by_its_heartbeat_or_its_silence(bench, network) -> None:

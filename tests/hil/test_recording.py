@@ -121,6 +121,28 @@ def test_two_hundred_seconds_decode_in_a_few(tmp_path: Path, network: Network) -
     assert (time.process_time() - start) * 100_000 / 2000 < 10.0
 
 
+def test_the_same_run_writes_the_same_file_bit_for_bit(tmp_path: Path, network: Network) -> None:
+    paths = [record(tmp_path / name, network.path, LogFormat.BLF, cycles=100)[0] for name in ("one", "two")]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_a_directory_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(RecordError, match="file"):
+        Recorder(tmp_path / "file")
+
+
+def test_a_full_disk_is_an_error_with_a_remedy(tmp_path: Path) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    (tmp_path / "000_straight.part.log").symlink_to("/dev/full")
+    recorder = Recorder(tmp_path, LogFormat.CANDUMP)
+    recorder._number = 0
+    frame = can.Message(arbitration_id=0x80, is_extended_id=False)
+    with pytest.raises(RecordError, match="No space left"), recorder.step("straight"):
+        recorder(frame)
+
+
 def test_steps_are_numbered_and_what_lies_between_them_is_kept(tmp_path: Path, network: Network) -> None:
     record(tmp_path, network.path, LogFormat.BLF, cycles=5)
     record(tmp_path, network.path, LogFormat.BLF, cycles=5)

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 
+import can
 import pytest
 
+from emulator.firmware.flywheels import Flywheels
 from hil.buses import open_bus
 from hil.clock import FreeRunningClock, WallClock
 from hil.master import Master
 from hil.network import Network
+from hil.serving import VehicleServer
 from ident.errors import BusError
 
 SERVER = """
@@ -45,12 +50,42 @@ def emulator(path: Path, pacing: str) -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
+PATIENCE = [
+    ("sample_timeout = { value = 0.1,", "sample_timeout = { value = 5.0,"),
+    ("heartbeat_timeout = { value = 0.25,", "heartbeat_timeout = { value = 5.0,"),
+    ("heartbeat_period = { value = 0.1,", "heartbeat_period = { value = 2.0,"),
+]
+"""A computer that runs other things besides must not fail these tests."""
+
+
+def test_the_same_master_works_over_a_bus_of_python_can(rewritten_network) -> None:
+    """Two endpoints of `virtual` in two threads stand for any interface that python-can knows."""
+    done = threading.Event()
+    network = rewritten_network(*PATIENCE)
+    served = can.Bus("vehicle", interface="virtual")
+    server = VehicleServer(Flywheels(), served, WallClock())
+    thread = threading.Thread(target=server.serve, args=(done.is_set,))
+    thread.start()
+    try:
+        with open_bus("virtual:vehicle") as bus, Master(bus, WallClock(), network) as master:
+            master.boot()
+            master.enable()
+            angles = [master.exchange((0.2,) * 4).wheel_angles[0] for _ in range(100)]
+    finally:
+        done.set()
+        thread.join()
+        served.shutdown()
+    assert all(after > before for before, after in pairwise(angles[5:]))
+    assert server.report.syncs > 100
+
+
 def drive_for_ever(master: Master) -> None:
     while True:
         master.exchange((0.0,) * 4)
 
 
-def test_in_lockstep_simulated_seconds_pass_faster_than_real_ones(tmp_path: Path, network: Network) -> None:
+def test_in_lockstep_simulated_seconds_pass_faster_than_real_ones(tmp_path: Path, rewritten_network) -> None:
+    network = rewritten_network(*PATIENCE)
     with (
         emulator(tmp_path / "bus", "lockstep"),
         open_bus(f"unix:{tmp_path / 'bus'}") as bus,
@@ -70,7 +105,8 @@ def test_in_lockstep_simulated_seconds_pass_faster_than_real_ones(tmp_path: Path
     assert sample.wheel_angles[0] - first.wheel_angles[0] == pytest.approx(expected, rel=1e-4)
 
 
-def test_in_real_time_a_simulated_second_takes_a_second(tmp_path: Path, network: Network) -> None:
+def test_in_real_time_a_simulated_second_takes_a_second(tmp_path: Path, rewritten_network) -> None:
+    network = rewritten_network(*PATIENCE)
     with (
         emulator(tmp_path / "bus", "realtime"),
         open_bus(f"unix:{tmp_path / 'bus'}") as bus,
@@ -82,8 +118,9 @@ def test_in_real_time_a_simulated_second_takes_a_second(tmp_path: Path, network:
         for _ in range(500):
             sample = master.exchange((0.1,) * 4)
         real = time.perf_counter() - start
-    assert real == pytest.approx(1.0, rel=0.2)
-    torque, t = round(100 / 1.27) * 1.27e-3, real
+    assert real > 0.99
+    torque, t = round(100 / 1.27) * 1.27e-3, sample.time - first.time
+    assert t == pytest.approx(real, rel=0.1)
     expected = torque / 1e-3 * (t - (1 - 2.718281828459045 ** (-t)) / 1.0) / 20
     assert sample.wheel_angles[0] - first.wheel_angles[0] == pytest.approx(expected, rel=0.1)
 
