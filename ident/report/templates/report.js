@@ -32,7 +32,16 @@
   const keys = Object.keys(figures);
   keys.forEach(draw);
 
-  const resize = () => keys.forEach((key) => Plotly.Plots.resize(document.getElementById(key)));
-  window.addEventListener("beforeprint", resize);
-  window.addEventListener("afterprint", resize);
+  // Paper has its own columns; the browser lays them out only after this event, so they are asked for here.
+  const fit = (width) => keys.map((key) => document.getElementById(key)).forEach((plot) => {
+    Plotly.relayout(plot, { width: width(plot), autosize: true });
+  });
+  window.addEventListener("beforeprint", () => {
+    document.documentElement.classList.add("paper");
+    fit((plot) => plot.parentElement.clientWidth);
+  });
+  window.addEventListener("afterprint", () => {
+    document.documentElement.classList.remove("paper");
+    fit(() => null);
+  });
 })();

@@ -1,0 +1,133 @@
+"""Digits, rows and Table 2."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ident.estimate.identify import Identification
+from ident.records.record import Record
+from ident.report.digits import MISSING, digits, percent, significant, unit_text, with_std
+from ident.report.paper import load_paper_result
+from ident.report.rows import Role, parameter_rows, role_of, step_rows
+from ident.report.summary import summarise
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+
+
+@given(st.floats(-1e4, 1e4), st.floats(1e-6, 1e3))
+def test_a_value_is_rounded_by_less_than_a_tenth_of_its_std(value: float, std: float) -> None:
+    assert abs(float(digits(value, std)) - value) <= 0.5000001 * max(0.1 * std, 0 if std < 10 else 1)
+
+
+@given(st.floats(1e-6, 9.0))
+def test_a_std_keeps_two_significant_digits(std: float) -> None:
+    assert float(digits(std, std)) == pytest.approx(std, rel=0.051)
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "text"),
+    [
+        (842.0684, 0.9934, "842.07 ± 0.99"),
+        (0.3342, 0.0685, "0.334 ± 0.069"),
+        (286.5955, 1.1835, "286.6 ± 1.2"),
+        (3.9656, 0.0125, "3.966 ± 0.013"),
+        (812.4, 123.0, "812 ± 123"),
+        (0.121, 0.0, "0.121"),
+    ],
+)
+def test_table_2_is_written_to_the_digits_its_stds_support(value: float, std: float, text: str) -> None:
+    assert with_std(value, std) == text
+
+
+def test_what_is_no_number_is_a_dash() -> None:
+    assert digits(math.nan, 1.0) == percent(math.nan) == significant(math.inf) == MISSING
+
+
+def test_percentages_and_units_read_naturally() -> None:
+    assert [percent(0.00094), percent(0.031), percent(0.63), percent(-0.011, signed=True)] == [
+        "0.09 %",
+        "3.1 %",
+        "63 %",
+        "-1.1 %",
+    ]
+    assert [significant(573.85), significant(2.206), significant(0.0301), significant(0.0)] == [
+        "574",
+        "2.21",
+        "0.0301",
+        "0",
+    ]
+    assert unit_text("kg m^2") == "kg m²"
+
+
+def test_the_shipped_table_2_is_that_of_the_paper() -> None:
+    paper = load_paper_result()
+    assert paper.condition == 11.56
+    assert paper.parameters["m_ch"] == 842.0684
+    assert paper.parameters.std_of("d_cw") == 0.0125
+    assert paper.parameters["B_w"] == 0.121
+    assert paper.parameters.std_of("B_w") == 0.0
+
+
+def test_a_row_says_how_far_the_truth_is_in_percent_and_in_std(
+    identification: Identification, truth: Parameters
+) -> None:
+    for row in parameter_rows(identification, truth):
+        estimate = row.estimate
+        assert row.error is not None
+        assert row.error_in_std is not None
+        assert row.error * truth[estimate.name] == pytest.approx(estimate.value - truth[estimate.name], abs=1e-9)
+        assert row.error_in_std * estimate.std == pytest.approx(estimate.value - truth[estimate.name], abs=1e-9)
+        assert row.covered == (estimate.ci95[0] <= truth[estimate.name] <= estimate.ci95[1])
+        assert 0.0 <= row.inertia_share <= 1.0
+
+
+def test_without_truth_or_paper_a_row_claims_no_error(identification: Identification) -> None:
+    row = parameter_rows(identification)[0]
+    assert (row.truth, row.error, row.error_in_std, row.covered, row.paper) == (None,) * 5
+
+
+def test_lifted_wheels_give_b_w_only_when_it_was_not_given(identification: Identification) -> None:
+    assert role_of("wheel_lifted", identification) is Role.INERTIA
+    given_inertia = replace(identification["B_w"], method="data sheet")
+    given = replace(identification, estimates=(*identification.estimates[:-1], given_inertia))
+    assert role_of("wheel_lifted", given) is Role.SHOWN
+    assert [row.role for row in step_rows(identification)] == [Role.INERTIA] * 4 + [Role.FIT] * 4 + [
+        Role.VALIDATION
+    ] * 2
+
+
+def test_a_poor_parameter_and_a_missed_lane_change_are_said_in_words(
+    identification: Identification, record: Record
+) -> None:
+    index = PARAMETER_NAMES.index("C_l")
+    estimates = list(identification.estimates)
+    estimates[index] = replace(estimates[index], ci95=(0.0, 2 * estimates[index].value))
+    floors = [
+        replace(floor, residual=0.2 * floor.signal) if floor.step == "lane_change" else floor
+        for floor in identification.floors
+    ]
+    floors[4] = replace(floors[4], noise=0.1, model_error=0.3)
+    worse = replace(identification, estimates=tuple(estimates), floors=tuple(floors))
+    summary = summarise("prototype", worse, record, parameter_rows(worse), step_rows(worse))
+    assert [warning.split()[:2] for warning in summary.warnings] == [
+        ["C_l", "is"],
+        ["In", "steering_left,"],
+        ["The", "steering"],
+        ["The", "drive"],
+    ]
+    assert "20 % NRMSE" in summary.warnings[-1]
+
+
+def test_a_good_result_carries_no_warning(identification: Identification, record: Record, truth: Parameters) -> None:
+    rows = parameter_rows(identification, truth)
+    quiet = [replace(floor, model_error=0.0) for floor in identification.floors]
+    steps = step_rows(replace(identification, floors=tuple(quiet)))
+    summary = summarise("prototype", identification, record, rows, steps)
+    assert summary.warnings == ()
+    assert "wheels in the air" in summary.sentences[1]
+    covered = sum(row.covered is True for row in rows)
+    assert any(f"{covered} of 11 intervals hold it" in sentence for sentence in summary.sentences)
