@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
-from functools import partial
+from functools import lru_cache, partial
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import canopen
 from canopen.objectdictionary import ODArray, ODRecord, ODVariable
+from canopen.objectdictionary.eds import import_eds
 from durand.datatypes import DatatypeEnum
 from durand.object_dictionary import ObjectDictionary, Record, Variable
 from durand.services.sdo.server import SDODomainAbort
@@ -53,6 +55,13 @@ _ACCESS = {"rww": "rw", "rwr": "rw"}
 """CiA 306 access types with a PDO direction in them -> what SDO may do."""
 
 
+@lru_cache(maxsize=64)
+def _parse(content: str, node_id: int) -> canopen.ObjectDictionary:
+    # Parsing takes longer than everything else at the start of a node, and the result is only read.
+    parsed: canopen.ObjectDictionary = import_eds(StringIO(content), node_id)  # type: ignore[no-untyped-call]
+    return parsed
+
+
 class _EdsRecord(Record):  # type: ignore[misc]  # durand carries no types
     """A record or array whose sub-index 0 is an entry of the EDS like any other (writable in PDO mappings)."""
 
@@ -84,7 +93,7 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
         super().__init__()
         self.mappable: set[tuple[int, int]] = set()
         self._pdo_writers: dict[tuple[int, int], Callable[[int], None]] = {}
-        for item in canopen.import_od(str(eds), node_id=node_id).values():
+        for item in _parse(eds.read_text(encoding="utf-8"), node_id).values():
             # Indices below 20h are the dummy types of the EDS, not objects of the device.
             if item.index >= 0x20:
                 self[item.index] = self._convert(item)

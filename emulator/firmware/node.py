@@ -140,6 +140,7 @@ class Node:
 
     def _initialise(self, application: bool) -> None:
         self.object_dictionary.restore(0x1000, 0xFFFF if application else 0x1FFF)
+        self.sdo_server.reset()
         for pdo in (*self.rpdos, *self.tpdos):
             pdo.load()
         self.producer.reset()

@@ -47,3 +47,8 @@ class SdoServer(SDOServer):  # type: ignore[misc]  # durand carries no types
         self.upload_manager = _BlockUpload(self)
         self._handle_cs_dict[2] = self._handle_cs_dict[5] = self.upload_manager.init_upload
         self._handle_cs_dict[3] = self.upload_manager.upload_segment
+
+    def reset(self) -> None:
+        """Forget any transfer in progress, as a reset of the node does."""
+        self.download_manager._abort()
+        self.upload_manager._abort()

@@ -7,7 +7,7 @@ from pathlib import Path
 import can
 from can.interfaces import BACKENDS
 
-from hil.buses.unix import UnixBus
+from hil.buses.unix import UnixBus, UnixHub
 from ident.errors import BusError
 
 _OURS = "unix"
@@ -35,6 +35,25 @@ def open_bus(name: str, bit_rate: float = 1e6) -> can.BusABC:
         return can.Bus(interface=interface, channel=channel, bitrate=round(bit_rate), ignore_config=True)
     except (can.CanError, OSError, ImportError, ValueError, TypeError, AttributeError) as error:
         raise BusError(f"{name} cannot be opened: {error}.", _remedy(interface)) from error
+
+
+def open_served_bus(name: str, bit_rate: float = 1e6) -> can.BusABC:
+    """Open a bus for the emulated side: the hub of `unix:/path`, a member of any other.
+
+    Args:
+        name: interface and channel.
+        bit_rate: [bit/s], for interfaces that set it.
+
+    Raises:
+        BusError: the bus cannot be opened.
+    """
+    interface, _, channel = name.partition(":")
+    if interface != _OURS or not channel:
+        return open_bus(name, bit_rate)
+    try:
+        return UnixHub(Path(channel))
+    except can.CanError as error:
+        raise BusError(f"{name} cannot be opened: {error}.", "Choose another path.") from error
 
 
 def _open_unix(path: Path) -> can.BusABC:

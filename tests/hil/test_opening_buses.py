@@ -7,7 +7,7 @@ from pathlib import Path
 import can
 import pytest
 
-from hil.buses import UnixHub, open_bus
+from hil.buses import UnixHub, open_bus, open_served_bus
 from ident.errors import BusError
 
 
@@ -43,6 +43,16 @@ def test_what_cannot_be_opened_is_named_with_a_remedy(name: str, named: str) -> 
         open_bus(name)
     assert named in str(caught.value)
     assert caught.value.remedy
+
+
+def test_a_hub_that_cannot_be_opened_is_named_with_a_remedy(tmp_path: Path) -> None:
+    name = f"unix:{tmp_path / 'bus'}"
+    with open_served_bus(name), pytest.raises(BusError, match="another process"):
+        open_served_bus(name)
+    with pytest.raises(BusError, match="/nowhere/bus"):
+        open_served_bus("unix:/nowhere/bus")
+    with pytest.raises(BusError, match="carrier-pigeon"):
+        open_served_bus("carrier-pigeon:0")
 
 
 def test_an_unknown_interface_is_answered_with_the_known_ones() -> None:
