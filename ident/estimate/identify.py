@@ -76,9 +76,9 @@ class Estimate:
 
     @property
     def poor(self) -> bool:
-        """Whether the interval is too wide to build on."""
+        """Whether the interval is too wide to build on, or the value negative, which none of these can be."""
         half_width = (self.ci95[1] - self.ci95[0]) / 2
-        return not half_width < POOR_RELATIVE_HALF_WIDTH * abs(self.value)
+        return not half_width < POOR_RELATIVE_HALF_WIDTH * self.value
 
 
 @dataclass(frozen=True)
