@@ -23,7 +23,7 @@ from ident.report.comparison import Comparison, comparisons, folded
 from ident.report.driven_path import Leg, covered_floor, driven_legs
 from ident.report.excitation import phase_planes
 from ident.report.paper import load_paper_result
-from ident.report.rows import Role, loop_rows, parameter_rows, step_rows
+from ident.report.rows import Role, loop_rows, parameter_rows, step_rows, torque_unit
 from ident.report.summary import summarise
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
@@ -211,7 +211,7 @@ def _folded_panels(content: ReportContent) -> list[_Panel]:
         fold = folded(comparison) if comparison.role is Role.FIT else None
         if fold is None:
             continue
-        unit = "N" if comparison.coordinate in ("x", "y") else "Nm"
+        unit = torque_unit(comparison.coordinate)
         panels.append(
             _Panel(
                 key=f"folded-{index}",

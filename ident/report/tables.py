@@ -66,8 +66,7 @@ def paper_table(identification: Identification, paper: PaperResult | None = None
 def excitation_table(identification: Identification) -> Table:
     """How well each parameter was excited, and what the textbook would have claimed of it.
 
-    Independence 1 is excitation that nothing else imitates. The naive std takes residuals as white and of one size,
-    as the paper does.
+    Independence 1 is excitation that nothing else imitates. The naive std takes residuals as white and of one size.
     """
     headings = ["", "independence", "std", "naive std", "ratio", "from B_w", "verdict", "method"]
     table = _table("Excitation and standard deviations", headings, left=(0, 6, 7))
