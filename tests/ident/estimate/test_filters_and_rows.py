@@ -1,0 +1,124 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ident.estimate.equations import equations_of, motion_of, usable_equations
+from ident.estimate.filters import Processing, differentiate, moving_rows, second_derivative, zero_phase
+from ident.records.record import Record, Step
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.parameters import Parameters
+
+DT = 0.002
+CUTOFF = 40.0
+property_of = settings(max_examples=20, deadline=None, derandomize=True)
+
+
+@property_of
+@given(frequency=st.floats(2.0, 200.0), phase=st.floats(0.0, 6.28))
+def test_a_zero_phase_filter_shrinks_a_sine_and_does_not_shift_it(frequency: float, phase: float) -> None:
+    """Butterworth of order 2, forwards and backwards: gain 1 / (1 + (tan wT/2 / tan w_g T/2)^4), phase 0."""
+    time = DT * np.arange(20000)
+    found = zero_phase(np.sin(frequency * time + phase), CUTOFF, DT)[4000:-4000]
+    inner = time[4000:-4000]
+    basis = np.stack([np.sin(frequency * inner + phase), np.cos(frequency * inner + phase)], axis=1)
+    in_phase, quadrature = np.linalg.lstsq(basis, found, rcond=None)[0]
+    gain = 1 / (1 + (np.tan(frequency * DT / 2) / np.tan(CUTOFF * DT / 2)) ** 4)
+    assert in_phase == pytest.approx(gain, abs=1e-6)
+    assert quadrature == pytest.approx(0.0, abs=1e-6)
+
+
+def test_constants_pass_a_filter_unchanged() -> None:
+    np.testing.assert_allclose(zero_phase(np.full((500, 2), 3.0), CUTOFF, DT), 3.0, rtol=1e-9)
+
+
+def test_a_filter_treats_time_reversal_alike() -> None:
+    values = np.random.default_rng(0).normal(size=3000)
+    there, back = zero_phase(values, CUTOFF, DT), zero_phase(values[::-1], CUTOFF, DT)[::-1]
+    np.testing.assert_allclose(there[800:-800], back[800:-800], atol=1e-9)
+
+
+def test_derivatives_of_a_parabola_are_exact() -> None:
+    time = DT * np.arange(100)
+    values = np.stack([3 * time**2 - time, 5 - time**2], axis=1)
+    rate, curvature = differentiate(values, DT), second_derivative(values, DT)
+    np.testing.assert_allclose(rate[1:-1], np.stack([6 * time - 1, -2 * time], axis=1)[1:-1], atol=1e-9)
+    np.testing.assert_allclose(curvature, np.tile([6.0, -2.0], (100, 1)), atol=1e-7)
+
+
+def test_stiction_and_the_memory_of_the_filter_around_it_are_dropped() -> None:
+    """One joint of two stops for a moment: those samples go, and 0.1 s on either side of them."""
+    processing = Processing(moving=0.05, guard=0.1)
+    rates = np.full((1000, 2), 0.5)
+    rates[:, 1] *= -1
+    rates[400:410, 1] = 0.04
+    found = moving_rows(rates, processing, DT)
+    expected = np.ones(1000, dtype=bool)
+    expected[350:460] = False
+    expected[:50] = expected[-50:] = False  # what came before the record is unknown
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_sign_changes_are_stiction_however_fast() -> None:
+    rates = np.concatenate([np.full(300, 1.0), [0.0], np.full(300, -1.0)])[:, None]
+    found = moving_rows(rates, Processing(), DT)
+    assert not found[250:351].any()
+    assert found[100:240].all()
+
+
+@pytest.fixture(scope="module")
+def record(record_of: Callable[..., Record], vehicle: VehicleDescription, truth: Parameters) -> Record:
+    return record_of(vehicle, truth)
+
+
+def test_filtered_columns_still_balance_the_filtered_torque(
+    record: Record, vehicle: VehicleDescription, truth: Parameters
+) -> None:
+    """A regressor of filtered velocities would not: tanh of a mean is no mean of tanh."""
+    for rows in usable_equations(list(record.segments), vehicle.geometry, Processing()):
+        error = (rows.torque - rows.regressor @ truth.values)[rows.moving]
+        assert np.sqrt(np.mean(error**2)) < 1e-3 * np.sqrt(np.mean(rows.torque[rows.moving] ** 2)), rows.step
+
+
+def test_every_step_gives_the_rows_of_the_coordinate_it_drives(record: Record, vehicle: VehicleDescription) -> None:
+    found = {
+        segment.step: [rows.coordinate for rows in equations_of(segment, vehicle.geometry, Processing())]
+        for segment in record.segments
+    }
+    assert found == {
+        "wheel_lifted": ["beta_fl", "beta_rl", "beta_fr", "beta_rr"],
+        "steering_left": ["alpha_l"],
+        "steering_right": ["alpha_r"],
+        "straight": ["x"],
+        "rotation": ["gamma"],
+        "lateral": ["y"],
+    }
+
+
+def test_a_lane_change_gives_rows_of_force_and_of_steering(record: Record, vehicle: VehicleDescription) -> None:
+    straight = next(record.of(Step.STRAIGHT))
+    rows = equations_of(replace(straight, step="lane_change"), vehicle.geometry, Processing())
+    assert [row.coordinate for row in rows] == ["alpha_v", "x"]
+    assert rows[1].moving.any()
+    assert not rows[0].moving.any(), "steering that stands still is stiction"
+
+
+def test_odometry_of_a_step_is_the_motion_that_was_driven(record: Record, vehicle: VehicleDescription) -> None:
+    """The wheels of mode 4 stand on a circle: yaw is rolling over its radius."""
+    rotation = next(record.of(Step.ROTATION))
+    motion = motion_of(rotation, vehicle.geometry, Processing())
+    geometry = vehicle.geometry
+    circle = np.hypot(geometry.wheelbase, geometry.track_width) / 2 + geometry.wheel_offset
+    rolling = np.gradient(rotation.wheel_angles[:, 2], rotation.sample_time)
+    np.testing.assert_allclose(motion.rates[:, 2], rolling * geometry.wheel_radius / circle, atol=2e-3)
+    np.testing.assert_allclose(motion.rates[:, :2], 0.0, atol=1e-9)
+
+
+def test_steps_that_the_estimator_does_not_know_give_no_rows(record: Record, vehicle: VehicleDescription) -> None:
+    stranger = replace(record.segments[0], step="my own")
+    assert usable_equations([stranger], vehicle.geometry, Processing()) == []
