@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.frames.grid import SyncGrid
 from hil.frames.logs import read_log
 from hil.frames.table import FrameTable
 from hil.network import MappedObject, Network, Node, Pdo, PdoDirection
@@ -32,7 +33,9 @@ class DecodedLog:
         motor_torques: (N, 4) motor torques measured at each SYNC [Nm].
         wheel_angles: (N, 4) rolling angles, unwrapped [rad].
         steering_angles: (N, 2) steering angles alpha_l, alpha_r, unwrapped [rad].
-        jitter: largest distance of a SYNC's stamp from the grid [s].
+        jitter: largest deviation of the time between two SYNCs from the cycle period, left-out cycles aside [s].
+        missing: cycles that the master left out.
+        resampled: the SYNCs were not on the grid, so the rows are interpolated linearly between them by their stamps.
         start: stamp of the first SYNC in the log [s].
     """
 
@@ -42,21 +45,25 @@ class DecodedLog:
     wheel_angles: FloatArray
     steering_angles: FloatArray
     jitter: float
+    missing: int
+    resampled: bool
     start: float
 
 
-def decode_log(path: Path, network: Network, accept_truncated: bool = False) -> DecodedLog:
+def decode_log(path: Path, network: Network, accept_truncated: bool = False, longest_gap: int = 5) -> DecodedLog:
     """Decode a recorded step.
 
     Args:
         path: BLF, ASC, candump or MF4 log.
         network: the network file of the vehicle that it was recorded on.
         accept_truncated: use what there is of a log whose writer was killed.
+        longest_gap: cycles in a row that a master short of time may have left out; they are interpolated.
 
     Raises:
-        RecordError: the log cannot be read, a node is not in it, frames have other lengths, or cycles are missing.
+        RecordError: the log cannot be read, a node is not in it, frames have other lengths, a sample is missing, or
+            more cycles in a row than `longest_gap`.
     """
-    return _Decoder(read_log(path, accept_truncated), network, path, accept_truncated).decode()
+    return _Decoder(read_log(path, accept_truncated), network, path, accept_truncated).decode(longest_gap)
 
 
 class _Decoder:
@@ -73,18 +80,24 @@ class _Decoder:
         if not self._count:
             raise RecordError(f"{path} holds no complete cycle.", "Drive the step again.")
 
-    def decode(self) -> DecodedLog:
-        period = self._network.cycle_period
+    def decode(self, longest_gap: int) -> DecodedLog:
         self._refuse_absent_nodes()
-        jitter = self._check_grid(period)
+        grid = SyncGrid(self._stamps, self._network.cycle_period)
+        if grid.worst_gap > longest_gap:
+            raise RecordError(
+                f"{self._path}: {grid.worst_gap} cycles in a row are missing after t = {grid.worst_gap_at:.3f} s.",
+                "Drive the step again; see to it that the master keeps its cycle.",
+            )
         drives, encoders = self._network.drives, self._network.encoders
         return DecodedLog(
-            time=_scaled(np.arange(self._count), period),
-            command_torques=_columns([self._commands(node) for node in drives]),
-            motor_torques=_columns([self._torque(node) for node in drives]),
-            wheel_angles=_columns([self._angle(node, _POSITION_ACTUAL) for node in drives]),
-            steering_angles=_columns([self._angle(node, _ENCODER_POSITION) for node in encoders]),
-            jitter=jitter,
+            time=grid.time,
+            command_torques=grid.hold(_columns([self._commands(node) for node in drives])),
+            motor_torques=grid.interpolate(_columns([self._torque(node) for node in drives])),
+            wheel_angles=grid.interpolate(_columns([self._angle(node, _POSITION_ACTUAL) for node in drives])),
+            steering_angles=grid.interpolate(_columns([self._angle(node, _ENCODER_POSITION) for node in encoders])),
+            jitter=grid.jitter,
+            missing=grid.missing,
+            resampled=grid.resamples,
             start=float(self._stamps[0]),
         )
 
@@ -101,19 +114,6 @@ class _Decoder:
                 f"{self._path} has no samples of {', '.join(dict.fromkeys(absent))}.",
                 f"Decode it with the network file that it was recorded with ({self._network.path} was used).",
             )
-
-    def _check_grid(self, period: float) -> float:
-        steps = np.rint(np.diff(self._stamps) / period)
-        gaps = np.flatnonzero(steps > 1)
-        if len(gaps):
-            at = self._stamps[gaps[0]] - self._stamps[0]
-            raise RecordError(
-                f"{self._path}: {int(steps[gaps].sum()) - len(gaps)} SYNCs are missing in {len(gaps)} places, "
-                f"first after t = {at:.3f} s.",
-                "Drive the step again; see to it that the master keeps its cycle.",
-            )
-        offset = self._stamps - self._stamps[0] - np.arange(self._count) * period
-        return float(np.max(np.abs(offset - np.median(offset))))
 
     def _angle(self, node: Node, index: int) -> FloatArray:
         counts = self._sampled(node, index)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -23,6 +24,9 @@ from hil.master.link import Link, is_data_frame
 from hil.network import Network
 
 Fields = tuple[int, ...]
+
+_GRID_TOLERANCE = 1e-6
+"""Lateness [s] that is rounding, not waiting."""
 
 
 class Sample(NamedTuple):
@@ -110,11 +114,12 @@ class Cycle:
         else:
             self._number += 1
         lateness = self._clock.wait_until(round(self._origin + self.time, 9))
-        self._link.drain()
-        if lateness > self._period:
-            # The grid is moved rather than caught up with: a burst of SYNCs would be worse than a gap.
+        if lateness > self._period - _GRID_TOLERANCE:
+            # Whole cycles are left out, so that every SYNC stays on the grid and none follows another too soon.
             self.overruns += 1
-            self._shift += lateness
+            self._number += math.ceil((lateness - _GRID_TOLERANCE) / self._period)
+            self._clock.wait_until(round(self._origin + self.time, 9))
+        self._link.drain()
 
     def _collect(self) -> list[Fields]:
         layout = self._layout

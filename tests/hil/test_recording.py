@@ -287,12 +287,53 @@ def test_a_lost_sample_is_named_by_node_and_time(tmp_path: Path, network: Networ
         decode_log(gap, network)
 
 
-def test_lost_cycles_are_counted_and_placed(tmp_path: Path, network: Network) -> None:
-    path, _ = record(tmp_path, network.path, LogFormat.BLF, cycles=40)
-    gap = without(path, tmp_path / "gap.blf", lambda _, message: 0.030 < message.timestamp % 10 - START < 0.037)
-    with pytest.raises(RecordError, match=r"3 SYNCs are missing in 1 places, first after t = 0.0\d\d s"):
-        decode_log(gap, network)
+def stumble(bench: LockstepBench, master: Master, recorder: Recorder, delays: dict[int, float]) -> list[Sample]:
+    """Drive a step in which the computer has no time for the master now and then: cycle -> delay [s]."""
+    with recorder.step("straight"):
+        samples = []
+        for k in range(200):
+            bench.clock.wait_until(bench.clock.now() + delays.get(k, 0.0))
+            samples.append(master.exchange((0.0, *[0.02 * math.sin(0.05 * k)] * 3)))
+    return samples
 
 
-START = 0.001
-"""A BLF file starts its time at the first frame, which a command precedes the first SYNC by less than a cycle."""
+STUMBLES = {
+    "late by less than a cycle": ({50: 0.0033, 120: 0.0025}, 0, 201),
+    "late by some cycles": ({50: 0.0073}, 3, 203),
+    "late by exactly one cycle": ({50: 0.004}, 1, 201),
+    "never late": ({}, 0, 200),
+}
+
+
+@pytest.mark.parametrize(("delays", "missing", "rows"), STUMBLES.values(), ids=STUMBLES)
+def test_a_master_short_of_time_leaves_a_record_that_is_still_uniform_and_true(
+    tmp_path: Path, network: Network, delays: dict[int, float], missing: int, rows: int
+) -> None:
+    vehicle, recorder = Flywheels(), Recorder(tmp_path)
+    vehicle.drives[0].speed, vehicle.drives[0].friction = 100.0, 1e-9
+    with LockstepBench(vehicle) as bench, Master(bench.bus, bench.clock, network, recorder) as master:
+        master.boot()
+        master.enable()
+        samples = stumble(bench, master, recorder, delays)
+        assert master.overruns == (missing > 0)
+    ((_, path),) = finished_steps(tmp_path)
+    decoded = decode_log(path, network)
+    assert (decoded.missing, decoded.resampled, len(decoded.time)) == (missing, rows > 200, rows)
+    # The wheel turns at constant speed: its angle tells the time at which it was sampled.
+    # Six heartbeats that were due meanwhile may come before the SYNC and delay its stamp.
+    speed, stamp_error = 100.0 / 20, 400e-6 if decoded.resampled else 0.0
+    errors = decoded.wheel_angles[:, 0] - decoded.wheel_angles[0, 0] - speed * decoded.time
+    assert np.max(np.abs(errors)) < 1e-6 + speed * stamp_error
+    assert decoded.wheel_angles[-1, 0] == pytest.approx(samples[-1].wheel_angles[0], abs=1e-6 + speed * stamp_error)
+
+
+def test_more_cycles_left_out_than_can_be_interpolated_are_an_error(tmp_path: Path, network: Network) -> None:
+    recorder = Recorder(tmp_path)
+    with LockstepBench(Flywheels()) as bench, Master(bench.bus, bench.clock, network, recorder) as master:
+        master.boot()
+        master.enable()
+        stumble(bench, master, recorder, {100: 0.030})
+    ((_, path),) = finished_steps(tmp_path)
+    with pytest.raises(RecordError, match=r"14 cycles in a row are missing after t = 0.198 s"):
+        decode_log(path, network)
+    assert decode_log(path, network, longest_gap=20).missing == 14
