@@ -17,9 +17,13 @@ from ident.campaign.loops import STEERING_RATE_CYCLES, LoopDesign
 from ident.campaign.reference import STEERING_LOOPS, Reference
 from ident.errors import CampaignError
 
+STANDSTILL_GAIN = 6.0
+"""Factor on the integral gain while the reference stands still: the coordinate sticks, so the integrator only has to
+cross the band of Coulomb friction, and a fast one does so in a second."""
+
 LEAK_TIME = 0.1
-"""Time in which an integrator gives up its torque once its coordinate stands inside the dead band [s]: friction
-then holds it, far from the edge at which a disturbance would move it on."""
+"""Time in which an integrator gives up its torque at standstill [s], once its coordinate is inside the dead band
+(friction then holds it, far from the edge at which a disturbance would move it on) or has passed its target."""
 
 REST = 1e-9
 """Reference speed that counts as standstill."""
@@ -74,12 +78,19 @@ class _Loop:
             raise FollowingError(self.name, index, error, self.limits.following_error)
         position_gain, velocity_gain, integral_gain = self.gains
         velocity_error = wanted + position_gain * error - rate
-        if abs(wanted) > REST or abs(error) > self.dead_band:
-            bound = self.limits.integral
-            self.integral = min(max(self.integral + integral_gain * velocity_error, -bound), bound)
+        if abs(wanted) > REST:
+            self._integrate(integral_gain * velocity_error)
         else:
-            self.integral *= self.leak
+            inside = abs(error) < self.dead_band
+            if inside or error * self.integral < 0:
+                self.integral *= self.leak
+            if not inside:
+                self._integrate(STANDSTILL_GAIN * integral_gain * velocity_error)
         return velocity_gain * velocity_error + self.integral
+
+    def _integrate(self, torque: float) -> None:
+        bound = self.limits.integral
+        self.integral = min(max(self.integral + torque, -bound), bound)
 
     def _measured(
         self, index: int, steps: Sequence[float], steering: Sequence[float], cycle: float

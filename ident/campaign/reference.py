@@ -110,7 +110,7 @@ def alignment_reference(
     """
     approach = target - np.where(target < start, -CREEP, CREEP)
     stroke_time = max(0.5, float(np.abs(approach - start).max()) / ALIGNMENT_SPEED)
-    times = np.cumsum([SETTLING / 4, stroke_time, CREEP / CREEP_SPEED, SETTLING])
+    times = np.cumsum([SETTLING / 4, stroke_time, CREEP / CREEP_SPEED, ALIGNMENT_SETTLING])
     time = sample_times(round(times[-1] / sample_time), sample_time)
     stroke = _shaped_move((time - times[0]) / stroke_time, approach - start, stroke_time)
     creep = _shaped_move((time - times[1]) / (times[2] - times[1]), target - approach, times[2] - times[1])
@@ -128,6 +128,9 @@ def _shaped_move(progress: Array, stroke: Array, duration: float) -> tuple[Array
     shape, rate, curvature = (values[:, None] for values in smooth_step(progress))
     return shape * stroke, rate * stroke / duration, curvature * stroke / duration**2
 
+
+ALIGNMENT_SETTLING: Final = 2.5
+"""Standstill after an alignment [s], in which the integrators bring the wheels into their dead band."""
 
 CREEP: Final = 0.08
 """Last part of an alignment [rad]."""
