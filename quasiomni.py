@@ -14,17 +14,15 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from ident.report.html import ReportContent, write_report
-from ident.report.tables import loop_table, parameter_table, room_table, step_table
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from hil.buses.opening import open_bus
-from hil.campaign.folder import Run, RunFolder, create_run, open_run
+from hil.campaign.folder import Run, RunFolder, create_run, network_file_of, open_run
 from hil.campaign.reading import join, read_any, read_run
 from hil.campaign.runner import CampaignRunner, Operator
 from hil.clock import Clock, FreeRunningClock, WallClock
-from hil.network import DEFAULT_NETWORK, load_network
+from hil.network import load_network
 from hil.recorder import LogFormat, Recorder
 from ident.campaign.plan import Plan, make_plan
 from ident.campaign.steps import ORDER
@@ -32,6 +30,16 @@ from ident.errors import BusError, CampaignError, UserError
 from ident.estimate.identify import Identification, KnownInertia, identify
 from ident.estimate.result_file import write_parameters
 from ident.records.record import Record, Step
+from ident.report.html import ReportContent, write_report
+from ident.report.tables import (
+    condition_line,
+    excitation_table,
+    loop_table,
+    paper_table,
+    parameter_table,
+    room_table,
+    step_table,
+)
 from ident.vehicle.description import VehicleDescription, find_data_file, load_vehicle
 from ident.vehicle.parameters import Parameters
 
@@ -45,6 +53,9 @@ app = typer.Typer(
 console = Console()
 errors = Console(stderr=True)
 
+PAPER_PROTOTYPE = "prototype"
+"""Name of the vehicle that Table 2 of the paper describes."""
+
 DEFAULT_STEPS = tuple(step for step in ORDER if step is not Step.LATERAL)
 
 VehicleOption = Annotated[
@@ -54,7 +65,9 @@ NetworkOption = Annotated[
     Path | None, typer.Option("--network", help="Network file: nodes, units, directions. Default: the vehicle's.")
 ]
 InertiaOption = Annotated[float | None, typer.Option("--b-w", help="Give B_w [kg m²] instead of lifting the wheels.")]
-InertiaStdOption = Annotated[float, typer.Option("--b-w-std", help="Standard deviation of the B_w given [kg m²].")]
+InertiaStdOption = Annotated[
+    float | None, typer.Option("--b-w-std", help="Standard deviation of the B_w given [kg m²]; needed with --b-w.")
+]
 SeedOption = Annotated[int, typer.Option(help="Seed of the excitation and of all emulated noise.")]
 
 
@@ -92,7 +105,7 @@ def campaign(
     periods: Annotated[int, typer.Option(help="Repeats of every excitation, at least 4.")] = 4,
     seed: SeedOption = 1,
     b_w: InertiaOption = None,
-    b_w_std: InertiaStdOption = 0.0,
+    b_w_std: InertiaStdOption = None,
     log_format: Annotated[LogFormat, typer.Option("--format", help="Format of the logs.")] = LogFormat.BLF,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in --out where it stopped.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before the vehicle moves.")] = False,
@@ -126,7 +139,7 @@ def identify_command(
     vehicle: VehicleOption = "prototype",
     network: NetworkOption = None,
     b_w: InertiaOption = None,
-    b_w_std: InertiaStdOption = 0.0,
+    b_w_std: InertiaStdOption = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for parameters.toml and report.html. Default: the run folder, or here.")
     ] = None,
@@ -308,9 +321,9 @@ def _bar(bars: Progress) -> Callable[[str, int, int], None]:
     tasks: dict[str, Any] = {}
 
     def show(step: str, done: int, total: int) -> None:
-        if step not in tasks or bars.tasks[tasks[step]].finished:
+        if step not in tasks:
             tasks[step] = bars.add_task(step, total=total)
-        bars.update(tasks[step], completed=done)
+        bars.update(tasks[step], completed=done, total=total)
 
     return show
 
@@ -335,7 +348,10 @@ def _identify(
 ) -> None:
     with console.status("identifying"):
         result = identify(record, vehicle.geometry, known_inertia=inertia)
-    console.print(parameter_table(result, truth), step_table(result))
+    console.print(parameter_table(result, truth), excitation_table(result), step_table(result))
+    if _is_paper_prototype(vehicle):
+        console.print(paper_table(result))
+    console.print(condition_line(result))
     out.mkdir(parents=True, exist_ok=True)
     write_parameters(result, out / "parameters.toml", provenance)
     with console.status("writing the report"):
@@ -351,13 +367,15 @@ def _content(
     truth: Parameters | None,
     plan: Plan | None,
 ) -> ReportContent:
-    poor = [
-        f"{estimate.name} is poorly excited: its interval is wider than half its value."
-        for estimate in result.estimates
-        if estimate.poor
-    ]
     title = f"Identification of {vehicle.name}"
-    return ReportContent(title, result, record, vehicle, truth, plan, provenance, poor)
+    return ReportContent(
+        title, result, record, vehicle, truth, plan, provenance, warnings=(), paper=_is_paper_prototype(vehicle)
+    )
+
+
+def _is_paper_prototype(vehicle: VehicleDescription) -> bool:
+    """Whether Table 2 of the paper has anything to say about the vehicle."""
+    return vehicle.name == PAPER_PROTOTYPE
 
 
 def _read_run(folder: Path) -> Record:
@@ -385,19 +403,18 @@ def _steps(skip: Sequence[Step], lateral: bool, b_w: float | None) -> tuple[Step
     return tuple(step for step in ORDER if step not in left_out)
 
 
-def _known_inertia(value: float | None, std: float) -> KnownInertia | None:
+def _known_inertia(value: float | None, std: float | None) -> KnownInertia | None:
     if value is None:
         return None
-    if not (value > 0 and std >= 0):
-        raise UserError(f"B_w = {value} ± {std} kg m² cannot be.", "Give a positive value and a standard deviation.")
+    if std is None:
+        raise UserError("B_w is given without its standard deviation.", "Add --b-w-std: every result depends on it.")
+    if not (value > 0 and 0 <= std < value):
+        raise UserError(f"B_w = {value} ± {std} kg m² cannot be.", "Give a positive value and a smaller deviation.")
     return KnownInertia(value, std, "given")
 
 
 def _network_file(vehicle: str, network: Path | None) -> Path:
-    if network is not None:
-        return network
-    shipped = DEFAULT_NETWORK.with_name(f"{Path(vehicle).stem}.toml")
-    return shipped if shipped.is_file() else DEFAULT_NETWORK
+    return network if network is not None else network_file_of(vehicle)
 
 
 def _replace_previous(out: Path) -> None:

@@ -20,7 +20,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from hil.network import Network, load_network
+from hil.network import DEFAULT_NETWORK, Network, load_network
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.optimise import Excitation
 from ident.campaign.plan import Plan, assemble_plan
@@ -30,6 +30,12 @@ from ident.records.record import Step
 from ident.vehicle.description import VehicleDescription, load_vehicle
 
 SCHEMA: Final = "quasiomni.run/1"
+
+
+def network_file_of(vehicle: str) -> Path:
+    """The network file shipped for a vehicle, by the vehicle's name or the name of its file."""
+    shipped = DEFAULT_NETWORK.with_name(f"{Path(vehicle).stem}.toml")
+    return shipped if shipped.is_file() else DEFAULT_NETWORK
 
 
 @dataclass(frozen=True)

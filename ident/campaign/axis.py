@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from ident.campaign.steps import StepSpec
 from ident.vehicle import dynamics, kinematics
 from ident.vehicle.description import VehicleDescription
+from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import COULOMB_EPSILON
 
 Array = NDArray[np.float64]
@@ -25,6 +27,8 @@ class Axis:
         wheel_rate: largest wheel rate per rate of the coordinate.
         wheel_load: wheel torque per contact force [m], the wheel radius; zero in the air.
         slipping_inertia: what is left of J when the wheels lose their grip.
+        holding_acceleration: acceleration at which the contact forces overcome the friction that holds the
+            steering; infinite where front and rear wheels cancel, as in all modes but the lateral one.
     """
 
     inertia: float
@@ -34,6 +38,7 @@ class Axis:
     wheel_rate: float
     wheel_load: float
     slipping_inertia: float
+    holding_acceleration: float
 
     def torque(self, velocity: Array, acceleration: Array) -> Array:
         """Generalized torque of a motion."""
@@ -45,7 +50,7 @@ def axis_of(spec: StepSpec, vehicle: VehicleDescription) -> Axis:
     """The axis that a step drives, from equation (19) with the prior parameters."""
     prior, geometry = vehicle.prior, vehicle.geometry
     if spec.mode is None:
-        return Axis(prior["B_w"], prior["d_vw"], prior["d_cw"], 1 / geometry.gear_ratio, 1.0, 0.0, prior["B_w"])
+        return Axis(prior["B_w"], prior["d_vw"], prior["d_cw"], 1 / geometry.gear_ratio, 1.0, 0.0, prior["B_w"], math.inf)
     alpha = np.tile(spec.steering(geometry), (3, 1))
     row = kinematics.GENERALIZED_VELOCITIES[spec.mode].index(spec.coordinate)
     velocity, acceleration = np.zeros((2, 3, len(kinematics.GENERALIZED_VELOCITIES[spec.mode])))
@@ -63,4 +68,13 @@ def axis_of(spec: StepSpec, vehicle: VehicleDescription) -> Axis:
         wheel_rate=float(np.abs(rates[1, 5:]).max()),
         wheel_load=geometry.wheel_radius,
         slipping_inertia=float(prior["B_w"] * np.sum(rates[1, 5:] ** 2)),
+        holding_acceleration=_holding_acceleration(spec, vehicle),
     )
+
+
+def _holding_acceleration(spec: StepSpec, vehicle: VehicleDescription) -> float:
+    """In lateral motion the four contact forces m ÿ/4 turn both wheels of a side the same way, by their lever a."""
+    if spec.mode is not Mode.LATERAL:
+        return math.inf
+    prior = vehicle.prior
+    return 2 * min(prior["d_cl"], prior["d_cr"]) / (vehicle.geometry.wheel_offset * prior["m_ch"])

@@ -27,6 +27,9 @@ TORQUE_RESERVE = 0.7
 ADHESION_RESERVE = 0.5
 """Share of the adhesion that a planned motion may use."""
 
+HOLDING_RESERVE = 0.6
+"""Share of the steering friction that may be asked to hold the wheels in lateral motion."""
+
 INFORMATION_WEIGHT = 0.3
 """Weight of the information content beside the condition number: a well-shaped whisper is no excitation."""
 
@@ -67,17 +70,18 @@ class Problem:
         """Share of each limit that a motion (position, velocity, acceleration) uses; 1 is the limit."""
         position, velocity, acceleration = motion
         motor = np.abs(self.axis.torque(velocity, acceleration)) * self.axis.motor_torque
-        speed = float(np.abs(velocity).max())
+        speed, peak_acceleration = float(np.abs(velocity).max()), float(np.abs(acceleration).max())
         adhesion = self.limits.floor_friction * self.mass * GRAVITY / 4 * self.axis.wheel_load
         grip = motor.max() * self.gear_ratio / adhesion if adhesion > 0 else 0.0
         return {
             "stroke": float(np.abs(position).max()) / self.spec.stroke,
             "speed": speed / self.spec.speed,
-            "acceleration": float(np.abs(acceleration).max()) / self.spec.acceleration,
+            "acceleration": peak_acceleration / self.spec.acceleration,
             "motor speed": speed * self.axis.wheel_rate * self.gear_ratio / self.limits.motor_speed,
             "peak torque": float(motor.max()) / (TORQUE_RESERVE * self.limits.peak_torque),
             "rated torque": float(np.sqrt(np.mean(motor**2))) / self.limits.rated_torque,
             "adhesion": float(grip) / ADHESION_RESERVE,
+            "steering friction": peak_acceleration / (HOLDING_RESERVE * self.axis.holding_acceleration),
         }
 
     def normal_matrix(self, motion: Motion) -> Array:
