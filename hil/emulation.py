@@ -13,8 +13,7 @@ import numpy as np
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
 from hil.bench import LockstepBench
-from hil.buses.opening import open_bus
-from hil.buses.unix import UnixHub
+from hil.buses import open_served_bus
 from hil.clock import Clock
 from hil.network import Network
 from hil.serving import VehicleServer
@@ -66,8 +65,7 @@ def server_bus(name: str, network: Network) -> Iterator[can.BusABC]:
     Raises:
         BusError: the bus cannot be opened.
     """
-    interface, _, channel = name.partition(":")
-    bus: can.BusABC = UnixHub(Path(channel)) if interface == "unix" else open_bus(name, network.bit_rate)
+    bus = open_served_bus(name, network.bit_rate)
     try:
         yield bus
     finally:

@@ -5,7 +5,7 @@ The same code drives the emulator and a real vehicle: it sees a bus, a clock and
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
 import can
@@ -32,6 +32,13 @@ ALIGNMENTS: Final = 3
 
 MISALIGNED: Final = 0.01
 """Steering error after the last attempt with which no step is begun [rad]."""
+
+_SESSIONS: Final = (
+    {Step.WHEEL_LIFTED},
+    {Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION, Step.LATERAL},
+    {Step.LANE_CHANGE},
+)
+"""Steps between which the drives lose their power: to move the vehicle by hand, and to identify before validating."""
 
 PROGRESS_CYCLES: Final = 100
 _STANDSTILL: Final = (0.0, 0.0, 0.0, 0.0)
@@ -90,27 +97,29 @@ class CampaignRunner:
             CampaignError: a coordinate leaves its reference or cannot be aligned; the drives are stopped.
         """
         finished = {step for step, _ in finished_steps(self._run.folder.frames)}
-        steps = [step for step in self._plan.steps if step not in finished]
-        lifted = [step for step in steps if step is Step.WHEEL_LIFTED]
-        floor = [step for step in steps if step is not Step.WHEEL_LIFTED]
-        if lifted:
-            self._operator.lift()
-            self._drive_steps(lifted)
-            self._operator.lower()
-        if floor:
-            self._drive_steps(floor)
+        for session in _SESSIONS:
+            steps = [step for step in self._plan.steps if step in session and step not in finished]
+            if not steps:
+                continue
+            if Step.WHEEL_LIFTED in steps:
+                self._operator.lift()
+            self._drive_session(steps)
+            if Step.WHEEL_LIFTED in steps:
+                self._operator.lower()
 
     def _master(self) -> Master:
         return Master(self._bus, self._clock, self._run.network, self._recorder)
 
-    def _drive_steps(self, steps: Collection[Step]) -> None:
+    def _drive_session(self, steps: Sequence[Step]) -> None:
+        """Boot, drive some steps, shut down. Whatever takes long is computed before: enabled drives want a SYNC."""
+        references = [self._plan.reference(step, self._parameters(step)) for step in steps]
         with self._master() as master:
             master.boot()
             master.enable()
-            for step in steps:
-                if step is not Step.WHEEL_LIFTED:
-                    self._align(master, step)
-                self._drive(master, self._plan.reference(step, self._parameters(step)))
+            for reference in references:
+                if reference.step is not Step.WHEEL_LIFTED:
+                    self._align(master, reference.step)
+                self._drive(master, reference)
         self.overruns += master.overruns
 
     def _align(self, master: Master, step: Step) -> None:

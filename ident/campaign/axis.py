@@ -50,7 +50,9 @@ def axis_of(spec: StepSpec, vehicle: VehicleDescription) -> Axis:
     """The axis that a step drives, from equation (19) with the prior parameters."""
     prior, geometry = vehicle.prior, vehicle.geometry
     if spec.mode is None:
-        return Axis(prior["B_w"], prior["d_vw"], prior["d_cw"], 1 / geometry.gear_ratio, 1.0, 0.0, prior["B_w"], math.inf)
+        return Axis(
+            prior["B_w"], prior["d_vw"], prior["d_cw"], 1 / geometry.gear_ratio, 1.0, 0.0, prior["B_w"], math.inf
+        )
     alpha = np.tile(spec.steering(geometry), (3, 1))
     row = kinematics.GENERALIZED_VELOCITIES[spec.mode].index(spec.coordinate)
     velocity, acceleration = np.zeros((2, 3, len(kinematics.GENERALIZED_VELOCITIES[spec.mode])))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeVar
@@ -74,7 +75,7 @@ class Plan:
         steps: in order, without the alignments between them.
         excitations: of the excitation steps.
         designs, limits: of every loop, by coordinate.
-        periods: repeats of an excitation.
+        periods: repeats of an excitation, before the factor of its step.
         cycle: T_s [s].
         manoeuvre: the lane change.
     """
@@ -93,7 +94,8 @@ class Plan:
         if step is Step.LANE_CHANGE:
             return lane_change_reference(self.manoeuvre, self.vehicle, parameters, self.cycle)
         spec, series = EXCITATIONS[step], self.excitations[step].series
-        return excitation_reference(spec, series, self.periods, self.vehicle, parameters, self.cycle)
+        periods = math.ceil(self.periods * spec.repeats)
+        return excitation_reference(spec, series, periods, self.vehicle, parameters, self.cycle)
 
     def alignment(self, start: Array, step: Step, parameters: Parameters) -> Reference:
         """Reference that takes the steering from `start` (2,) to where `step` begins."""

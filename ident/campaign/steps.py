@@ -44,6 +44,7 @@ class StepSpec:
         stroke: largest excursion of the coordinate from its start [rad or m].
         speed: largest speed of the coordinate [rad/s or m/s].
         acceleration: largest acceleration of the coordinate.
+        repeats: periods of this step per period asked of a campaign: steering friction is the noisiest.
     """
 
     step: Step
@@ -55,6 +56,7 @@ class StepSpec:
     stroke: float
     speed: float
     acceleration: float
+    repeats: float = 1.0
 
     def steering(self, geometry: Geometry) -> Array:
         """Steering angles at the start of the step (2,) [rad]."""
@@ -63,8 +65,8 @@ class StepSpec:
 
 _SPECS: Final = (
     StepSpec(Step.WHEEL_LIFTED, None, "beta", Posture.AHEAD, 4.0, 6, 8.0, 12.0, 120.0),
-    StepSpec(Step.STEERING_LEFT, Mode.ALIGNMENT, "alpha_l", Posture.AHEAD, 5.0, 6, 1.3, 5.0, 40.0),
-    StepSpec(Step.STEERING_RIGHT, Mode.ALIGNMENT, "alpha_r", Posture.AHEAD, 5.0, 6, 1.3, 5.0, 40.0),
+    StepSpec(Step.STEERING_LEFT, Mode.ALIGNMENT, "alpha_l", Posture.AHEAD, 5.0, 6, 1.3, 5.0, 40.0, 1.5),
+    StepSpec(Step.STEERING_RIGHT, Mode.ALIGNMENT, "alpha_r", Posture.AHEAD, 5.0, 6, 1.3, 5.0, 40.0, 1.5),
     StepSpec(Step.STRAIGHT, Mode.STEERED, "x", Posture.AHEAD, 8.0, 6, 1.0, 1.2, 2.0),
     StepSpec(Step.ROTATION, Mode.ROTATION, "gamma", Posture.ROTATION, 8.0, 6, 1.2, 1.4, 2.5),
     StepSpec(Step.LATERAL, Mode.LATERAL, "y", Posture.ACROSS, 8.0, 6, 0.8, 1.0, 2.0),

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from ident.errors import EstimationError
 from ident.estimate.equations import Equations, column, usable_equations
@@ -142,6 +143,14 @@ def identify(
     """
     processing = processing or Processing()
     equations = usable_equations(list(record.segments), geometry, processing)
+    # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _identify(equations, known_inertia, processing)
+
+
+def _identify(
+    equations: Sequence[Equations], known_inertia: KnownInertia | None, processing: Processing
+) -> Identification:
     inertia, lifted = _wheel_inertia(equations, known_inertia)
     rows = [equation for equation in equations if equation.step in FIT_STEPS]
     fit = _fit(rows, INDEPENDENT, {"B_w": inertia.value})
