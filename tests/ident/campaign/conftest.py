@@ -7,8 +7,10 @@ from ident.campaign.axis import axis_of
 from ident.campaign.excitation import motion_basis, resting_projection, series_of
 from ident.campaign.optimise import SAMPLES, Excitation, Problem, size_within_limits
 from ident.campaign.plan import Plan, assemble_plan
+from ident.campaign.reference import Reference
 from ident.campaign.steps import EXCITATIONS, ORDER, PERIODS, StepSpec
 from ident.estimate.filters import Processing
+from ident.records.record import Step
 from ident.vehicle.description import VehicleDescription
 
 CYCLE = 0.002
@@ -35,3 +37,9 @@ def plan(vehicle: VehicleDescription) -> Plan:
     generator = np.random.default_rng(0)
     excitations = {step: random_excitation(spec, vehicle, generator) for step, spec in EXCITATIONS.items()}
     return assemble_plan(vehicle, excitations, steps=ORDER, periods=PERIODS, cycle=CYCLE)
+
+
+@pytest.fixture(scope="session")
+def references(plan: Plan) -> dict[Step, Reference]:
+    """The references of all its steps."""
+    return {step: plan.reference(step, plan.vehicle.prior) for step in plan.steps}

@@ -16,12 +16,9 @@ from ident.vehicle.description import VehicleDescription
 from ident.vehicle.modes import Mode, detect_mode, icr_residual
 
 Array = NDArray[np.float64]
+References = dict[Step, Reference]
 CYCLE = 0.002
 excitation_steps = pytest.mark.parametrize("step", list(EXCITATIONS))
-
-
-def reference(plan: Plan, step: Step) -> Reference:
-    return plan.reference(step, plan.vehicle.prior)
 
 
 def derivative(values: Array) -> Array:
@@ -29,8 +26,8 @@ def derivative(values: Array) -> Array:
 
 
 @excitation_steps
-def test_an_excitation_step_starts_and_ends_at_rest_and_repeats_its_periods(plan: Plan, step: Step) -> None:
-    found = reference(plan, step)
+def test_an_excitation_step_starts_and_ends_at_rest_and_repeats_its_periods(references: References, step: Step) -> None:
+    found = references[step]
     per_period = round(EXCITATIONS[step].period / CYCLE)
     counts = [int(np.sum(found.period == number)) for number in range(PERIODS)]
     assert counts == [per_period] * PERIODS
@@ -48,15 +45,15 @@ def test_an_excitation_step_starts_and_ends_at_rest_and_repeats_its_periods(plan
 
 
 @excitation_steps
-def test_the_velocity_of_a_track_is_the_derivative_of_its_position(plan: Plan, step: Step) -> None:
-    for track in reference(plan, step).tracks.values():
+def test_the_velocity_of_a_track_is_the_derivative_of_its_position(references: References, step: Step) -> None:
+    for track in references[step].tracks.values():
         moving = np.abs(track.velocity).max()
         np.testing.assert_allclose(derivative(track.position), track.velocity, atol=2e-2 * max(moving, 1e-9))
 
 
 @excitation_steps
-def test_only_the_driven_coordinate_moves(plan: Plan, step: Step) -> None:
-    spec, found = EXCITATIONS[step], reference(plan, step)
+def test_only_the_driven_coordinate_moves(plan: Plan, references: References, step: Step) -> None:
+    spec, found = EXCITATIONS[step], references[step]
     moving = [name for name, track in found.tracks.items() if np.any(track.velocity != 0)]
     assert moving == ([spec.coordinate] if spec.mode is not None else list(found.tracks))
     start = spec.steering(plan.vehicle.geometry)
@@ -67,11 +64,13 @@ def test_only_the_driven_coordinate_moves(plan: Plan, step: Step) -> None:
 
 
 @excitation_steps
-def test_wheels_turn_by_their_column_of_the_motion_and_roll_the_vehicle_along_its_path(plan: Plan, step: Step) -> None:
+def test_wheels_turn_by_their_column_of_the_motion_and_roll_the_vehicle_along_its_path(
+    plan: Plan, references: References, step: Step
+) -> None:
     """Odometry of what the tracks make the wheels do is the path that the reference promises."""
     if EXCITATIONS[step].mode is None:
         pytest.skip("wheels in the air drive no path")
-    found, geometry = reference(plan, step), plan.vehicle.geometry
+    found, geometry = references[step], plan.vehicle.geometry
     wheels = np.sum([track.velocity[:, None] * track.wheels for track in found.tracks.values()], axis=0)
     alpha, alpha_rate = (
         np.stack([getattr(found.tracks[name], what) for name in ("alpha_l", "alpha_r")], axis=1)
@@ -83,9 +82,11 @@ def test_wheels_turn_by_their_column_of_the_motion_and_roll_the_vehicle_along_it
 
 
 @excitation_steps
-def test_feed_forward_is_inertia_and_friction_of_the_axis_shared_among_its_wheels(plan: Plan, step: Step) -> None:
+def test_feed_forward_is_inertia_and_friction_of_the_axis_shared_among_its_wheels(
+    plan: Plan, references: References, step: Step
+) -> None:
     """Power of the motors equals force times speed of the coordinate, by the lumped axis."""
-    found, spec = reference(plan, step), EXCITATIONS[step]
+    found, spec = references[step], EXCITATIONS[step]
     axis = axis_of(spec, plan.vehicle)
     name = spec.coordinate if spec.mode is not None else "beta_fl"
     track = found.tracks[name]
@@ -99,8 +100,8 @@ def test_feed_forward_is_inertia_and_friction_of_the_axis_shared_among_its_wheel
 
 
 @pytest.fixture(scope="module")
-def lane_change(plan: Plan) -> Reference:
-    return reference(plan, Step.LANE_CHANGE)
+def lane_change(references: References) -> Reference:
+    return references[Step.LANE_CHANGE]
 
 
 def test_a_lane_change_ends_parallel_and_shifted_by_what_was_asked(plan: Plan, lane_change: Reference) -> None:

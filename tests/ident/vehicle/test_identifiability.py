@@ -41,10 +41,9 @@ def shape(request: pytest.FixtureRequest, geometry: Geometry) -> Geometry:
 
 
 @pytest.mark.parametrize("row", TABLE_1)
-@pytest.mark.parametrize("seed", [0, 1])
-def test_table_1_is_what_random_motion_can_tell_apart(row: str, seed: int, shape: Geometry) -> None:
+def test_table_1_is_what_random_motion_can_tell_apart(row: str, shape: Geometry) -> None:
     configurations, expected = TABLE_1[row]
-    assert independent_parameters(configurations, shape, np.random.default_rng(seed)) == expected
+    assert independent_parameters(configurations, shape, np.random.default_rng(0)) == expected
 
 
 def ranks(configurations: tuple[Configuration, ...], geometry: Geometry) -> NDArray[np.float64]:
