@@ -18,9 +18,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from hil.buses.opening import open_bus
-from hil.campaign.folder import Run, RunFolder, create_run, network_file_of, open_run
+from hil.campaign.folder import Run, RunFolder, create_run, network_file_of, open_run, refuse_used
 from hil.campaign.reading import join, read_any, read_run
-from hil.campaign.runner import CampaignRunner, Operator
+from hil.campaign.runner import CampaignRunner, Operator, check_network
 from hil.clock import Clock, FreeRunningClock, WallClock
 from hil.network import load_network
 from hil.recorder import LogFormat, Recorder
@@ -127,7 +127,7 @@ def campaign(
         run = _prepare(out, vehicle, network, seed, steps, periods, inertia, bus, "", resume)
         clock: Clock = FreeRunningClock() if lockstep else WallClock()
         with contextlib.closing(_Shut(open_bus(bus, run.network.bit_rate))) as opened:
-            _drive(run, opened.bus, clock, HumanOperator(), log_format, ask=not yes)
+            _drive(run, opened.bus, clock, HumanOperator(), log_format, vehicle, ask=not yes)
     console.print(f"Next: [bold]quasiomni identify {out}[/bold]")
 
 
@@ -256,8 +256,8 @@ def _campaign_on_emulator(
 ) -> None:
     emulator = _emulator()
     run = _prepare(out, vehicle, network, seed, steps, periods, inertia, "emulator, in lockstep", vehicle, resume)
-    with emulator.bench(run.prototype, run.seed, gui, run.folder.network) as bench:
-        _drive(run, bench.bus, bench.clock, bench.operator, log_format, ask=False)
+    with emulator.bench(run.prototype, run.seed, gui, run.network.path) as bench:
+        _drive(run, bench.bus, bench.clock, bench.operator, log_format, vehicle, ask=False)
 
 
 def _prepare(
@@ -274,12 +274,11 @@ def _prepare(
 ) -> Run:
     if resume:
         return open_run(out)
+    refuse_used(RunFolder(out))
     described, network_file = load_vehicle(vehicle), _network_file(vehicle, network)
     loaded = load_network(network_file)
     plan = _plan(described, steps, periods, loaded.cycle_period, seed)
-    run = Run(RunFolder(out), plan, loaded, seed, bus, prototype, inertia)
-    create_run(run, find_data_file("ident.vehicle", vehicle), network_file)
-    return run
+    return Run(RunFolder(out), plan, loaded, seed, bus, prototype, inertia)
 
 
 def _plan(vehicle: VehicleDescription, steps: Sequence[Step], periods: int, cycle: float, seed: int) -> Plan:
@@ -295,18 +294,22 @@ def _plan(vehicle: VehicleDescription, steps: Sequence[Step], periods: int, cycl
         )
 
 
-def _drive(run: Run, bus: Any, clock: Clock, operator: Operator, log_format: LogFormat, *, ask: bool) -> None:
+def _drive(
+    run: Run, bus: Any, clock: Clock, operator: Operator, log_format: LogFormat, vehicle: str, *, ask: bool
+) -> None:
+    """Check, ask, and only then make the run folder and move."""
     console.print(loop_table(run.plan), room_table(run.plan))
+    with console.status("looking for the six nodes"):
+        check_network(bus, clock, run.network)
+    console.print("All six nodes answer: identity, mode and units are those of the network file.")
+    if ask and not typer.confirm("The vehicle will move. Is the floor free, and a hand at the emergency stop?"):
+        raise typer.Exit(code=1)
+    if not run.folder.manifest.is_file():
+        create_run(run, find_data_file("ident.vehicle", vehicle))
     recorder = Recorder(run.folder.frames, log_format)
     try:
         with _progress() as bars:
             runner = CampaignRunner(run, bus, clock, recorder, operator, _bar(bars))
-            runner.check()
-            bars.stop()
-            console.print("All six nodes answer: identity, mode and units are those of the network file.")
-            if ask and not typer.confirm("The vehicle will move. Is the floor free, and a hand at the emergency stop?"):
-                raise typer.Exit(code=1)
-            bars.start()
             runner.drive()
     except KeyboardInterrupt:
         errors.print(f"Stopped. Finished steps are kept: go on with [bold]--resume --out {run.folder.path}[/bold].")

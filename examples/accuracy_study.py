@@ -39,7 +39,7 @@ def run_campaign(name: str, seed: int, folder: Path) -> Outcome:
     generator = np.random.default_rng(seed)
     plan = make_plan(vehicle, generator, steps=steps, periods=PERIODS, cycle=network.cycle_period)
     run = Run(RunFolder(folder), plan, network, seed, "emulator, in lockstep", name, None)
-    create_run(run, find_data_file("ident.vehicle", name), network_file)
+    create_run(run, find_data_file("ident.vehicle", name))
     with emulation.bench(name, seed, False, network_file) as bench:
         recorder = Recorder(run.folder.frames)
         CampaignRunner(run, bench.bus, bench.clock, recorder, bench.operator, lambda *_: None).drive()

@@ -98,20 +98,29 @@ class Run:
     known_inertia: KnownInertia | None
 
 
-def create_run(run: Run, vehicle_file: Path, network_file: Path) -> None:
+def refuse_used(folder: RunFolder) -> None:
+    """Refuse a folder that a new run would overwrite.
+
+    Raises:
+        CampaignError: the folder already holds a run.
+    """
+    if folder.manifest.exists() or any(folder.frames.glob("*")):
+        raise CampaignError(
+            f"{folder.path} already holds a run.", "Go on with it (--resume), or name another folder (--out)."
+        )
+
+
+def create_run(run: Run, vehicle_file: Path) -> None:
     """Make the folder, copy vehicle and network files, write the manifest last.
 
     Raises:
         CampaignError: the folder already holds a run.
     """
     folder = run.folder
-    if folder.manifest.exists() or any(folder.frames.glob("*")):
-        raise CampaignError(
-            f"{folder.path} already holds a run.", "Go on with it (--resume), or name another folder (--out)."
-        )
+    refuse_used(folder)
     folder.network.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(vehicle_file, folder.vehicle)
-    shutil.copyfile(network_file, folder.network)
+    shutil.copyfile(run.network.path, folder.network)
     for eds in {node.eds for node in run.network.nodes}:
         shutil.copyfile(eds, folder.network.parent / eds.name)
     temporary = folder.manifest.with_suffix(".tmp")

@@ -15,6 +15,7 @@ from hil.campaign.folder import Run
 from hil.campaign.reading import read_run
 from hil.clock import Clock
 from hil.master.master import Master
+from hil.network import Network
 from hil.recorder import Recorder, finished_steps
 from ident.campaign.controller import Controller
 from ident.campaign.reference import Reference
@@ -57,6 +58,15 @@ class Operator(Protocol):
         """Put the vehicle on the floor, wheels about straight ahead, and return when it is there."""
 
 
+def check_network(bus: can.BusABC, clock: Clock, network: Network) -> None:
+    """See that all nodes are the ones described; nothing moves.
+
+    Raises:
+        BusError: a node is missing, another device, in other units, or without the mode.
+    """
+    Master(bus, clock, network).check()
+
+
 class CampaignRunner:
     """Drives a run.
 
@@ -80,14 +90,6 @@ class CampaignRunner:
         self._operator = operator
         self._progress = progress
         self.overruns = 0
-
-    def check(self) -> None:
-        """See that all nodes are the ones described; nothing moves.
-
-        Raises:
-            BusError: a node is missing, another device, in other units, or without the mode.
-        """
-        self._master().check()
 
     def drive(self) -> None:
         """Drive all steps that are not finished yet.
