@@ -120,6 +120,12 @@ def test_a_lane_change_starts_and_ends_at_rest_with_wheels_ahead(lane_change: Re
     np.testing.assert_allclose(lane_change.feed_forward[[0, -1]], 0.0, atol=1e-9)
 
 
+def test_a_lane_change_begins_and_ends_to_steer_without_a_jerk(lane_change: Reference) -> None:
+    for name in ("alpha_l", "alpha_r"):
+        velocity = lane_change.tracks[name].velocity
+        assert np.abs(np.diff(velocity)).max() < 0.02 * np.abs(velocity).max()
+
+
 def test_a_lane_change_keeps_the_axles_on_one_centre(plan: Plan, lane_change: Reference) -> None:
     geometry = plan.vehicle.geometry
     alpha = np.stack([lane_change.tracks[name].position for name in ("alpha_l", "alpha_r")], axis=1)

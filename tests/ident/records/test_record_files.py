@@ -170,6 +170,7 @@ BREAKS: dict[str, tuple[Callable[[Table], Table], tuple[str, ...], str]] = {
         ("period",),
         "-1 outside",
     ),
+    "periods are infinite": (lambda t: broken(t, period=with_value(t["period"], 3, np.inf)), ("period",), "0, 1, 2"),
     "periods are halves": (lambda t: broken(t, period=with_value(t["period"], 3, 0.5)), ("period",), "0, 1, 2"),
 }
 
