@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import integrate, optimize
 
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.steps import StepSpec
@@ -209,12 +210,15 @@ def _speed_profile(manoeuvre: LaneChange, sample_time: float) -> tuple[Array, Ar
 
 
 def _curvature_of_shift(manoeuvre: LaneChange) -> _CurvatureOfShift:
-    """Amplitude by the small-angle formula; the heading returns to its start exactly."""
-    unit = _CurvatureOfShift(1.0, manoeuvre.length)
-    arc = np.linspace(0.0, manoeuvre.length, 4001)
-    spacing = arc[1]
-    heading = np.cumsum(unit(arc)) * spacing
-    return _CurvatureOfShift(manoeuvre.shift / (float(heading.sum()) * spacing), manoeuvre.length)
+    """The curvature whose path ends beside its start by the shift asked for; the heading returns by itself."""
+    arc = np.linspace(0.0, manoeuvre.length, 2001)
+    heading = integrate.cumulative_trapezoid(_CurvatureOfShift(1.0, manoeuvre.length)(arc), arc, initial=0.0)
+
+    def excess(amplitude: float) -> float:
+        return float(integrate.trapezoid(np.sin(amplitude * heading), arc)) - manoeuvre.shift
+
+    steepest = math.pi / 2 / float(np.abs(heading).max())
+    return _CurvatureOfShift(float(optimize.brentq(excess, 0.0, steepest)), manoeuvre.length)
 
 
 @dataclass(frozen=True)

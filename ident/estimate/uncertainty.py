@@ -95,9 +95,10 @@ def _of_periods(folded: Array, sample_time: float) -> list[LongRun]:
     deviations = np.concatenate([_block_sums(period - mean, sample_time) for period in folded])
     noise = _bartlett(deviations)
     noise_total = noise.covariance * periods / (periods - 1)
-    repeated = periods**2 * _bartlett(_block_sums(mean, sample_time)).covariance - noise_total
+    pattern = _prewhitened(_block_sums(mean, sample_time))
+    repeated = periods**2 * pattern.covariance - noise_total
     degrees = noise.degrees_of_freedom * (periods - 1) / periods
-    return [LongRun(noise_total, degrees), LongRun(_positive_part(repeated), degrees / periods)]
+    return [LongRun(noise_total, degrees), LongRun(_positive_part(repeated), pattern.degrees_of_freedom)]
 
 
 def _positive_part(matrix: Array) -> Array:
@@ -111,6 +112,22 @@ def _block_sums(scores: Array, sample_time: float) -> Array:
     block = max(1, round(BLOCK_TIME / sample_time))
     starts = np.arange(0, len(scores), block)
     return np.asarray(np.add.reduceat(scores, starts, axis=0)) if len(scores) else scores
+
+
+def _prewhitened(blocks: Array) -> LongRun:
+    """Bartlett on AR(1)-whitened blocks, recoloured (Andrews and Monahan 1992).
+
+    The mean period is short, and the fit has taken from it what lies along the regressor: its sum is zero. Without
+    whitening the kernel then finds 0.6 to 0.8 of the true spread.
+    """
+    power = np.sum(blocks[:-1] ** 2, axis=0)
+    memory = np.sum(blocks[1:] * blocks[:-1], axis=0) / np.maximum(power, np.finfo(float).tiny)
+    memory = np.clip(memory, -0.97, 0.97)
+    whitened = _bartlett(np.vstack([blocks[:1], blocks[1:] - memory * blocks[:-1]]))
+    colour = 1 / (1 - memory)
+    slowest = float(np.abs(memory).max())
+    degrees = whitened.degrees_of_freedom * (1 - slowest) / (1 + slowest)
+    return LongRun(whitened.covariance * np.outer(colour, colour), degrees)
 
 
 def _bartlett(blocks: Array) -> LongRun:

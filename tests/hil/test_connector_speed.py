@@ -45,7 +45,7 @@ def test_master_bus_firmware_and_recorder_cost_less_than_the_physics(
             lambda k: master.exchange([0.3 * math.sin(0.05 * k + wheel) for wheel in range(4)]), CYCLES
         )
     with capsys.disabled():
-        print(f"\nconnector {connector * 1e6:.0f} us a cycle, physics {physics * 1e6:.0f} us a cycle")  # noqa: T201  # the numbers are what `make bench` is for
+        print(f"\nconnector {connector * 1e6:.0f} us a cycle, physics {physics * 1e6:.0f} us a cycle")
     assert connector < physics
 
 
@@ -64,6 +64,6 @@ def test_two_hundred_seconds_of_frames_decode_in_two_seconds_of_cpu(
     decoded = decode_log(path, network)
     spent = time.process_time() - start
     with capsys.disabled():
-        print(f"\n{len(decoded.time)} cycles decoded in {spent:.2f} s")  # noqa: T201  # the numbers are what `make bench` is for
+        print(f"\n{len(decoded.time)} cycles decoded in {spent:.2f} s")  # the numbers are what `make bench` is for
     assert len(decoded.time) == 100_000
     assert spent < 2.0
