@@ -13,6 +13,7 @@ from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.network import DeviceNetwork
 from hil.clock import Clock
 from hil.network import DEFAULT_NETWORK, load_network
+from hil.realtime import steady_memory
 
 _IDLE = 0.001
 """Longest time without looking at the clock [s]: one step of the physics engine."""
@@ -75,12 +76,13 @@ class VehicleServer:
 
     def serve(self, stop: Callable[[], bool]) -> ServingReport:
         """Serve until `stop()`, which is asked at least every millisecond of idleness."""
-        while not stop():
-            message = self._bus.recv(_IDLE)
-            if message is None:
-                self._follow_clock()
-            elif not (message.is_extended_id or message.is_remote_frame or message.is_error_frame):
-                self._take(message.arbitration_id, bytes(message.data))
+        with steady_memory():
+            while not stop():
+                message = self._bus.recv(_IDLE)
+                if message is None:
+                    self._follow_clock()
+                elif not (message.is_extended_id or message.is_remote_frame or message.is_error_frame):
+                    self._take(message.arbitration_id, bytes(message.data))
         return self.report
 
     def _take(self, can_id: int, data: bytes) -> None:

@@ -16,6 +16,7 @@ from hil.campaign.reading import read_run
 from hil.clock import Clock
 from hil.master.master import Master
 from hil.network import Network
+from hil.realtime import steady_memory
 from hil.recorder import Recorder, finished_steps
 from ident.campaign.controller import Controller
 from ident.campaign.reference import Reference
@@ -115,7 +116,7 @@ class CampaignRunner:
     def _drive_session(self, steps: Sequence[Step]) -> None:
         """Boot, drive some steps, shut down. Whatever takes long is computed before: enabled drives want a SYNC."""
         references = [self._plan.reference(step, self._parameters(step)) for step in steps]
-        with self._master() as master:
+        with steady_memory(), self._master() as master:
             master.boot()
             master.enable()
             for reference in references:
