@@ -1,46 +1,32 @@
-"""The command line: composes vehicle, bus, campaign, estimate and report. Everything it does lives elsewhere."""
+"""The command line: the composition root. What the commands do lives in `hil.workflow`."""
 
 from __future__ import annotations
 
 import contextlib
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
-from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any
+from types import ModuleType
+from typing import Annotated
 
-import numpy as np
+import can
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from hil.buses.opening import open_bus
-from hil.campaign.folder import Run, RunFolder, create_run, network_file_of, open_run, refuse_used
-from hil.campaign.reading import join, read_any, read_run
-from hil.campaign.runner import CampaignRunner, Operator, check_network
-from hil.clock import Clock, FreeRunningClock, WallClock
+from hil import workflow
+from hil.buses import open_bus
+from hil.campaign.folder import RunFolder, network_file_of, open_run
+from hil.clock import FreeRunningClock, WallClock
 from hil.network import load_network
-from hil.recorder import LogFormat, Recorder
-from ident.campaign.plan import Plan, make_plan
-from ident.campaign.steps import ORDER
-from ident.errors import BusError, CampaignError, UserError
-from ident.estimate.identify import Identification, KnownInertia, identify
-from ident.estimate.result_file import write_parameters
-from ident.records.record import Record, Step
-from ident.report.html import ReportContent, write_report
-from ident.report.tables import (
-    condition_line,
-    excitation_table,
-    loop_table,
-    paper_table,
-    parameter_table,
-    room_table,
-    step_table,
-)
-from ident.vehicle.description import VehicleDescription, find_data_file, load_vehicle
+from hil.recorder import LogFormat
+from hil.workflow import HumanOperator, Order
+from ident.campaign.steps import ORDER, PERIODS
+from ident.errors import BusError, UserError
+from ident.estimate.identify import KnownInertia
+from ident.records.record import Step
 from ident.vehicle.parameters import Parameters
 
 app = typer.Typer(
@@ -53,10 +39,7 @@ app = typer.Typer(
 console = Console()
 errors = Console(stderr=True)
 
-PAPER_PROTOTYPE = "prototype"
-"""Name of the vehicle that Table 2 of the paper describes."""
-
-DEFAULT_STEPS = tuple(step for step in ORDER if step is not Step.LATERAL)
+LOCKSTEP = "emulator, in lockstep"
 
 VehicleOption = Annotated[
     str, typer.Option("--vehicle", help="Vehicle file: `prototype`, `compact`, or the path of your own.")
@@ -69,6 +52,7 @@ InertiaStdOption = Annotated[
     float | None, typer.Option("--b-w-std", help="Standard deviation of the B_w given [kg m²]; needed with --b-w.")
 ]
 SeedOption = Annotated[int, typer.Option(help="Seed of the excitation and of all emulated noise.")]
+GuiOption = Annotated[bool, typer.Option("--gui", help="Show the emulated vehicle in a window.")]
 
 
 class Stand(StrEnum):
@@ -83,12 +67,13 @@ def demo(
     out: Annotated[Path, typer.Option(help="Run folder to write.")] = Path("runs/demo"),
     vehicle: VehicleOption = "prototype",
     seed: SeedOption = 1,
-    gui: Annotated[bool, typer.Option("--gui", help="Show the vehicle in a window.")] = False,
+    gui: GuiOption = False,
 ) -> None:
     """The whole story on the emulator: boot, four steps, parameters beside the truth, lane change, report."""
-    _replace_previous(out)
-    _campaign_on_emulator(out, vehicle, None, seed, DEFAULT_STEPS, 4, LogFormat.BLF, None, gui, resume=False)
-    _identify_run(out, compare_with_truth=True)
+    _clear_previous(out)
+    order = Order(out, vehicle, None, _steps((), False, None), PERIODS, seed, None, LogFormat.BLF, LOCKSTEP, vehicle)
+    _drive_on_emulator(order, gui, resume=False)
+    workflow.identify_run(out, out, None, _truth(vehicle), console)
 
 
 @app.command()
@@ -102,7 +87,7 @@ def campaign(
     network: NetworkOption = None,
     skip: Annotated[list[Step] | None, typer.Option(help="Leave out a step; repeat the option for more.")] = None,
     lateral: Annotated[bool, typer.Option("--lateral", help="Drive the optional lateral step too.")] = False,
-    periods: Annotated[int, typer.Option(help="Repeats of every excitation, at least 4.")] = 4,
+    periods: Annotated[int, typer.Option(help="Repeats of every excitation, at least 4.")] = PERIODS,
     seed: SeedOption = 1,
     b_w: InertiaOption = None,
     b_w_std: InertiaStdOption = None,
@@ -112,27 +97,25 @@ def campaign(
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="With --bus: the other side is an emulator that SYNC moves.")
     ] = False,
-    gui: Annotated[bool, typer.Option("--gui", help="Show the emulated vehicle in a window.")] = False,
+    gui: GuiOption = False,
 ) -> None:
     """Drive the identification steps and record every frame; on the emulator, or with --bus on a real vehicle.
 
     Nothing moves before all six nodes have answered with the expected identity, mode and units, and you have seen
     the room it takes. A run that was stopped keeps its finished steps: go on with --resume.
     """
-    steps = _steps(skip or [], lateral, b_w)
-    inertia = _known_inertia(b_w, b_w_std)
+    steps, inertia = _steps(skip or (), lateral, b_w), _known_inertia(b_w, b_w_std)
+    prototype, where = (vehicle, LOCKSTEP) if bus is None else ("", bus)
+    order = Order(out, vehicle, network, steps, periods, seed, inertia, log_format, where, prototype)
     if bus is None:
-        _campaign_on_emulator(out, vehicle, network, seed, steps, periods, log_format, inertia, gui, resume)
+        _drive_on_emulator(order, gui, resume)
     else:
-        run = _prepare(out, vehicle, network, seed, steps, periods, inertia, bus, "", resume)
-        clock: Clock = FreeRunningClock() if lockstep else WallClock()
-        with contextlib.closing(_Shut(open_bus(bus, run.network.bit_rate))) as opened:
-            _drive(run, opened.bus, clock, HumanOperator(), log_format, vehicle, ask=not yes)
+        _drive_on_bus(order, bus, ask=not yes, lockstep=lockstep, resume=resume)
     console.print(f"Next: [bold]quasiomni identify {out}[/bold]")
 
 
-@app.command(name="identify")
-def identify_command(
+@app.command()
+def identify(
     records: Annotated[
         list[Path], typer.Argument(help="Run folder, logs named NNN_step.blf, or CSV, Parquet or MF4 records.")
     ],
@@ -147,13 +130,9 @@ def identify_command(
     """Identify the parameters from recorded frames or records alone; writes parameters.toml and report.html."""
     inertia = _known_inertia(b_w, b_w_std)
     if len(records) == 1 and RunFolder(records[0]).manifest.is_file():
-        _identify_run(records[0], compare_with_truth=False, inertia=inertia, out=out)
-        return
-    described = load_vehicle(vehicle)
-    joined = join([read_any(path, load_network(_network_file(vehicle, network))) for path in records])
-    _identify(
-        joined, described, inertia, out or Path(), {"record": joined.source, "vehicle": described.name}, None, None
-    )
+        workflow.identify_run(records[0], out or records[0], inertia, None, console)
+    else:
+        workflow.identify_records(records, vehicle, network, inertia, out or Path(), console)
 
 
 @app.command()
@@ -162,13 +141,8 @@ def report(
     out: Annotated[Path | None, typer.Option(help="File to write. Default: report.html in the run folder.")] = None,
 ) -> None:
     """Write the HTML report of a run again, from its frames."""
-    target = out or RunFolder(run).report
-    opened = open_run(run)
-    record = _read_run(run)
-    result = identify(record, opened.plan.vehicle.geometry, known_inertia=opened.known_inertia)
-    content = _content(record, result, opened.plan.vehicle, _provenance(opened), _truth(opened), opened.plan)
-    write_report(content, target)
-    console.print(f"Written: {target}")
+    prototype = open_run(run).prototype
+    workflow.report_run(run, out or RunFolder(run).report, _truth(prototype) if prototype else None, console)
 
 
 @app.command()
@@ -177,61 +151,75 @@ def emulate(
     prototype: Annotated[str, typer.Option(help="`prototype`, `compact`, or the path of your own.")] = "prototype",
     network: NetworkOption = None,
     seed: SeedOption = 1,
-    stand: Annotated[
-        Stand, typer.Option(help="On the floor, or on the jack-stand with its wheels free.")
-    ] = Stand.FLOOR,
+    stand: Annotated[Stand, typer.Option(help="On the floor, or on the jack-stand, wheels free.")] = Stand.FLOOR,
     lockstep: Annotated[bool, typer.Option("--lockstep", help="Time moves with the master's SYNC.")] = False,
     duration: Annotated[float | None, typer.Option(help="Stop after so many seconds of wall time.")] = None,
-    gui: Annotated[bool, typer.Option("--gui", help="Show the vehicle in a window.")] = False,
+    gui: GuiOption = False,
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
-    emulator = _emulator()
-    network_file = _network_file(prototype, network)
+    emulation = _emulation()
+    network_file = network or network_file_of(prototype)
     end = None if duration is None else time.monotonic() + duration
     with (
-        emulator.vehicle(prototype, seed, gui) as vehicle,
-        emulator.server_bus(bus, load_network(network_file)) as opened,
+        emulation.vehicle(prototype, seed, gui) as vehicle,
+        emulation.server_bus(bus, load_network(network_file)) as opened,
     ):
         if stand is Stand.JACK:
             vehicle.lift()
         console.print(f"{prototype} is up on {bus}, {'in lockstep' if lockstep else 'in real time'}. Ctrl-C ends it.")
-        server = emulator.server(vehicle, opened, WallClock(), network_file, lockstep)
+        server = emulation.server(vehicle, opened, WallClock(), network_file, lockstep)
         with contextlib.suppress(KeyboardInterrupt):
             server.serve(lambda: end is not None and time.monotonic() > end)
         served = server.report
     console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
 
 
-class HumanOperator:
-    """Asks the person beside the vehicle to lift and lower it."""
-
-    def lift(self) -> None:
-        """Ask for the jack-stand."""
-        self._ask("Put the vehicle on its jack-stand, all four wheels free to turn")
-
-    def lower(self) -> None:
-        """Ask for the floor."""
-        self._ask("Put the vehicle on the floor, wheels about straight ahead")
-
-    def _ask(self, what: str) -> None:
-        if not sys.stdin.isatty():
-            raise CampaignError(
-                f"{what}: that needs a person at a terminal.", "Or give B_w: --b-w VALUE --b-w-std STD."
-            )
-        console.input(f"[bold]{what}[/bold], then press Enter. ")
+def _drive_on_emulator(order: Order, gui: bool, resume: bool) -> None:
+    run = open_run(order.out) if resume else workflow.plan_run(order, console)
+    if not run.prototype:
+        raise UserError(
+            f"{order.out} was driven on {run.bus}, not on the emulator.", f"Go on with it there: --bus {run.bus}."
+        )
+    emulation = _emulation()
+    with emulation.bench(run.prototype, run.seed, gui, run.network.path) as bench, _stop_is_no_error(order.out):
+        workflow.drive_run(run, order, bench.bus, bench.clock, bench.operator, console, lambda: True)
 
 
-class _Shut:
-    """A bus whose `close` takes it off the wire."""
+def _drive_on_bus(order: Order, name: str, *, ask: bool, lockstep: bool, resume: bool) -> None:
+    run = open_run(order.out) if resume else workflow.plan_run(order, console)
+    if run.prototype:
+        raise UserError(
+            f"{order.out} was driven on the emulator.", "Go on with it without --bus, or take another --out."
+        )
 
-    def __init__(self, bus: Any) -> None:
-        self.bus = bus
+    def may_move() -> bool:
+        return not ask or typer.confirm("The vehicle will move. Is the floor free, a hand at the emergency stop?")
 
-    def close(self) -> None:
-        self.bus.shutdown()
+    clock = FreeRunningClock() if lockstep else WallClock()
+    with _opened(name, run.network.bit_rate) as bus, _stop_is_no_error(order.out):
+        if not workflow.drive_run(run, order, bus, clock, HumanOperator(console), console, may_move):
+            raise typer.Exit(code=1)
 
 
-def _emulator() -> Any:
+@contextmanager
+def _opened(name: str, bit_rate: float) -> Iterator[can.BusABC]:
+    bus = open_bus(name, bit_rate)
+    try:
+        yield bus
+    finally:
+        bus.shutdown()
+
+
+@contextmanager
+def _stop_is_no_error(out: Path) -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt:
+        errors.print(f"Stopped, drives off. Finished steps are kept: go on with [bold]--resume --out {out}[/bold].")
+        raise typer.Exit(code=130) from None
+
+
+def _emulation() -> ModuleType:
     """The emulated side, loaded only where it is asked for."""
     try:
         from hil import emulation
@@ -242,163 +230,10 @@ def _emulator() -> Any:
     return emulation
 
 
-def _campaign_on_emulator(
-    out: Path,
-    vehicle: str,
-    network: Path | None,
-    seed: int,
-    steps: Sequence[Step],
-    periods: int,
-    log_format: LogFormat,
-    inertia: KnownInertia | None,
-    gui: bool,
-    resume: bool,
-) -> None:
-    emulator = _emulator()
-    run = _prepare(out, vehicle, network, seed, steps, periods, inertia, "emulator, in lockstep", vehicle, resume)
-    with emulator.bench(run.prototype, run.seed, gui, run.network.path) as bench:
-        _drive(run, bench.bus, bench.clock, bench.operator, log_format, vehicle, ask=False)
-
-
-def _prepare(
-    out: Path,
-    vehicle: str,
-    network: Path | None,
-    seed: int,
-    steps: Sequence[Step],
-    periods: int,
-    inertia: KnownInertia | None,
-    bus: str,
-    prototype: str,
-    resume: bool,
-) -> Run:
-    if resume:
-        return open_run(out)
-    refuse_used(RunFolder(out))
-    described, network_file = load_vehicle(vehicle), _network_file(vehicle, network)
-    loaded = load_network(network_file)
-    plan = _plan(described, steps, periods, loaded.cycle_period, seed)
-    return Run(RunFolder(out), plan, loaded, seed, bus, prototype, inertia)
-
-
-def _plan(vehicle: VehicleDescription, steps: Sequence[Step], periods: int, cycle: float, seed: int) -> Plan:
-    with _progress() as bars:
-        task = bars.add_task("optimising the excitation", total=sum(step is not Step.LANE_CHANGE for step in steps))
-        return make_plan(
-            vehicle,
-            np.random.default_rng(seed),
-            steps=steps,
-            periods=periods,
-            cycle=cycle,
-            progress=lambda _: bars.advance(task),
-        )
-
-
-def _drive(
-    run: Run, bus: Any, clock: Clock, operator: Operator, log_format: LogFormat, vehicle: str, *, ask: bool
-) -> None:
-    """Check, ask, and only then make the run folder and move."""
-    console.print(loop_table(run.plan), room_table(run.plan))
-    with console.status("looking for the six nodes"):
-        check_network(bus, clock, run.network)
-    console.print("All six nodes answer: identity, mode and units are those of the network file.")
-    if ask and not typer.confirm("The vehicle will move. Is the floor free, and a hand at the emergency stop?"):
-        raise typer.Exit(code=1)
-    if not run.folder.manifest.is_file():
-        create_run(run, find_data_file("ident.vehicle", vehicle))
-    recorder = Recorder(run.folder.frames, log_format)
-    try:
-        with _progress() as bars:
-            runner = CampaignRunner(run, bus, clock, recorder, operator, _bar(bars))
-            runner.drive()
-    except KeyboardInterrupt:
-        errors.print(f"Stopped. Finished steps are kept: go on with [bold]--resume --out {run.folder.path}[/bold].")
-        raise typer.Exit(code=130) from None
-    finally:
-        recorder.close()
-    if runner.overruns:
-        errors.print(f"[yellow]{runner.overruns} cycles began late: close other programs on this computer.[/yellow]")
-
-
-def _bar(bars: Progress) -> Callable[[str, int, int], None]:
-    tasks: dict[str, Any] = {}
-
-    def show(step: str, done: int, total: int) -> None:
-        if step not in tasks:
-            tasks[step] = bars.add_task(step, total=total)
-        bars.update(tasks[step], completed=done, total=total)
-
-    return show
-
-
-def _identify_run(
-    folder: Path, *, compare_with_truth: bool, inertia: KnownInertia | None = None, out: Path | None = None
-) -> None:
-    run = open_run(folder)
-    truth = _truth(run) if compare_with_truth else None
-    record = _read_run(folder)
-    _identify(record, run.plan.vehicle, inertia or run.known_inertia, out or folder, _provenance(run), truth, run.plan)
-
-
-def _identify(
-    record: Record,
-    vehicle: VehicleDescription,
-    inertia: KnownInertia | None,
-    out: Path,
-    provenance: dict[str, str],
-    truth: Parameters | None,
-    plan: Plan | None,
-) -> None:
-    with console.status("identifying"):
-        result = identify(record, vehicle.geometry, known_inertia=inertia)
-    console.print(parameter_table(result, truth), excitation_table(result), step_table(result))
-    if _is_paper_prototype(vehicle):
-        console.print(paper_table(result))
-    console.print(condition_line(result))
-    out.mkdir(parents=True, exist_ok=True)
-    write_parameters(result, out / "parameters.toml", provenance)
-    with console.status("writing the report"):
-        write_report(_content(record, result, vehicle, provenance, truth, plan), out / "report.html")
-    console.print(f"Written: {out / 'parameters.toml'}, {out / 'report.html'}")
-
-
-def _content(
-    record: Record,
-    result: Identification,
-    vehicle: VehicleDescription,
-    provenance: dict[str, str],
-    truth: Parameters | None,
-    plan: Plan | None,
-) -> ReportContent:
-    title = f"Identification of {vehicle.name}"
-    return ReportContent(
-        title, result, record, vehicle, truth, plan, provenance, warnings=(), paper=_is_paper_prototype(vehicle)
-    )
-
-
-def _is_paper_prototype(vehicle: VehicleDescription) -> bool:
-    """Whether Table 2 of the paper has anything to say about the vehicle."""
-    return vehicle.name == PAPER_PROTOTYPE
-
-
-def _read_run(folder: Path) -> Record:
-    with console.status("decoding the frames"):
-        return read_run(folder)
-
-
-def _provenance(run: Run) -> dict[str, str]:
-    return {
-        "run": run.folder.path.name,
-        "vehicle": run.plan.vehicle.name,
-        "bus": run.bus,
-        "seed": str(run.seed),
-        "quasiomni": version("quasiomni"),
-    }
-
-
-def _truth(run: Run) -> Parameters | None:
-    """What the emulator was built with; None for a real vehicle."""
-    return _emulator().truth(run.prototype) if run.prototype else None
+def _truth(prototype: str) -> Parameters:
+    """What the emulated prototype was built with."""
+    truth: Parameters = _emulation().truth(prototype)
+    return truth
 
 
 def _steps(skip: Sequence[Step], lateral: bool, b_w: float | None) -> tuple[Step, ...]:
@@ -416,12 +251,8 @@ def _known_inertia(value: float | None, std: float | None) -> KnownInertia | Non
     return KnownInertia(value, std, "given")
 
 
-def _network_file(vehicle: str, network: Path | None) -> Path:
-    return network if network is not None else network_file_of(vehicle)
-
-
-def _replace_previous(out: Path) -> None:
-    """The demo starts afresh: files of an earlier demo go, anything else stays."""
+def _clear_previous(out: Path) -> None:
+    """The demo starts afresh: logs and manifest of an earlier demo go, anything else stays."""
     folder = RunFolder(out)
     if folder.manifest.is_file():
         for log in folder.frames.glob("[0-9][0-9][0-9]_*"):
@@ -429,15 +260,8 @@ def _replace_previous(out: Path) -> None:
         folder.manifest.unlink()
 
 
-@contextmanager
-def _progress() -> Iterator[Progress]:
-    columns = (SpinnerColumn(), TextColumn("{task.description:<24}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as bars:
-        yield bars
-
-
 def main() -> None:
-    """Entry point: user errors become one line each and exit code 2."""
+    """Entry point: user errors become two lines and exit code 2."""
     try:
         app()
     except UserError as error:
