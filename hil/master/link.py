@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 
 import can
 import canopen
@@ -33,6 +34,17 @@ class Link(canopen.Network):
         self._can = bus
         self._clock = clock
         self._tap = tap
+
+    @contextlib.contextmanager
+    def record_may_fail(self) -> Iterator[None]:
+        """Inside, frames pass even when the tap raises: on a full disk the drives must still be stopped."""
+        tap = self._tap
+        if tap is not None:
+            self._tap = _forgiving(tap)
+        try:
+            yield
+        finally:
+            self._tap = tap
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         """Send a data frame; called by canopen's SDO and NMT services too."""
@@ -87,6 +99,14 @@ class Link(canopen.Network):
         """Dispatch what has arrived, without waiting."""
         while (message := self.receive(0.0)) is not None:
             self.dispatch(message)
+
+
+def _forgiving(tap: Tap) -> Tap:
+    def tapped(message: can.Message) -> None:
+        with contextlib.suppress(Exception):
+            tap(message)
+
+    return tapped
 
 
 def _failed(error: can.CanError) -> BusError:

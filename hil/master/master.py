@@ -160,13 +160,19 @@ class Master:
         self._started = False
 
     def emergency_stop(self) -> None:
-        """Quick stop for every drive, whoever still answers; then all nodes pre-operational."""
+        """Quick stop for every drive, whoever still answers and whether or not it can be recorded; then all nodes
+        pre-operational.
+        """
         for command in self._cycle.commands:
             command.set_torque(0.0)
             command.set_controlword(QUICK_STOP)
-        for _ in range(round(_STOP_TIME / self._network.cycle_period)):
-            self._cycle.sync_only()
-        self._command_nmt(_NMT_PRE_OPERATIONAL)
+        with self._link.record_may_fail():
+            for _ in range(round(_STOP_TIME / self._network.cycle_period)):
+                # A frame that the interface refuses now may pass a cycle later.
+                with contextlib.suppress(BusError):
+                    self._cycle.sync_only()
+            with contextlib.suppress(BusError):
+                self._command_nmt(_NMT_PRE_OPERATIONAL)
         self._started = self._enabled = False
 
     def __enter__(self) -> Self:
@@ -175,12 +181,18 @@ class Master:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is None:
+        if kind is not None:
+            self._stop_if_started()
+            return
+        try:
             self.shut_down()
-        elif self._started:
-            # The error that is on its way out is the one to report.
-            with contextlib.suppress(BusError):
-                self.emergency_stop()
+        except BaseException:
+            self._stop_if_started()
+            raise
+
+    def _stop_if_started(self) -> None:
+        if self._started:
+            self.emergency_stop()
 
     def _exchange(self, motor_torques: Sequence[float]) -> Sample:
         self._torques = motor_torques
@@ -206,11 +218,19 @@ class Master:
             self._link.send_message(0, bytes((command, node.node_id)))
 
     def _state_error(self, node: Node, statusword: int, what: str) -> DriveStateError:
+        # The other drives go on with their last torque while the question about the error code is on its way.
+        self._stop_if_started()
         state = decode_state(statusword)
         label = state.label if state is not None else "in no known state"
-        code = self._access[node.node_id].read(0x603F)
         return DriveStateError(
-            f"{node.label} {what} is {label} (statusword {statusword:04X}h, error code 603Fh = {code:04X}h"
+            f"{node.label} {what} is {label} (statusword {statusword:04X}h, error code 603Fh {self._error_code(node)}"
             f"{self._supervision.emergency(node)}).",
             "Look the error code up in the drive's manual, remove the cause and start again.",
         )
+
+    def _error_code(self, node: Node) -> str:
+        """What 603Fh holds; a drive that does not tell must not hide the state that it is in."""
+        try:
+            return f"= {self._access[node.node_id].read(0x603F):04X}h"
+        except BusError:
+            return "cannot be read"

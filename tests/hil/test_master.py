@@ -25,7 +25,7 @@ from hil.master.errors import (
     UnitsError,
 )
 from hil.network import Network, load_network
-from ident.errors import BusError
+from ident.errors import BusError, RecordError
 
 STILL = (0.0, 0.0, 0.0, 0.0)
 INERTIA = FRICTION = 1e-3
@@ -164,6 +164,73 @@ def test_an_error_in_the_program_stops_the_drives(bench, network, flywheels) -> 
     with pytest.raises(ZeroDivisionError), master:
         raise ZeroDivisionError
     assert not any(drive.enabled for drive in flywheels.drives)
+
+
+def test_a_disk_that_is_full_stops_the_drives_all_the_same(bench, network, flywheels) -> None:
+    written = 0
+
+    def fill_the_disk(message: can.Message) -> None:
+        nonlocal written
+        written += 1
+        if written > 1000:
+            raise RecordError("full", "free some space")
+
+    def campaign() -> None:
+        with Master(bench.bus, bench.clock, network, fill_the_disk) as master:
+            master.boot()
+            master.enable()
+            drive(master, 1000, torque=1.0)
+
+    with pytest.raises(RecordError):
+        campaign()
+    assert not any(drive.enabled for drive in flywheels.drives)
+
+
+def test_a_bus_that_refuses_some_frames_does_not_keep_the_drives_from_being_stopped(
+    bench, network, flywheels, monkeypatch
+) -> None:
+    send, refused = bench.bus.send, iter([True] * 7)
+
+    def send_when_free(message: can.Message, timeout: float | None = None) -> None:
+        if next(refused, False):
+            raise can.CanOperationError("transmit buffer full")
+        send(message, timeout)
+
+    master = enabled(bench, network)
+    drive(master, 5, torque=1.0)
+    monkeypatch.setattr(bench.bus, "send", send_when_free)
+    with pytest.raises(ZeroDivisionError), master:
+        raise ZeroDivisionError
+    assert not any(drive.enabled for drive in flywheels.drives)
+
+
+def test_a_node_that_is_lost_during_the_orderly_end_does_not_leave_the_others_under_torque(
+    bench, network, flywheels
+) -> None:
+    master = enabled(bench, network)
+    drive(master, 5, torque=1.0)
+    with pytest.raises(NodeLostError, match=r"node 6"), master:
+        bench.devices.nodes[6].sync_frames = list
+    assert not any(drive.enabled for drive in flywheels.drives)
+
+
+def test_the_others_are_stopped_before_a_faulty_drive_is_asked_for_its_error(bench, network, flywheels) -> None:
+    """A drive that has lost its supply answers no SDO; its neighbours must not push on for the time-out."""
+    master = enabled(bench, network)
+    drive(master, 5, torque=0.5)
+    bench.devices.nodes[2].application.fail(0x3220)
+    object_access, still_enabled = master.object_access(network.drives[1]), []
+    read = object_access.read
+
+    def silent(index: int, subindex: int = 0) -> int:
+        still_enabled.append([drive.enabled for drive in flywheels.drives])
+        read(index, subindex)
+        raise MissingNodeError("silent", "look")
+
+    object_access.read = silent
+    with pytest.raises(DriveStateError, match=r"node 2 .*603Fh cannot be read"):
+        drive(master, 3, torque=0.5)
+    assert still_enabled == [[False] * 4]
 
 
 def test_the_master_never_needs_more_than_five_seconds_for_a_node_that_is_not_there(rewritten_network) -> None:
