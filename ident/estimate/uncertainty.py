@@ -22,6 +22,10 @@ BLOCK_TIME = 0.02
 """Scores are summed over blocks of this length first [s], well below the filter's memory."""
 
 
+SIGNIFICANCE = 0.95
+"""Confidence with which a pattern must exceed the noise before it counts as repeated model error."""
+
+
 @dataclass(frozen=True)
 class Scores:
     """xₜ eₜ of one coordinate of one segment, zero in dropped rows.
@@ -95,10 +99,28 @@ def _of_periods(folded: Array, sample_time: float) -> list[LongRun]:
     deviations = np.concatenate([_block_sums(period - mean, sample_time) for period in folded])
     noise = _bartlett(deviations)
     noise_total = noise.covariance * periods / (periods - 1)
-    pattern = _prewhitened(_block_sums(mean, sample_time))
-    repeated = periods**2 * pattern.covariance - noise_total
     degrees = noise.degrees_of_freedom * (periods - 1) / periods
-    return [LongRun(noise_total, degrees), LongRun(_positive_part(repeated), pattern.degrees_of_freedom)]
+    found = [LongRun(noise_total, degrees)]
+    if _repeats(folded, noise.degrees_of_freedom):
+        pattern = _prewhitened(_block_sums(mean, sample_time))
+        repeated = _positive_part(periods**2 * pattern.covariance - noise_total)
+        found.append(LongRun(repeated, pattern.degrees_of_freedom))
+    return found
+
+
+def _repeats(folded: Array, degrees: float) -> bool:
+    """Whether the mean period (P, T, n) is larger than noise alone would leave it: an F test.
+
+    Without the test, the noise of the mean period would be counted twice, and intervals under pure noise be half as
+    wide again as they need to be.
+    """
+    periods = len(folded)
+    between = folded.var(axis=0, ddof=1).mean(axis=0)
+    pattern = np.mean(folded.mean(axis=0) ** 2, axis=0)
+    driven = pattern > 0
+    smallest = np.finfo(float).eps * pattern[driven]
+    ratio = periods * float(np.mean(pattern[driven] / np.maximum(between[driven], smallest))) if driven.any() else 0.0
+    return ratio > float(stats.f.ppf(SIGNIFICANCE, degrees / periods, degrees * (periods - 1) / periods))
 
 
 def _positive_part(matrix: Array) -> Array:
