@@ -20,7 +20,7 @@ test-all: .venv/installed
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not bench"
 
 bench: .venv/installed
-	$(BIN)/python -m pytest -m bench --benchmark-disable-gc -s
+	$(BIN)/python -m pytest -m bench -s
 
 check: .venv/installed
 	$(BIN)/ruff check .

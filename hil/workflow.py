@@ -197,7 +197,9 @@ def report_run(folder: Path, target: Path, truth: Parameters | None, console: Co
         result = identify(record, vehicle.geometry, known_inertia=run.known_inertia)
     paper = vehicle.name == PAPER_PROTOTYPE
     title = f"Identification of {vehicle.name}"
-    write_report(ReportContent(title, result, record, vehicle, truth, run.plan, provenance_of(run), (), paper), target)
+    write_report(
+        ReportContent(title, result, record, vehicle, truth, run.plan, provenance_of(run), record.notes, paper), target
+    )
     console.print(f"Written: {target}")
 
 
@@ -229,11 +231,13 @@ def _identify(
     if paper:
         console.print(paper_table(result))
     console.print(condition_line(result))
+    for note in record.notes:
+        console.print(f"[yellow]{note}[/yellow]")
     out.mkdir(parents=True, exist_ok=True)
     write_parameters(result, out / "parameters.toml", provenance)
     title = f"Identification of {vehicle.name}"
     with console.status("writing the report"):
-        content = ReportContent(title, result, record, vehicle, truth, plan, provenance, (), paper)
+        content = ReportContent(title, result, record, vehicle, truth, plan, provenance, record.notes, paper)
         write_report(content, out / "report.html")
     console.print(f"Written: {out / 'parameters.toml'}, {out / 'report.html'}")
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.campaign.folder import RunFolder, open_run
-from hil.frames import decode_log
+from hil.frames import DecodedLog, decode_log
 from hil.network import Network
 from hil.recorder import LogFormat, finished_steps, step_of
 from ident.campaign.plan import Plan
@@ -29,8 +29,7 @@ def read_run(path: Path) -> Record:
     logs = finished_steps(RunFolder(path).frames)
     if not logs:
         raise RecordError(f"{path} holds no finished step.", "Drive the campaign, or go on with it (--resume).")
-    segments = [_segment(step, log, run.network, run.plan) for step, log in logs]
-    return Record(segments, str(path))
+    return _record(logs, run.network, run.plan, str(path))
 
 
 def read_logs(paths: Sequence[Path], network: Network) -> Record:
@@ -39,13 +38,13 @@ def read_logs(paths: Sequence[Path], network: Network) -> Record:
     Raises:
         RecordError: a name does not tell the step, or a log cannot be used.
     """
-    segments = []
+    logs = []
     for path in paths:
         step = step_of(path)
         if step is None:
             raise RecordError(f"{path} does not tell which step it holds.", "Name it like 003_straight.blf.")
-        segments.append(_segment(step, path, network, None))
-    return Record(segments, ", ".join(str(path) for path in paths))
+        logs.append((step, path))
+    return _record(logs, network, None, ", ".join(str(path) for path in paths))
 
 
 def read_any(path: Path, network: Network) -> Record:
@@ -72,11 +71,26 @@ def read_any(path: Path, network: Network) -> Record:
 def join(records: Sequence[Record]) -> Record:
     """All segments of several records behind each other."""
     segments = [segment for record in records for segment in record.segments]
-    return Record(segments, ", ".join(record.source for record in records))
+    notes = tuple(note for record in records for note in record.notes)
+    return Record(segments, ", ".join(record.source for record in records), notes)
 
 
-def _segment(step: str, path: Path, network: Network, plan: Plan | None) -> Segment:
-    log = decode_log(path, network)
+def _record(logs: Sequence[tuple[str, Path]], network: Network, plan: Plan | None, source: str) -> Record:
+    decoded = [(step, path, decode_log(path, network)) for step, path in logs]
+    notes = tuple(note for _, path, log in decoded if (note := _note(path, log)))
+    return Record([_segment(step, path, log, network, plan) for step, path, log in decoded], source, notes)
+
+
+def _note(path: Path, log: DecodedLog) -> str:
+    if not log.resampled:
+        return ""
+    return (
+        f"{path.name}: the master did not keep its cycle ({log.missing} cycles left out, others up to "
+        f"{log.jitter * 1e3:.2f} ms off); its samples are interpolated to the grid."
+    )
+
+
+def _segment(step: str, path: Path, log: DecodedLog, network: Network, plan: Plan | None) -> Segment:
     return make_segment(
         Segment(
             step=step,

@@ -80,10 +80,12 @@ class Record:
     Attributes:
         segments: non-empty.
         source: where the record was read from, for messages.
+        notes: what a reader had to repair, for people.
     """
 
     segments: Sequence[Segment]
     source: str = "record"
+    notes: tuple[str, ...] = ()
 
     def of(self, step: str) -> Iterator[Segment]:
         """Segments of one step."""
