@@ -8,9 +8,10 @@ from typing import Any
 
 import canopen
 
+from hil.network.checks import check_complete, check_network, check_positive
 from hil.network.description import DRIVES, Identity, MappedObject, Network, Node, Pdo, PdoDirection, Role
 from ident.errors import DataFileError
-from ident.vehicle.quantities import read_quantities, read_toml, require_table
+from ident.vehicle.quantities import Quantity, read_quantities, read_toml, require_table
 
 DEFAULT_NETWORK = Path(__file__).parent.parent / "data" / "network.toml"
 
@@ -22,6 +23,7 @@ _COMMON_UNITS = {
 }
 _DRIVE_UNITS = {"rated_torque": "Nm", **_COMMON_UNITS}
 _ENCODER_UNITS = {"measuring_range": "1", **_COMMON_UNITS}
+_BUS_UNITS = {"bit_rate": "bit/s", "cycle_period": "s"}
 _MASTER_UNITS = dict.fromkeys(
     ("heartbeat_period", "boot_timeout", "sdo_timeout", "sample_timeout", "state_timeout"), "s"
 )
@@ -43,12 +45,12 @@ def load_network(path: Path = DEFAULT_NETWORK) -> Network:
             cannot be.
     """
     document = read_toml(path)
-    bus = read_quantities(require_table(document, "bus", path), {"bit_rate": "bit/s", "cycle_period": "s"}, "bus")
+    bus = _read_positive(document, "bus", _BUS_UNITS, path, f"{path}: bus")
     master = require_table(document, "master", path)
-    times = read_quantities(require_table(master, "times", path), _MASTER_UNITS, "master.times")
+    times = _read_positive(master, "times", _MASTER_UNITS, path, f"{path}: master.times")
     devices = require_table(document, "devices", path)
     nodes = tuple(_read_node(entry, devices, path) for entry in document.get("nodes", ()))
-    _check_complete(nodes, path)
+    check_complete(nodes, path)
     network = Network(
         name=str(document.get("name", path.stem)),
         path=path,
@@ -59,25 +61,16 @@ def load_network(path: Path = DEFAULT_NETWORK) -> Network:
         times={name: quantity.value for name, quantity in times.items()},
         nodes=nodes,
     )
-    if network.worst_bus_load > 1.0:
-        raise DataFileError(
-            f"{path}: the PDOs of a cycle need up to {network.worst_bus_load:.0%} of the bus.",
-            "Map fewer objects, make the cycle longer, or raise the bit rate.",
-        )
+    check_network(network)
     return network
 
 
-def _check_complete(nodes: Sequence[Node], path: Path) -> None:
-    for what in ("role", "node_id"):
-        found = [getattr(node, what) for node in nodes]
-        doubled = {item for item in found if found.count(item) > 1}
-        if doubled:
-            raise DataFileError(
-                f"{path}: {what} {', '.join(map(str, doubled))} is given twice.", "Give each node its own."
-            )
-    missing = [role for role in Role if role not in {node.role for node in nodes}]
-    if missing:
-        raise DataFileError(f"{path} has no node for {', '.join(missing)}.", "Add a [[nodes]] entry for each.")
+def _read_positive(
+    parent: Mapping[str, Any], name: str, units: Mapping[str, str], path: Path, where: str
+) -> dict[str, Quantity]:
+    quantities = read_quantities(require_table(parent, name, path), units, where)
+    check_positive({key: quantity.value for key, quantity in quantities.items()}, where)
+    return quantities
 
 
 def _read_integer(table: Mapping[str, Any], name: str, low: int, high: int, where: str) -> int:
@@ -111,7 +104,7 @@ def _read_node(entry: Mapping[str, Any], devices: Mapping[str, Any], path: Path)
         identity=_read_identity(device, where),
         rotation=rotation,
         zero_counts=_read_integer(entry, "zero_counts", -(2**31), 2**32 - 1, where),
-        quantities=read_quantities(require_table(device, "quantities", path), units, where),
+        quantities=_read_positive(device, "quantities", units, path, where),
         pdos=pdos,
     )
 
@@ -132,11 +125,15 @@ def _read_identity(device: Mapping[str, Any], where: str) -> Identity:
 
 
 def _read_pdo(entry: Mapping[str, Any], dictionary: canopen.ObjectDictionary, where: str) -> Pdo:
+    if entry.get("direction") not in tuple(PdoDirection):
+        raise DataFileError(
+            f"{where}: a PDO has direction {entry.get('direction')!r}.", f"Use one of {', '.join(PdoDirection)}."
+        )
     pdo = Pdo(
         direction=PdoDirection(entry["direction"]),
         number=_read_integer(entry, "number", 1, 4, where),
         transmission_type=_read_integer(entry, "transmission_type", 1, 240, where),
-        objects=tuple(_read_object(item, dictionary, where) for item in entry["objects"]),
+        objects=tuple(_read_object(item, dictionary, where) for item in entry.get("objects", ())),
     )
     if sum(item.bits for item in pdo.objects) > 64:
         raise DataFileError(f"{where}: PDO {pdo.number} is longer than 8 bytes.", "Split it into two PDOs.")
@@ -144,16 +141,17 @@ def _read_pdo(entry: Mapping[str, Any], dictionary: canopen.ObjectDictionary, wh
 
 
 def _read_object(item: Mapping[str, Any], dictionary: canopen.ObjectDictionary, where: str) -> MappedObject:
-    index, subindex = item["index"], item.get("subindex", 0)
+    index = _read_integer(item, "index", 0x1000, 0xFFFF, f"{where}, PDO object {item.get('name')!r}")
+    subindex = _read_integer({"subindex": 0, **item}, "subindex", 0, 0xFF, f"{where}, {index:04X}h")
     variable = dictionary.get_variable(index, subindex)
     if variable is None or variable.data_type not in _STRUCT_CODES or not variable.pdo_mappable:
         raise DataFileError(f"{where}: {index:04X}h:{subindex} cannot be mapped.", "Choose from the EDS file.")
-    if variable.name != item["name"]:
+    if variable.name != item.get("name"):
         raise DataFileError(
-            f"{where}: {index:04X}h:{subindex} is {variable.name!r} in the EDS file, not {item['name']!r}.",
+            f"{where}: {index:04X}h:{subindex} is {variable.name!r} in the EDS file, not {item.get('name')!r}.",
             "Make name and index agree.",
         )
-    return MappedObject(item["name"], index, subindex, _STRUCT_CODES[variable.data_type], len(variable))
+    return MappedObject(variable.name, index, subindex, _STRUCT_CODES[variable.data_type], len(variable))
 
 
 def _check_needed(pdos: Sequence[Pdo], role: Role, where: str) -> None:

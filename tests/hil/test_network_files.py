@@ -63,6 +63,16 @@ MISTAKES = {
         "",
         "6077",
     ),
+    "a direction that is not there": ('direction = "receive"', 'direction = "recieve"', "recieve"),
+    "a PDO object without index": ('name = "Controlword", index = 0x6040', 'name = "Controlword"', "Controlword"),
+    "a PDO that does not come every cycle": ("transmission_type = 1\n", "transmission_type = 2\n", "transmission type"),
+    "a cycle of no length": ("value = 0.002", "value = 0.0", "cycle_period"),
+    "a bit rate of zero": ("bit_rate = { value = 1e6", "bit_rate = { value = 0", "bit_rate"),
+    "an encoder without increments": ("value = 1048576", "value = 0", "counts_per_revolution"),
+    "a master with the id of a node": ("node_id = 127", "node_id = 3", "703h"),
+    "a SYNC with the identifier of a TPDO": ("sync_cob_id = 0x80", "sync_cob_id = 0x183", "183h"),
+    "a heartbeat that 16 bits of milliseconds cannot hold": ("value = 0.25", "value = 70.0", "heartbeat_timeout"),
+    "nodes that trip between two heartbeats of the master": ("value = 0.25", "value = 0.05", "every 0.1 s"),
     "a device that is not described": ('device = "steering_encoder"', 'device = "resolver"', "resolver"),
 }
 
