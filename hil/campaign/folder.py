@@ -114,10 +114,20 @@ def create_run(run: Run, vehicle_file: Path) -> None:
     """Make the folder, copy vehicle and network files, write the manifest last.
 
     Raises:
-        CampaignError: the folder already holds a run.
+        CampaignError: the folder already holds a run, or cannot be written.
     """
+    refuse_used(run.folder)
+    try:
+        _write_run(run, vehicle_file)
+    except OSError as error:
+        raise CampaignError(
+            f"{run.folder.path} cannot be made a run folder: {error.strerror or error}.",
+            "Name a folder that can be written (--out), or free some space.",
+        ) from error
+
+
+def _write_run(run: Run, vehicle_file: Path) -> None:
     folder = run.folder
-    refuse_used(folder)
     folder.network.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(vehicle_file, folder.vehicle)
     shutil.copyfile(run.network.path, folder.network)
@@ -176,6 +186,8 @@ def _excitation_entry(excitation: Excitation) -> dict[str, Any]:
 def _restore(folder: RunFolder, manifest: Mapping[str, Any], vehicle: VehicleDescription, network: Network) -> Run:
     if manifest["schema"] != SCHEMA:
         raise ValueError(f"schema {manifest['schema']!r}, not {SCHEMA!r}")
+    if manifest["cycle"] != network.cycle_period:
+        raise ValueError(f"a cycle of {manifest['cycle']!r} s, not that of {network.path}")
     excitations = {Step(step): _excitation_of(entry) for step, entry in manifest["excitations"].items()}
     plan = assemble_plan(
         vehicle,

@@ -69,7 +69,15 @@ def read_any(path: Path, network: Network) -> Record:
 
 
 def join(records: Sequence[Record]) -> Record:
-    """All segments of several records behind each other."""
+    """All segments of several records behind each other.
+
+    Raises:
+        RecordError: one is given twice; it would count as two drives, and the intervals come out too narrow.
+    """
+    sources = [record.source for record in records]
+    twins = sorted({source for source in sources if sources.count(source) > 1})
+    if twins:
+        raise RecordError(f"{', '.join(twins)} is given more than once.", "Name every record once.")
     segments = [segment for record in records for segment in record.segments]
     notes = tuple(note for record in records for note in record.notes)
     return Record(segments, ", ".join(record.source for record in records), notes)

@@ -26,12 +26,14 @@ def read_toml(path: Path) -> dict[str, Any]:
     """Parse a TOML file.
 
     Raises:
-        DataFileError: the file is missing or is not TOML.
+        DataFileError: the file is missing, cannot be read, or is not TOML.
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise DataFileError(f"{path} does not exist.", "Name an existing TOML file.") from error
+    except OSError as error:
+        raise DataFileError(f"{path} cannot be read: {error.strerror}.", "Name a readable TOML file.") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DataFileError(f"{path} is not valid TOML: {error}.", "Mend the file at that place.") from error
 

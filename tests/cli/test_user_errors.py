@@ -180,3 +180,18 @@ def test_a_good_record_is_identified_and_reported(quasi: Any, record: Record, tm
     assert "m_ch" in answer.out
     assert (tmp_path / "result" / "parameters.toml").is_file()
     assert "<html" in (tmp_path / "result" / "report.html").read_text()
+
+
+def test_a_record_that_is_given_twice_is_no_second_drive(quasi: Any, record: Record, tmp_path: Path) -> None:
+    path = tmp_path / "record.csv"
+    write_record(record, path)
+    assert_user_error(quasi("identify", path, path, "--b-w", 0.12, "--b-w-std", 0.01), "more than once")
+
+
+def test_a_run_folder_that_cannot_be_made(quasi: Any, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    assert_user_error(campaign(quasi, tmp_path / "file" / "run"), "cannot be made a run folder", "--out")
+
+
+def test_a_folder_in_place_of_a_vehicle_file(quasi: Any, tmp_path: Path) -> None:
+    assert_user_error(campaign(quasi, tmp_path / "run", "--vehicle", tmp_path.as_posix()), "cannot be read")
