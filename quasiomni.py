@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 import contextlib
+import signal
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from types import ModuleType
+from types import FrameType, ModuleType
 from typing import Annotated
 
 import can
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from hil import workflow
 from hil.buses import open_bus
-from hil.campaign.folder import RunFolder, network_file_of, open_run
+from hil.campaign.folder import Run, RunFolder, network_file_of, open_run
 from hil.clock import FreeRunningClock, WallClock
 from hil.network import load_network
 from hil.recorder import LogFormat
+from hil.truth import truth_of
 from hil.workflow import HumanOperator, Order
 from ident.campaign.steps import ORDER, PERIODS
 from ident.errors import BusError, UserError
 from ident.estimate.identify import KnownInertia
 from ident.records.record import Step
-from ident.vehicle.parameters import Parameters
 
 app = typer.Typer(
     help="From prototype to trusted model: dynamic identification of quasi-omnidirectional platforms over CAN.",
@@ -51,7 +53,7 @@ InertiaOption = Annotated[float | None, typer.Option("--b-w", help="Give B_w [kg
 InertiaStdOption = Annotated[
     float | None, typer.Option("--b-w-std", help="Standard deviation of the B_w given [kg m²]; needed with --b-w.")
 ]
-SeedOption = Annotated[int, typer.Option(help="Seed of the excitation and of all emulated noise.")]
+SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the excitation and of all emulated noise.")]
 GuiOption = Annotated[bool, typer.Option("--gui", help="Show the emulated vehicle in a window.")]
 
 
@@ -72,12 +74,13 @@ def demo(
     """The whole story on the emulator: boot, four steps, parameters beside the truth, lane change, report."""
     _clear_previous(out)
     order = Order(out, vehicle, None, _steps((), False, None), PERIODS, seed, None, LogFormat.BLF, LOCKSTEP, vehicle)
-    _drive_on_emulator(order, gui, resume=False)
-    workflow.identify_run(out, out, None, _truth(vehicle), console)
+    _drive_on_emulator(workflow.plan_run(order, console), order, gui)
+    workflow.identify_run(out, out, None, truth_of(vehicle), console)
 
 
 @app.command()
 def campaign(
+    context: typer.Context,
     out: Annotated[Path, typer.Option(help="Run folder to write, or to go on with.")] = Path("runs/campaign"),
     bus: Annotated[
         str | None,
@@ -107,10 +110,11 @@ def campaign(
     steps, inertia = _steps(skip or (), lateral, b_w), _known_inertia(b_w, b_w_std)
     prototype, where = (vehicle, LOCKSTEP) if bus is None else ("", bus)
     order = Order(out, vehicle, network, steps, periods, seed, inertia, log_format, where, prototype)
+    run = _resumed(order, context) if resume else workflow.plan_run(order, console)
     if bus is None:
-        _drive_on_emulator(order, gui, resume)
+        _drive_on_emulator(run, order, gui)
     else:
-        _drive_on_bus(order, bus, ask=not yes, lockstep=lockstep, resume=resume)
+        _drive_on_bus(run, order, bus, ask=not yes, lockstep=lockstep)
     console.print(f"Next: [bold]quasiomni identify {out}[/bold]")
 
 
@@ -142,7 +146,7 @@ def report(
 ) -> None:
     """Write the HTML report of a run again, from its frames."""
     prototype = open_run(run).prototype
-    workflow.report_run(run, out or RunFolder(run).report, _truth(prototype) if prototype else None, console)
+    workflow.report_run(run, out or RunFolder(run).report, truth_of(prototype) if prototype else None, console)
 
 
 @app.command()
@@ -153,7 +157,7 @@ def emulate(
     seed: SeedOption = 1,
     stand: Annotated[Stand, typer.Option(help="On the floor, or on the jack-stand, wheels free.")] = Stand.FLOOR,
     lockstep: Annotated[bool, typer.Option("--lockstep", help="Time moves with the master's SYNC.")] = False,
-    duration: Annotated[float | None, typer.Option(help="Stop after so many seconds of wall time.")] = None,
+    duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
     gui: GuiOption = False,
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
@@ -174,8 +178,16 @@ def emulate(
     console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
 
 
-def _drive_on_emulator(order: Order, gui: bool, resume: bool) -> None:
-    run = open_run(order.out) if resume else workflow.plan_run(order, console)
+def _resumed(order: Order, context: typer.Context) -> Run:
+    """The run to go on with; options that contradict it are refused."""
+    run = open_run(order.out)
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
+    workflow.refuse_changed(run, order, given)
+    return run
+
+
+def _drive_on_emulator(run: Run, order: Order, gui: bool) -> None:
     if not run.prototype:
         raise UserError(
             f"{order.out} was driven on {run.bus}, not on the emulator.", f"Go on with it there: --bus {run.bus}."
@@ -185,12 +197,17 @@ def _drive_on_emulator(order: Order, gui: bool, resume: bool) -> None:
         workflow.drive_run(run, order, bench.bus, bench.clock, bench.operator, console, lambda: True)
 
 
-def _drive_on_bus(order: Order, name: str, *, ask: bool, lockstep: bool, resume: bool) -> None:
-    run = open_run(order.out) if resume else workflow.plan_run(order, console)
+def _drive_on_bus(run: Run, order: Order, name: str, *, ask: bool, lockstep: bool) -> None:
     if run.prototype:
         raise UserError(
             f"{order.out} was driven on the emulator.", "Go on with it without --bus, or take another --out."
         )
+    if order.log_format is LogFormat.MF4 and not lockstep:
+        raise UserError(
+            "MF4 logs are written too slowly for a cycle of 2 ms.", "Record BLF, and convert it afterwards."
+        )
+    if run.bus != name:
+        errors.print(f"[yellow]{escape(str(order.out))} was begun on {run.bus}, it goes on on {name}.[/yellow]")
 
     def may_move() -> bool:
         return not ask or typer.confirm("The vehicle will move. Is the floor free, a hand at the emergency stop?")
@@ -230,12 +247,6 @@ def _emulation() -> ModuleType:
     return emulation
 
 
-def _truth(prototype: str) -> Parameters:
-    """What the emulated prototype was built with."""
-    truth: Parameters = _emulation().truth(prototype)
-    return truth
-
-
 def _steps(skip: Sequence[Step], lateral: bool, b_w: float | None) -> tuple[Step, ...]:
     left_out = {*skip, *([] if lateral else [Step.LATERAL]), *([] if b_w is None else [Step.WHEEL_LIFTED])}
     return tuple(step for step in ORDER if step not in left_out)
@@ -243,6 +254,8 @@ def _steps(skip: Sequence[Step], lateral: bool, b_w: float | None) -> tuple[Step
 
 def _known_inertia(value: float | None, std: float | None) -> KnownInertia | None:
     if value is None:
+        if std is not None:
+            raise UserError("B_w's standard deviation is given without B_w.", "Add --b-w, or leave --b-w-std out.")
         return None
     if std is None:
         raise UserError("B_w is given without its standard deviation.", "Add --b-w-std: every result depends on it.")
@@ -260,14 +273,21 @@ def _clear_previous(out: Path) -> None:
         folder.manifest.unlink()
 
 
+def _interrupt(_signal: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
 def main() -> None:
-    """Entry point: user errors become two lines and exit code 2."""
+    """Entry point: user errors become two lines and exit code 2; a closed terminal stops the drives like Ctrl-C."""
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _interrupt)
     try:
         app()
     except UserError as error:
         label = "bus" if isinstance(error, BusError) else "error"
-        errors.print(f"[bold red]{label}:[/bold red] {error.what}", highlight=False)
-        errors.print(f"[bold]remedy:[/bold] {error.remedy}", highlight=False)
+        errors.print(f"[bold red]{label}:[/bold red] {escape(error.what)}", highlight=False)
+        errors.print(f"[bold]remedy:[/bold] {escape(error.remedy)}", highlight=False)
         sys.exit(2)
 
 

@@ -24,6 +24,7 @@ from hil.campaign.runner import CampaignRunner
 from hil.campaign.study import TOLERANCES, Outcome, accuracy, coverage, outcome_of
 from hil.network import load_network
 from hil.recorder import Recorder
+from hil.truth import truth_of
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import ORDER, PERIODS
 from ident.estimate.identify import identify
@@ -75,7 +76,7 @@ def main() -> None:
     seeds = range(arguments.seeds[0], arguments.seeds[1] + 1)
     with ProcessPoolExecutor(arguments.jobs) as pool:
         outcomes = list(pool.map(partial(kept_outcome, arguments.vehicle, arguments.out), seeds))
-    rows = accuracy(outcomes, emulation.truth(arguments.vehicle))
+    rows = accuracy(outcomes, truth_of(arguments.vehicle))
     print("| parameter | tolerance % | median abs. error % | bias % | scatter % | half-width % | covered |")
     print("|---|---|---|---|---|---|---|")
     for row in rows:

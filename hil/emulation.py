@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import can
-import numpy as np
 
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
@@ -17,7 +16,6 @@ from hil.buses import open_served_bus
 from hil.clock import Clock
 from hil.network import Network
 from hil.serving import VehicleServer
-from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 
 @dataclass(frozen=True)
@@ -75,9 +73,3 @@ def server_bus(name: str, network: Network) -> Iterator[can.BusABC]:
 def server(emulated: EmulatedVehicle, bus: can.BusABC, clock: Clock, network: Path, lockstep: bool) -> VehicleServer:
     """A server of an emulated vehicle on a bus."""
     return VehicleServer(emulated, bus, clock, network, lockstep)
-
-
-def truth(prototype: str) -> Parameters:
-    """The parameters that the prototype was built with."""
-    values = load_prototype(prototype).truth
-    return Parameters(np.array([values[name] for name in PARAMETER_NAMES]), np.zeros(len(PARAMETER_NAMES)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -21,8 +21,8 @@ from hil.clock import Clock
 from hil.network import load_network
 from hil.recorder import LogFormat, Recorder
 from ident.campaign.plan import Plan, make_plan
-from ident.errors import CampaignError
-from ident.estimate.identify import KnownInertia, identify
+from ident.errors import CampaignError, UserError
+from ident.estimate.identify import Identification, KnownInertia, identify
 from ident.estimate.result_file import write_parameters
 from ident.records.record import Record, Step
 from ident.report.html import ReportContent, write_report
@@ -114,6 +114,40 @@ def plan_run(order: Order, console: Console) -> Run:
     return Run(RunFolder(order.out), plan, network, order.seed, order.bus, order.prototype, order.known_inertia)
 
 
+def refuse_changed(run: Run, order: Order, given: Collection[str]) -> None:
+    """Refuse options of a resumed campaign that differ from what was planned.
+
+    Args:
+        run: as it was planned.
+        order: as it is asked for now.
+        given: names of the options that were given.
+
+    Raises:
+        CampaignError: an option that was given differs; named.
+    """
+    changed: Mapping[str, Callable[[], bool]] = {
+        "vehicle": lambda: _differ(find_data_file("ident.vehicle", order.vehicle), run.folder.vehicle),
+        "network": lambda: _differ(order.network or network_file_of(order.vehicle), run.folder.network),
+        "skip": lambda: order.steps != run.plan.steps,
+        "lateral": lambda: order.steps != run.plan.steps,
+        "b_w": lambda: order.known_inertia != run.known_inertia,
+        "b_w_std": lambda: order.known_inertia != run.known_inertia,
+        "periods": lambda: order.periods != run.plan.periods,
+        "seed": lambda: order.seed != run.seed,
+    }
+    different = [name for name, differs in changed.items() if name in given and differs()]
+    if different:
+        options = ", ".join(f"--{name.replace('_', '-')}" for name in different)
+        raise CampaignError(
+            f"{run.folder.path} was planned with another {options}.",
+            "A run goes on as it was planned: leave that out, or start another run (--out).",
+        )
+
+
+def _differ(one: Path, other: Path) -> bool:
+    return one.read_bytes() != other.read_bytes()
+
+
 def drive_run(
     run: Run,
     order: Order,
@@ -129,6 +163,7 @@ def drive_run(
         UserError: the network is not the one described, or a step failed; the drives are stopped.
     """
     console.print(loop_table(run.plan), room_table(run.plan))
+    console.print("Resetting the six nodes and asking who they are; nothing moves.")
     with console.status("looking for the six nodes"):
         check_network(bus, clock, run.network)
     console.print("All six nodes answer: identity, mode and units are those of the network file.")
@@ -233,13 +268,20 @@ def _identify(
     console.print(condition_line(result))
     for note in record.notes:
         console.print(f"[yellow]{note}[/yellow]")
-    out.mkdir(parents=True, exist_ok=True)
-    write_parameters(result, out / "parameters.toml", provenance)
+    _write_result(result, out, provenance)
     title = f"Identification of {vehicle.name}"
     with console.status("writing the report"):
         content = ReportContent(title, result, record, vehicle, truth, plan, provenance, record.notes, paper)
         write_report(content, out / "report.html")
     console.print(f"Written: {out / 'parameters.toml'}, {out / 'report.html'}")
+
+
+def _write_result(result: Identification, out: Path, provenance: Mapping[str, str]) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        write_parameters(result, out / "parameters.toml", provenance)
+    except OSError as error:
+        raise UserError(f"{out} cannot be written to: {error.strerror}.", "Name another folder (--out).") from error
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hil.campaign.folder import RunFolder, open_run
 from hil.frames import DecodedLog, decode_log
 from hil.network import Network
-from hil.recorder import LogFormat, finished_steps, step_of
+from hil.recorder import INTERLUDE, LogFormat, finished_steps, step_of
 from ident.campaign.plan import Plan
 from ident.campaign.steps import EXCITATIONS
 from ident.errors import RecordError
@@ -43,6 +43,8 @@ def read_logs(paths: Sequence[Path], network: Network) -> Record:
         step = step_of(path)
         if step is None:
             raise RecordError(f"{path} does not tell which step it holds.", "Name it like 003_straight.blf.")
+        if step == INTERLUDE:
+            raise RecordError(f"{path} holds what was sent between steps.", "Name the logs of steps.")
         logs.append((step, path))
     return _record(logs, network, None, ", ".join(str(path) for path in paths))
 

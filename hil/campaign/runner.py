@@ -100,15 +100,17 @@ class CampaignRunner:
             CampaignError: a coordinate leaves its reference or cannot be aligned; the drives are stopped.
         """
         finished = {step for step, _ in finished_steps(self._run.folder.frames)}
+        # A killed run may have left the vehicle on its stand, so a resumed one asks for the floor as well.
+        maybe_lifted = Step.WHEEL_LIFTED in self._plan.steps
         for session in _SESSIONS:
             steps = [step for step in self._plan.steps if step in session and step not in finished]
-            if not steps:
-                continue
             if Step.WHEEL_LIFTED in steps:
                 self._operator.lift()
-            self._drive_session(steps)
-            if Step.WHEEL_LIFTED in steps:
+            elif steps and maybe_lifted:
                 self._operator.lower()
+                maybe_lifted = False
+            if steps:
+                self._drive_session(steps)
 
     def _master(self) -> Master:
         return Master(self._bus, self._clock, self._run.network, self._recorder)

@@ -45,7 +45,7 @@ def read_log(path: Path, accept_truncated: bool = False) -> FrameTable:
     if not whole and not accept_truncated:
         raise RecordError(
             f"{path} is truncated after {len(table)} frames, {table.time[-1] - table.time[0]:.3f} s.",
-            "Its step was not finished: drive it again, or ask for what there is of it.",
+            "Its step was not finished: drive it again (--resume).",
         )
     return table
 

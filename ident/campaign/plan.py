@@ -42,6 +42,9 @@ DEAD_BANDS: Final = {"alpha": 1e-4, "x": 5e-4, "y": 5e-4, "gamma": 5e-4, "beta":
 HOLDING_BAND: Final = 3e-3
 """The same for a coordinate that stands still throughout a step [rad or m]."""
 
+MOST_PERIODS: Final = 100
+"""Repeats of an excitation, at most: a step is planned, driven and decoded as a whole."""
+
 INTEGRAL_SHARE: Final = 3.0
 """Bound of an integrator in units of the coordinate's Coulomb friction."""
 
@@ -166,6 +169,8 @@ def assemble_plan(
         raise CampaignError(
             f"{periods} periods a step do not separate noise from model error.", f"Drive at least {PERIODS}."
         )
+    if periods > MOST_PERIODS:
+        raise CampaignError(f"{periods} periods a step would take hours.", f"Drive at most {MOST_PERIODS}.")
     axes = {step: axis_of(spec, vehicle) for step, spec in EXCITATIONS.items()}
     plan = Plan(
         vehicle=vehicle,

@@ -34,6 +34,14 @@ INDEPENDENT: Final = tuple(name for name in PARAMETER_NAMES if name != "B_w")
 LIFTED: Final = ("d_vw", "d_cw", "B_w")
 """What a wheel in the air shows."""
 
+INERTIAL: Final = {
+    "C_l": Step.STEERING_LEFT,
+    "C_r": Step.STEERING_RIGHT,
+    "m_ch": Step.STRAIGHT,
+    "C_ch": Step.ROTATION,
+}
+"""Inertias, which are never near zero, and the steps that excite them."""
+
 FIT_STEPS: Final = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION, Step.LATERAL)
 VALIDATION_STEPS: Final = (Step.LANE_CHANGE,)
 
@@ -160,6 +168,7 @@ def _identify(
         _estimate(fit, index, covariance[index, index], abs(sensitivity[index]) * inertia.std)
         for index in range(len(INDEPENDENT))
     ]
+    _refuse_unexcited(estimates)
     values = np.array([*(estimate.value for estimate in estimates), inertia.value])
     deviations = np.sqrt(np.diag(covariance))
     return Identification(
@@ -170,6 +179,17 @@ def _identify(
         equations=tuple(equations),
         processing=processing,
     )
+
+
+def _refuse_unexcited(estimates: Sequence[Estimate]) -> None:
+    """An inertia is positive; one that is smaller than its standard deviation was not excited, only not quite zero."""
+    lost = [estimate for estimate in estimates if estimate.name in INERTIAL and estimate.std > abs(estimate.value)]
+    if lost:
+        named = ", ".join(f"{e.name} ({e.value:.3g} ± {e.std:.3g} {e.unit})" for e in lost)
+        steps = ", ".join(f"{e.name}: {INERTIAL[e.name]}" for e in lost)
+        raise EstimationError(
+            f"The data hardly excite {named}.", f"Add or repeat the step that does, with more acceleration ({steps})."
+        )
 
 
 def _wheel_inertia(equations: Sequence[Equations], known: KnownInertia | None) -> tuple[KnownInertia, _Fit | None]:

@@ -41,10 +41,9 @@ def read_channels(path: Path) -> Channels:
     Raises:
         RecordError: the file is missing, of unknown kind, unreadable, or its channels have several rasters.
     """
-    reader = _lookup(path, _READERS)
     if not path.is_file():
-        raise RecordError(f"{path} does not exist.", "Name an existing record.")
-    return reader(path)
+        raise RecordError(f"{path} does not exist or is no file.", "Name an existing record.")
+    return _lookup(path, _READERS)(path)
 
 
 def write_channels(channels: Channels, path: Path) -> None:
@@ -77,7 +76,9 @@ def _read_csv(path: Path) -> Channels:
         try:
             header, *rows = csv.reader(file)
         except (ValueError, csv.Error) as error:
-            raise RecordError(f"{path} is not a CSV file with a header line.", "Write one.") from error
+            raise RecordError(
+                f"{path} is empty or no CSV file.", "Its first line names the channels, each further line is a sample."
+            ) from error
     names = [name.strip() for name in header]
     _refuse_twins(path, names)
     for number, row in enumerate(rows):

@@ -13,6 +13,7 @@ from hil.network import DEFAULT_NETWORK
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.reference import excitation_reference
 from ident.campaign.steps import EXCITATIONS
+from ident.estimate.identify import KnownInertia
 from ident.records.files import write_record
 from ident.records.record import Record, Segment, Step, make_segment
 from ident.vehicle.description import load_vehicle
@@ -105,6 +106,48 @@ def test_a_folder_that_holds_a_run_is_not_overwritten(quasi: Any, tmp_path: Path
 
 def test_resume_without_a_run(quasi: Any, tmp_path: Path) -> None:
     assert_user_error(campaign(quasi, tmp_path / "nowhere", "--resume"), "no run folder")
+
+
+def test_a_resumed_run_is_not_driven_with_other_options(quasi: Any, tmp_path: Path, drive: Any) -> None:
+    run = tmp_path / "run"
+    drive(run, [Step.ROTATION], known_inertia=KnownInertia(0.121, 0.001, "given"))
+    for options, named in (
+        (("--vehicle", "compact"), "--vehicle"),
+        (("--seed", 9), "--seed"),
+        (("--b-w", 0.2, "--b-w-std", 0.001), "--b-w"),
+        (("--lateral",), "--lateral"),
+    ):
+        answer = quasi("campaign", "--out", run, "--resume", *options)
+        assert_user_error(answer, "was planned with another", named)
+
+
+def test_a_run_without_rotation_is_refused_for_the_yaw_inertia(quasi: Any, record: Record, tmp_path: Path) -> None:
+    path = tmp_path / "record.csv"
+    write_record(Record([segment for segment in record.segments if segment.step != Step.ROTATION]), path)
+    assert_user_error(quasi("identify", path, "--b-w", 0.12, "--b-w-std", 0.01), "C_ch", "rotation")
+
+
+def test_messages_keep_their_brackets(quasi: Any, tmp_path: Path) -> None:
+    vehicle = tmp_path / "mine.toml"
+    vehicle.write_text('name = "mine"\n')
+    assert_user_error(campaign(quasi, tmp_path / "run", "--vehicle", vehicle), "[limits]")
+
+
+def test_a_folder_that_cannot_be_written_to(quasi: Any, record: Record, tmp_path: Path) -> None:
+    path, taken = tmp_path / "record.csv", tmp_path / "taken"
+    write_record(record, path)
+    taken.write_text("a file")
+    assert_user_error(quasi("identify", path, "--b-w", 0.12, "--b-w-std", 0.01, "--out", taken), "taken", "--out")
+
+
+def test_numbers_out_of_range(quasi: Any, tmp_path: Path) -> None:
+    assert campaign(quasi, tmp_path / "run", "--seed", -1).code == 2
+    assert_user_error(campaign(quasi, tmp_path / "run", "--periods", 1_000_000), "at most 100")
+    assert_user_error(quasi("identify", tmp_path, "--b-w-std", 0.01), "without B_w")
+
+
+def test_a_record_that_is_not_there(quasi: Any, tmp_path: Path) -> None:
+    assert_user_error(quasi("identify", tmp_path / "nothere"), "does not exist")
 
 
 def test_too_few_periods(quasi: Any, tmp_path: Path) -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from hil import emulation
 from hil.campaign.folder import Run
 from hil.campaign.reading import read_run
 from hil.campaign.study import TOLERANCES, Outcome, accuracy, coverage, outcome_of
+from hil.truth import truth_of
 from ident.campaign.steps import ORDER
 from ident.estimate.identify import identify
 from ident.records.record import Step
@@ -32,7 +32,7 @@ def outcomes(drive: Callable[..., Run], folder: Path, vehicle: str, seeds: range
 def test_twenty_seeds_keep_the_tolerances_and_the_intervals_their_word(
     drive: Callable[..., Run], tmp_path: Path, vehicle: str
 ) -> None:
-    rows = accuracy(outcomes(drive, tmp_path, vehicle, range(1000, 1020)), emulation.truth(vehicle))
+    rows = accuracy(outcomes(drive, tmp_path, vehicle, range(1000, 1020)), truth_of(vehicle))
     for row in rows:
         assert row.median_error < TOLERANCES[row.name], row
         assert row.half_width <= TOLERANCES[row.name], row
@@ -40,7 +40,7 @@ def test_twenty_seeds_keep_the_tolerances_and_the_intervals_their_word(
 
 
 def test_a_sample_of_seeds_keeps_the_tolerances(drive: Callable[..., Run], tmp_path: Path) -> None:
-    rows = accuracy(outcomes(drive, tmp_path, "prototype", range(1020, 1023)), emulation.truth("prototype"))
+    rows = accuracy(outcomes(drive, tmp_path, "prototype", range(1020, 1023)), truth_of("prototype"))
     for row in rows:
         assert row.median_error < TOLERANCES[row.name], row
     assert coverage(rows) >= 0.8

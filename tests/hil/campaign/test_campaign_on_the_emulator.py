@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hil import emulation
 from hil.campaign.folder import Run, open_run
 from hil.campaign.reading import read_any, read_logs, read_run
 from hil.campaign.study import TOLERANCES
 from hil.recorder import finished_steps
+from hil.truth import truth_of
 from ident.campaign.steps import ORDER
 from ident.estimate.identify import Identification, identify
 from ident.estimate.result_file import write_parameters
@@ -48,7 +48,7 @@ def result(record: Record, run: Run) -> Identification:
 
 @pytest.fixture(scope="module")
 def truth(vehicle: str) -> Parameters:
-    return emulation.truth(vehicle)
+    return truth_of(vehicle)
 
 
 def test_every_parameter_is_found_within_three_standard_deviations(result: Identification, truth: Parameters) -> None:
