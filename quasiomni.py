@@ -24,12 +24,12 @@ from hil.campaign.folder import Run, RunFolder, network_file_of, open_run
 from hil.clock import FreeRunningClock, WallClock
 from hil.network import load_network
 from hil.recorder import LogFormat
-from hil.truth import truth_of
 from hil.workflow import HumanOperator, Order
 from ident.campaign.steps import ORDER, PERIODS
 from ident.errors import BusError, UserError
 from ident.estimate.identify import KnownInertia
 from ident.records.record import Step
+from ident.vehicle.parameters import Parameters
 
 app = typer.Typer(
     help="From prototype to trusted model: dynamic identification of quasi-omnidirectional platforms over CAN.",
@@ -75,7 +75,7 @@ def demo(
     _clear_previous(out)
     order = Order(out, vehicle, None, _steps((), False, None), PERIODS, seed, None, LogFormat.BLF, LOCKSTEP, vehicle)
     _drive_on_emulator(workflow.plan_run(order, console), order, gui)
-    workflow.identify_run(out, out, None, truth_of(vehicle), console)
+    workflow.identify_run(out, out, None, _truth(vehicle), console)
 
 
 @app.command()
@@ -146,7 +146,7 @@ def report(
 ) -> None:
     """Write the HTML report of a run again, from its frames."""
     prototype = open_run(run).prototype
-    workflow.report_run(run, out or RunFolder(run).report, truth_of(prototype) if prototype else None, console)
+    workflow.report_run(run, out or RunFolder(run).report, _truth(prototype) if prototype else None, console)
 
 
 @app.command()
@@ -245,6 +245,13 @@ def _emulation() -> ModuleType:
             f"The emulator is not installed ({error.name}).", "Install it: pip install 'quasiomni[emulator]'."
         ) from error
     return emulation
+
+
+def _truth(prototype: str) -> Parameters:
+    """What the emulated prototype was built with; needs its data file, not the engine."""
+    from hil.truth import truth_of
+
+    return truth_of(prototype)
 
 
 def _steps(skip: Sequence[Step], lateral: bool, b_w: float | None) -> tuple[Step, ...]:

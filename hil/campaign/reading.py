@@ -105,7 +105,7 @@ def _segment(step: str, path: Path, log: DecodedLog, network: Network, plan: Pla
         Segment(
             step=step,
             sample_time=network.cycle_period,
-            time=log.time + log.start,
+            time=log.time,
             motor_torques=log.motor_torques,
             wheel_angles=log.wheel_angles,
             steering_angles=log.steering_angles,

@@ -77,7 +77,8 @@ def _read_csv(path: Path) -> Channels:
             header, *rows = csv.reader(file)
         except (ValueError, csv.Error) as error:
             raise RecordError(
-                f"{path} is empty or no CSV file.", "Its first line names the channels, each further line is a sample."
+                f"{path} has no header line: it is empty or no CSV file.",
+                "Its first line names the channels, each further line is a sample.",
             ) from error
     names = [name.strip() for name in header]
     _refuse_twins(path, names)

@@ -33,7 +33,10 @@ Table = Mapping[str, NDArray[Any]]
 
 
 def record_from_table(table: Table, source: str) -> Record:
-    """Record from channels by name, all of one length; a new segment starts wherever `step` changes.
+    """Record from channels by name, all of one length.
+
+    A new segment starts wherever `step` changes, or time falls back to where the segment began: a step may be
+    driven twice in a row.
 
     Raises:
         RecordError: a channel is missing, lengths differ, or a segment breaks the contract.
@@ -41,13 +44,22 @@ def record_from_table(table: Table, source: str) -> Record:
     _check_channels(table, source)
     period = period_numbers(table.get("period"), len(table["time"]), source)
     steps = np.asarray(table["step"]).astype(str)
-    starts = np.flatnonzero(np.concatenate([[True], steps[1:] != steps[:-1]]))
-    ends = [*starts[1:].tolist(), len(steps)]
+    starts = _starts(steps, np.asarray(table["time"], dtype=float))
+    ends = [*starts[1:], len(steps)]
     segments = [
         make_segment(_slice(table, slice(int(start), int(end)), str(steps[start]), period), source)
         for start, end in zip(starts, ends, strict=True)
     ]
     return Record(segments, source)
+
+
+def _starts(steps: NDArray[Any], time: NDArray[np.float64]) -> list[int]:
+    candidates = np.flatnonzero((steps[1:] != steps[:-1]) | (np.diff(time) < 0)) + 1
+    starts = [0]
+    for row in candidates.tolist():
+        if steps[row] != steps[row - 1] or time[row] <= time[starts[-1]]:
+            starts.append(row)
+    return starts
 
 
 def table_from_record(record: Record) -> dict[str, NDArray[Any]]:

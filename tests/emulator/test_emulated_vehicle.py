@@ -172,7 +172,7 @@ def test_load_fluctuation_is_as_large_and_as_slow_as_stated() -> None:
     p = prototype.truth
     load = rows(prototype, 2, 1.0, 200_000)["load"]
     steering = np.array([p["d_cl"], p["d_cl"], p["d_cr"], p["d_cr"]]) / 2
-    expected = 0.03 * np.concatenate([steering, [p["d_cw"]] * 4])
+    expected = prototype.noise.load_fluctuation * np.concatenate([steering, [p["d_cw"]] * 4])
     assert load.std(axis=0) == pytest.approx(expected, rel=0.08)
     assert np.abs(load.mean(axis=0) / expected).max() < 0.15
     lag = 100
