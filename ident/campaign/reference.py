@@ -173,7 +173,7 @@ def lane_change_reference(
     velocities = np.stack([alpha_v_rate, velocity], axis=1)
     accelerations = np.stack([np.gradient(alpha_v_rate, sample_time), acceleration], axis=1)
     alpha = kinematics.steering_from_virtual(alpha_v, geometry)
-    torques = dynamics.feed_forward(Mode.STEERED, alpha, velocities, accelerations, parameters.values, geometry)
+    torques = _self_sufficient_sides(alpha, velocities, accelerations, geometry, parameters)
     column = kinematics.complement(Mode.STEERED, alpha, geometry)[:, 5:, 1]
     tracks = {
         **_steering_tracks(alpha, np.gradient(alpha, sample_time, axis=0), geometry),
@@ -187,6 +187,24 @@ def lane_change_reference(
 def sample_times(samples: int, sample_time: float) -> Array:
     """Times of a number of samples from zero (N,) [s]."""
     return np.asarray(np.arange(samples) * sample_time, dtype=np.float64)
+
+
+def _self_sufficient_sides(
+    alpha: Array, velocities: Array, accelerations: Array, geometry: Geometry, parameters: Parameters
+) -> Array:
+    """Feed-forward of steered motion in which each side brings the torque that its own steering needs.
+
+    It satisfies (21), whose α_v row is a combination of both steering rows, but not with the least torque: that one
+    leaves the difference between the sides to the constraint forces, and wheels that carry steering torque slip.
+    """
+    rates, lifted = dynamics.lift_velocities(Mode.STEERED, alpha, velocities, accelerations, geometry)
+    wanted, matrix = [], []
+    for mode, rows in ((Mode.ALIGNMENT, [0, 1]), (Mode.STEERED, [1])):
+        theta = dynamics.projected_regressor(mode, alpha, rates, lifted, geometry)
+        wanted.append((theta @ parameters.values)[:, rows])
+        matrix.append(dynamics.projected_input(mode, alpha, geometry)[:, rows])
+    inverse = np.linalg.pinv(np.concatenate(matrix, axis=1))
+    return np.asarray(np.einsum("nij,nj->ni", inverse, np.concatenate(wanted, axis=1)))
 
 
 def smooth_step(progress: Array) -> tuple[Array, Array, Array]:
