@@ -49,7 +49,7 @@ class Reference:
 
     Attributes:
         step: its name in records.
-        coordinate: what is driven, for messages.
+        coordinate: what is driven.
         sample_time: [s].
         tracks: by coordinate: alpha_l, alpha_r, and x, y or gamma; or beta_fl ... in the air.
         feed_forward: motor torques (N, 4) [Nm].

@@ -57,7 +57,8 @@ def _starts(steps: NDArray[Any], time: NDArray[np.float64]) -> list[int]:
     candidates = np.flatnonzero((steps[1:] != steps[:-1]) | (np.diff(time) < 0)) + 1
     starts = [0]
     for row in candidates.tolist():
-        if steps[row] != steps[row - 1] or time[row] <= time[starts[-1]]:
+        begun = time[starts[-1]]
+        if steps[row] != steps[row - 1] or time[row] <= begun < time[row - 1]:
             starts.append(row)
     return starts
 
