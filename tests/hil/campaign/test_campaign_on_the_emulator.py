@@ -52,7 +52,7 @@ def truth(vehicle: str) -> Parameters:
 
 
 def test_every_parameter_is_found(result: Identification, truth: Parameters) -> None:
-    """Within 3.5 standard deviations, or half its tolerance: aligned to three increments, wheels still slip a little."""
+    """Within 3.5 standard deviations, or half its tolerance: wheels aligned to three increments still slip a little."""
     for estimate in result.estimates:
         error = abs(estimate.value - truth[estimate.name])
         slip = 0.5 * TOLERANCES[estimate.name] / 100 * truth[estimate.name]
