@@ -230,11 +230,7 @@ def report_run(folder: Path, target: Path, truth: Parameters | None, console: Co
     with console.status("identifying"):
         record = read_run(folder)
         result = identify(record, vehicle.geometry, known_inertia=run.known_inertia)
-    paper = vehicle.name == PAPER_PROTOTYPE
-    title = f"Identification of {vehicle.name}"
-    write_report(
-        ReportContent(title, result, record, vehicle, truth, run.plan, provenance_of(run), record.notes, paper), target
-    )
+    write_report(_content(record, result, vehicle, provenance_of(run), truth, run.plan), target)
     console.print(f"Written: {target}")
 
 
@@ -261,19 +257,30 @@ def _identify(
 ) -> None:
     with console.status("identifying"):
         result = identify(record, vehicle.geometry, known_inertia=inertia)
-    paper = vehicle.name == PAPER_PROTOTYPE
+    content = _content(record, result, vehicle, provenance, truth, plan)
     console.print(parameter_table(result, truth), excitation_table(result), step_table(result))
-    if paper:
+    if content.paper:
         console.print(paper_table(result))
     console.print(condition_line(result))
     for note in record.notes:
         console.print(f"[yellow]{note}[/yellow]")
     _write_result(result, out, provenance)
-    title = f"Identification of {vehicle.name}"
     with console.status("writing the report"):
-        content = ReportContent(title, result, record, vehicle, truth, plan, provenance, record.notes, paper)
         write_report(content, out / "report.html")
     console.print(f"Written: {out / 'parameters.toml'}, {out / 'report.html'}")
+
+
+def _content(
+    record: Record,
+    result: Identification,
+    vehicle: VehicleDescription,
+    provenance: Mapping[str, str],
+    truth: Parameters | None,
+    plan: Plan | None,
+) -> ReportContent:
+    """What a report shows; Table 2 of the paper only beside the vehicle that it describes."""
+    title, paper = f"Identification of {vehicle.name}", vehicle.name == PAPER_PROTOTYPE
+    return ReportContent(title, result, record, vehicle, truth, plan, provenance, record.notes, paper)
 
 
 def _write_result(result: Identification, out: Path, provenance: Mapping[str, str]) -> None:
