@@ -1,67 +1,39 @@
-"""The command line: the composition root. What the commands do lives in `hil.workflow`."""
+"""The commands around one campaign: drive it, identify it, report it."""
 
 from __future__ import annotations
 
-import contextlib
-import signal
-import sys
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from enum import StrEnum
 from pathlib import Path
-from types import FrameType, ModuleType
 from typing import Annotated
 
 import can
 import typer
-from rich.console import Console
 from rich.markup import escape
 
 from hil import workflow
 from hil.buses import open_bus
-from hil.campaign.folder import Run, RunFolder, network_file_of, open_run
+from hil.campaign.folder import Run, RunFolder, open_run
 from hil.clock import FreeRunningClock, WallClock
-from hil.network import load_network
 from hil.recorder import LogFormat
 from hil.workflow import HumanOperator, Order
 from ident.campaign.steps import ORDER, PERIODS
-from ident.errors import BusError, UserError
+from ident.errors import UserError
 from ident.estimate.identify import KnownInertia
 from ident.records.record import Step
 from ident.vehicle.parameters import Parameters
-
-app = typer.Typer(
-    help="From prototype to trusted model: dynamic identification of quasi-omnidirectional platforms over CAN.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    add_completion=False,
-    rich_markup_mode="markdown",
+from quasiomni.application import app, console, errors
+from quasiomni.options import (
+    GuiOption,
+    InertiaOption,
+    InertiaStdOption,
+    NetworkOption,
+    SeedOption,
+    VehicleOption,
+    load_emulation,
 )
-console = Console()
-errors = Console(stderr=True)
 
 LOCKSTEP = "emulator, in lockstep"
-
-VehicleOption = Annotated[
-    str, typer.Option("--vehicle", help="Vehicle file: `prototype`, `compact`, or the path of your own.")
-]
-NetworkOption = Annotated[
-    Path | None, typer.Option("--network", help="Network file: nodes, units, directions. Default: the vehicle's.")
-]
-InertiaOption = Annotated[float | None, typer.Option("--b-w", help="Give B_w [kg m²] instead of lifting the wheels.")]
-InertiaStdOption = Annotated[
-    float | None, typer.Option("--b-w-std", help="Standard deviation of the B_w given [kg m²]; needed with --b-w.")
-]
-SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the excitation and of all emulated noise.")]
-GuiOption = Annotated[bool, typer.Option("--gui", help="Show the emulated vehicle in a window.")]
-
-
-class Stand(StrEnum):
-    """Where an emulated vehicle stands when it comes up."""
-
-    FLOOR = "floor"
-    JACK = "jack"
 
 
 @app.command()
@@ -149,35 +121,6 @@ def report(
     workflow.report_run(run, out or RunFolder(run).report, _truth(prototype) if prototype else None, console)
 
 
-@app.command()
-def emulate(
-    bus: Annotated[str, typer.Option(help="INTERFACE:CHANNEL to serve, e.g. `unix:/tmp/can0` or `socketcan:can0`.")],
-    prototype: Annotated[str, typer.Option(help="`prototype`, `compact`, or the path of your own.")] = "prototype",
-    network: NetworkOption = None,
-    seed: SeedOption = 1,
-    stand: Annotated[Stand, typer.Option(help="On the floor, or on the jack-stand, wheels free.")] = Stand.FLOOR,
-    lockstep: Annotated[bool, typer.Option("--lockstep", help="Time moves with the master's SYNC.")] = False,
-    duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
-    gui: GuiOption = False,
-) -> None:
-    """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
-    emulation = _emulation()
-    network_file = network or network_file_of(prototype)
-    end = None if duration is None else time.monotonic() + duration
-    with (
-        emulation.vehicle(prototype, seed, gui) as vehicle,
-        emulation.server_bus(bus, load_network(network_file)) as opened,
-    ):
-        if stand is Stand.JACK:
-            vehicle.lift()
-        console.print(f"{prototype} is up on {bus}, {'in lockstep' if lockstep else 'in real time'}. Ctrl-C ends it.")
-        server = emulation.server(vehicle, opened, WallClock(), network_file, lockstep)
-        with contextlib.suppress(KeyboardInterrupt):
-            server.serve(lambda: end is not None and time.monotonic() > end)
-        served = server.report
-    console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
-
-
 def _resumed(order: Order, context: typer.Context) -> Run:
     """The run to go on with; options that contradict it are refused."""
     run = open_run(order.out)
@@ -192,7 +135,7 @@ def _drive_on_emulator(run: Run, order: Order, gui: bool) -> None:
         raise UserError(
             f"{order.out} was driven on {run.bus}, not on the emulator.", f"Go on with it there: --bus {run.bus}."
         )
-    emulation = _emulation()
+    emulation = load_emulation()
     with emulation.bench(run.prototype, run.seed, gui, run.network.path) as bench, _stop_is_no_error(order.out):
         workflow.drive_run(run, order, bench.bus, bench.clock, bench.operator, console, lambda: True)
 
@@ -236,17 +179,6 @@ def _stop_is_no_error(out: Path) -> Iterator[None]:
         raise typer.Exit(code=130) from None
 
 
-def _emulation() -> ModuleType:
-    """The emulated side, loaded only where it is asked for."""
-    try:
-        from hil import emulation
-    except ImportError as error:
-        raise UserError(
-            f"The emulator is not installed ({error.name}).", "Install it: pip install 'quasiomni[emulator]'."
-        ) from error
-    return emulation
-
-
 def _truth(prototype: str) -> Parameters:
     """What the emulated prototype was built with; needs its data file, not the engine."""
     from hil.truth import truth_of
@@ -278,25 +210,3 @@ def _clear_previous(out: Path) -> None:
         for log in folder.frames.glob("[0-9][0-9][0-9]_*"):
             log.unlink()
         folder.manifest.unlink()
-
-
-def _interrupt(_signal: int, _frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
-
-
-def main() -> None:
-    """Entry point: user errors become two lines and exit code 2; a closed terminal stops the drives like Ctrl-C."""
-    for name in ("SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), _interrupt)
-    try:
-        app()
-    except UserError as error:
-        label = "bus" if isinstance(error, BusError) else "error"
-        errors.print(f"[bold red]{label}:[/bold red] {escape(error.what)}", highlight=False)
-        errors.print(f"[bold]remedy:[/bold] {escape(error.remedy)}", highlight=False)
-        sys.exit(2)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,5 @@
+"""`python -m quasiomni`."""
+
+from quasiomni.application import main
+
+main()

@@ -1,0 +1,41 @@
+"""The command line's application object, its consoles, and its entry point."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from types import FrameType
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from ident.errors import BusError, UserError
+
+app = typer.Typer(
+    help="From prototype to trusted model: dynamic identification of quasi-omnidirectional platforms over CAN.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    rich_markup_mode="markdown",
+)
+console = Console()
+errors = Console(stderr=True)
+
+
+def _interrupt(_signal: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def main() -> None:
+    """Entry point: user errors become two lines and exit code 2; a closed terminal stops the drives like Ctrl-C."""
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _interrupt)
+    try:
+        app()
+    except UserError as error:
+        label = "bus" if isinstance(error, BusError) else "error"
+        errors.print(f"[bold red]{label}:[/bold red] {escape(error.what)}", highlight=False)
+        errors.print(f"[bold]remedy:[/bold] {escape(error.remedy)}", highlight=False)
+        sys.exit(2)

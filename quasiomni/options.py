@@ -1,0 +1,35 @@
+"""Options that several commands share, and what several commands need."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated
+
+import typer
+
+from ident.errors import UserError
+
+VehicleOption = Annotated[
+    str, typer.Option("--vehicle", help="Vehicle file: `prototype`, `compact`, or the path of your own.")
+]
+NetworkOption = Annotated[
+    Path | None, typer.Option("--network", help="Network file: nodes, units, directions. Default: the vehicle's.")
+]
+InertiaOption = Annotated[float | None, typer.Option("--b-w", help="Give B_w [kg m²] instead of lifting the wheels.")]
+InertiaStdOption = Annotated[
+    float | None, typer.Option("--b-w-std", help="Standard deviation of the B_w given [kg m²]; needed with --b-w.")
+]
+SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the excitation and of all emulated noise.")]
+GuiOption = Annotated[bool, typer.Option("--gui", help="Show the emulated vehicle in a window.")]
+
+
+def load_emulation() -> ModuleType:
+    """The emulated side, loaded only where it is asked for."""
+    try:
+        from hil import emulation
+    except ImportError as error:
+        raise UserError(
+            f"The emulator is not installed ({error.name}).", "Install it: pip install 'quasiomni[emulator]'."
+        ) from error
+    return emulation

@@ -1,0 +1,52 @@
+"""The command that serves the emulated vehicle to masters in other processes."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from hil.campaign.folder import network_file_of
+from hil.clock import WallClock
+from hil.network import load_network
+from quasiomni.application import app, console
+from quasiomni.options import GuiOption, NetworkOption, SeedOption, load_emulation
+
+
+class Stand(StrEnum):
+    """Where an emulated vehicle stands when it comes up."""
+
+    FLOOR = "floor"
+    JACK = "jack"
+
+
+@app.command()
+def emulate(
+    bus: Annotated[str, typer.Option(help="INTERFACE:CHANNEL to serve, e.g. `unix:/tmp/can0` or `socketcan:can0`.")],
+    prototype: Annotated[str, typer.Option(help="`prototype`, `compact`, or the path of your own.")] = "prototype",
+    network: NetworkOption = None,
+    seed: SeedOption = 1,
+    stand: Annotated[Stand, typer.Option(help="On the floor, or on the jack-stand, wheels free.")] = Stand.FLOOR,
+    lockstep: Annotated[bool, typer.Option("--lockstep", help="Time moves with the master's SYNC.")] = False,
+    duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
+    gui: GuiOption = False,
+) -> None:
+    """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
+    emulation = load_emulation()
+    network_file = network or network_file_of(prototype)
+    end = None if duration is None else time.monotonic() + duration
+    with (
+        emulation.vehicle(prototype, seed, gui) as vehicle,
+        emulation.server_bus(bus, load_network(network_file)) as opened,
+    ):
+        if stand is Stand.JACK:
+            vehicle.lift()
+        console.print(f"{prototype} is up on {bus}, {'in lockstep' if lockstep else 'in real time'}. Ctrl-C ends it.")
+        server = emulation.server(vehicle, opened, WallClock(), network_file, lockstep)
+        with contextlib.suppress(KeyboardInterrupt):
+            server.serve(lambda: end is not None and time.monotonic() > end)
+        served = server.report
+    console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
