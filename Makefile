@@ -35,5 +35,5 @@ clean:
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit("Python 3.11 or newer is needed, this is %d.%d." % v[:2] if v < (3, 11) else 0)'
 	@$(PYTHON) -c 'import sys; v = sys.version_info; v[:2] == (3, 11) or print("No Python 3.11 found: PyBullet has no wheel for %d.%d and will be compiled (10 to 30 minutes, needs a C++ compiler)." % v[:2])'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[emulator,records,test]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[emulator,records,dbc,ziglang,cosim,cluster,test]'
 	@touch $@
