@@ -16,6 +16,7 @@ class ErrorCode(IntEnum):
 
     NONE = 0x0000
     HEARTBEAT = 0x8130
+    BUS_OFF_RECOVERED = 0x8140
     PDO_LENGTH = 0x8210
     PDO_TOO_LONG = 0x8220
 

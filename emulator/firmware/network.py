@@ -41,7 +41,7 @@ class DeviceNetwork:
         self._routes: dict[int, list[Callable[[int, bytes], None]]] = {}
         self._sync_cob_id = description.sync_cob_id
         self.nodes = {node.node_id: self._make_node(node) for node in description.nodes}
-        self._in_order = tuple(self.nodes.values())
+        self._find_listeners()
         for node in self._in_order:
             node.power_on()
 
@@ -72,6 +72,29 @@ class DeviceNetwork:
     def next_event(self) -> float:
         """Instant of the next timer [s], infinite if there is none."""
         return self._timers.next_event()
+
+    def power_off(self, node_id: int) -> None:
+        """The supply of a node fails: its power stage is off, it neither hears nor sends."""
+        self.nodes[node_id].power_off()
+        self._find_listeners()
+
+    def power_on(self, node_id: int) -> None:
+        """The supply of a node is back: it boots."""
+        self.nodes[node_id].power_on()
+        self._find_listeners()
+
+    def bus_off(self, node_id: int) -> None:
+        """The CAN controller of a node goes bus-off: it neither hears nor sends, its application goes on."""
+        self.nodes[node_id].bus_off()
+        self._find_listeners()
+
+    def bus_on(self, node_id: int) -> None:
+        """The CAN controller of a node has recovered from bus-off."""
+        self.nodes[node_id].bus_on()
+        self._find_listeners()
+
+    def _find_listeners(self) -> None:
+        self._in_order = tuple(node for node in self.nodes.values() if node.network.connected)
 
     def _sync(self) -> None:
         for node in self._in_order:

@@ -53,18 +53,39 @@ class NodeBus:
     ) -> None:
         self._routes = routes
         self._mine: dict[int, Callable[[int, bytes], None]] = {}
-        self.send = send
+        self._transmit = send
+        self.connected = True
+
+    def send(self, cob_id: int, data: bytes) -> None:
+        """Transmit a frame; nothing leaves a node that is off the bus."""
+        if self.connected:
+            self._transmit(cob_id, data)
+
+    def connect(self) -> None:
+        """Hear and send again."""
+        if not self.connected:
+            self.connected = True
+            for cob_id, callback in self._mine.items():
+                self._routes.setdefault(cob_id, []).append(callback)
+
+    def disconnect(self) -> None:
+        """Neither hear nor send until `connect`; the subscriptions are kept."""
+        if self.connected:
+            self.connected = False
+            for cob_id, callback in self._mine.items():
+                self._routes[cob_id].remove(callback)
 
     def add_subscription(self, cob_id: int, callback: Callable[[int, bytes], None]) -> None:
         """Call `callback` with every frame of this identifier."""
         self.remove_subscription(cob_id)
         self._mine[cob_id] = callback
-        self._routes.setdefault(cob_id, []).append(callback)
+        if self.connected:
+            self._routes.setdefault(cob_id, []).append(callback)
 
     def remove_subscription(self, cob_id: int) -> None:
         """Stop listening to an identifier."""
         callback = self._mine.pop(cob_id, None)
-        if callback is not None:
+        if callback is not None and self.connected:
             self._routes[cob_id].remove(callback)
 
 
@@ -107,7 +128,24 @@ class Node:
 
     def power_on(self) -> None:
         """Boot: initialise, send the boot-up message, become pre-operational."""
+        self.network.connect()
         self.nmt.reset(application=True)
+
+    def power_off(self) -> None:
+        """The supply fails: nothing is sent any more, the power stage is off."""
+        self.network.disconnect()
+        self.nmt.enter(NmtState.INITIALISATION)
+        self.application.reset()
+
+    def bus_off(self) -> None:
+        """The CAN controller has counted 256 transmit errors (ISO 11898-1) and left the bus: a lost connection."""
+        self.network.disconnect()
+        self._connection_lost()
+
+    def bus_on(self) -> None:
+        """The CAN controller has recovered from bus-off."""
+        self.network.connect()
+        self.emergency.report(ErrorCode.BUS_OFF_RECOVERED, ErrorRegister.COMMUNICATION)
 
     def latch(self) -> None:
         """SYNC: apply the waiting RPDOs, then take the process values of this instant."""
@@ -183,6 +221,9 @@ class Node:
 
     def _heartbeat_lost(self, _node_id: int) -> None:
         self.emergency.report(ErrorCode.HEARTBEAT, ErrorRegister.COMMUNICATION)
+        self._connection_lost()
+
+    def _connection_lost(self) -> None:
         self.application.connection_lost()
         target = _ERROR_BEHAVIOUR[self.object_dictionary.value(0x1029, 1)]
         if target is not None and self.nmt.state is NmtState.OPERATIONAL:
