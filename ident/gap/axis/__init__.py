@@ -1,0 +1,1 @@
+"""Diagnosis of a servo axis, or of several coupled ones."""

@@ -1,0 +1,148 @@
+"""A gap as a regression: rows of a model, and columns that each possible cause would add to it.
+
+Builders (one for the vehicle, one for a servo axis) turn records into a `Problem`; everything statistical sees nothing
+else. The model of a block is
+
+    target = baseline p + Σ columns θ + noise,
+
+p shared by all blocks, θ by all blocks in which a candidate acts.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.vehicle.effects import EffectParameter
+
+Array = NDArray[np.float64]
+Contribution = Callable[[Array, Array], Sequence[Array | None]]
+"""Values of the parameters (k,) and of the baseline (p,) -> what a candidate adds to the model of every block, (N,)."""
+
+
+class Channel(enum.StrEnum):
+    """What is compared: rolling constraints, generalized torques, or simulated and recorded motion."""
+
+    KINEMATIC = "kinematic"
+    DYNAMIC = "dynamic"
+    OUTCOME = "outcome"
+
+
+@dataclass(frozen=True)
+class Block:
+    """Rows of one coordinate of one uninterrupted segment, all samples, in time.
+
+    Every series has passed the same zero-phase filter.
+
+    Attributes:
+        record: where the rows come from, for messages.
+        channel, step, coordinate: what they compare.
+        unit: of the target, SI.
+        sample_time: [s].
+        bandwidth: cutoff of the filter that the series have passed [rad/s].
+        target: (N,) measured.
+        baseline: (N, p) regressor of the model; columns of zeros where a parameter does not act.
+        moving: (N,) rows to be used; the others are stiction, or the ends of the filter.
+        period: (N,) number of the repeat, -1 outside of any.
+        regions: masks (N,) by name (`low_speed`, `forward`, ...) in which the gap is counted; they may overlap.
+        features: (N, f) states that an unknown cause might depend on (speeds, angles, accelerations); any scale.
+    """
+
+    record: str
+    channel: Channel
+    step: str
+    coordinate: str
+    unit: str
+    sample_time: float
+    bandwidth: float
+    target: Array
+    baseline: Array
+    moving: NDArray[np.bool_]
+    period: NDArray[np.int64]
+    regions: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    features: Array | None = None
+
+    @property
+    def label(self) -> str:
+        """Step and coordinate."""
+        return f"{self.step}/{self.coordinate}"
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Columns of a candidate, its nonlinear parameters held at one choice.
+
+    Attributes:
+        columns: one (N, k) a block, None where it does not act; filtered like the block.
+        start: coefficients of the columns (k,) -> values of all parameters of the candidate. None: they are the same.
+    """
+
+    columns: tuple[Array | None, ...]
+    start: Callable[[Array], Array] | None = None
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A possible cause at a place.
+
+    Attributes:
+        effect: canonical name.
+        where: place.
+        parameters: what its result is given in.
+        variants: at least one; several choices of nonlinear parameters are tried, the best one counts.
+        contribution: exact and nonlinear in the parameters, for the refit; None where the columns are all there is.
+        drift: it is a changed value of the model, no structure that the model lacks.
+    """
+
+    effect: str
+    where: str
+    parameters: tuple[EffectParameter, ...]
+    variants: tuple[Variant, ...]
+    contribution: Contribution | None = None
+    drift: bool = False
+
+    @property
+    def key(self) -> str:
+        """`effect@where`, unique in a problem."""
+        return f"{self.effect}@{self.where}"
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """Values of the model that is judged, and how well they are known: (p,) each, in the units of the baseline."""
+
+    values: Array
+    std: Array
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything that the search for causes sees of one or several records.
+
+    Attributes:
+        names, units: of the baseline's p parameters.
+        blocks: rows.
+        candidates: possible causes; the same ones, in the same order, in a problem to fit and one to confirm.
+        nominal: model that is judged; None: the baseline is refitted freely.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    blocks: tuple[Block, ...]
+    candidates: tuple[Candidate, ...]
+    nominal: Nominal | None = None
+
+    def candidate(self, key: str) -> Candidate:
+        """The candidate of that key.
+
+        Raises:
+            KeyError: there is none.
+        """
+        for candidate in self.candidates:
+            if candidate.key == key:
+                return candidate
+        raise KeyError(key)
