@@ -1,0 +1,149 @@
+"""C sources to shared libraries, by the cross compiler `ziglang` or, for this computer alone, the system's."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from fmu.platforms import Platform, host_platform
+from ident.errors import UserError
+
+HEADERS: Final = Path(__file__).parent / "headers"
+"""The header files of FMI 2.0.4 and 3.0.1, by the Modelica Association, 2-clause BSD licence."""
+
+FLAGS: Final = (
+    "-std=c99",
+    "-O2",
+    # The same operations in the same order on every processor: no fused multiply-add where others have none.
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fvisibility=hidden",
+    "-shared",
+)
+"""Of every platform; nothing that depends on the place of the sources, so that builds repeat byte for byte."""
+
+_UNIVERSAL_ALIGNMENT: Final = 14
+"""Binary logarithm of the page of arm64 macOS, where the slices of a universal binary start."""
+
+_UNIVERSAL_TYPES: Final = {"x86_64-darwin": (0x01000007, 3), "aarch64-darwin": (0x0100000C, 0)}
+"""Processor type and subtype in a universal binary (mach/machine.h)."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """How a compiler is called.
+
+    Attributes:
+        name: for people.
+        command: what to call, before the flags.
+        cross: whether it builds for every platform.
+    """
+
+    name: str
+    command: tuple[str, ...]
+    cross: bool
+
+
+def find_compiler() -> Compiler:
+    """The cross compiler where it is installed, else the system's.
+
+    Raises:
+        UserError: there is none.
+    """
+    if importlib.util.find_spec("ziglang") is not None:
+        return Compiler("ziglang", (sys.executable, "-m", "ziglang", "cc"), cross=True)
+    for name in ("cc", "gcc", "clang"):
+        path = shutil.which(name)
+        if path is not None:
+            return Compiler(name, (path,), cross=False)
+    raise UserError("There is no C compiler.", "Install one: pip install 'quasiomni[ziglang]'.")
+
+
+def check_platforms(compiler: Compiler, platforms: Sequence[Platform]) -> None:
+    """Refuse platforms that a compiler cannot build for.
+
+    Raises:
+        UserError: one of them is not this computer, and the compiler builds for nothing else.
+    """
+    others = [platform.name for platform in platforms if platform != host_platform()]
+    if others and not compiler.cross:
+        raise UserError(
+            f"{compiler.name} builds for this computer alone, not for {', '.join(others)}.",
+            "Install the cross compiler: pip install 'quasiomni[ziglang]', or build with --platforms host.",
+        )
+
+
+def compile_libraries(
+    sources: Mapping[str, bytes],
+    platforms: Sequence[Platform],
+    compiler: Compiler,
+    progress: Callable[[Platform], None],
+) -> dict[str, bytes]:
+    """Shared libraries of C sources, by the names of the platforms.
+
+    The cross compiler keeps its objects and the C libraries of its targets in the user's cache folder. The first
+    build for Windows compiles such a library, which takes a minute.
+
+    Args:
+        sources: file name -> text, `.c` files and the headers that they include.
+        platforms: what to build for.
+        compiler: from `find_compiler`.
+        progress: called with each platform that is done.
+
+    Raises:
+        UserError: the compiler cannot build for a platform, or reports an error; its last lines are told.
+    """
+    check_platforms(compiler, platforms)
+    with tempfile.TemporaryDirectory(prefix="quasiomni-") as folder:
+        for name, text in sources.items():
+            (Path(folder) / name).write_bytes(text)
+        units = sorted(name for name in sources if name.endswith(".c"))
+
+        def build(platform: Platform) -> bytes:
+            library = _compile(Path(folder), units, platform, compiler)
+            progress(platform)
+            return library
+
+        with ThreadPoolExecutor(max_workers=max(1, os.cpu_count() or 1)) as pool:
+            built = list(pool.map(build, platforms))
+    return {platform.name: library for platform, library in zip(platforms, built, strict=True)}
+
+
+def _compile(folder: Path, units: Sequence[str], platform: Platform, compiler: Compiler) -> bytes:
+    # A macOS library carries its own name, so the name must not depend on where it is built.
+    output = Path(platform.name) / f"model{platform.suffix}"
+    (folder / output.parent).mkdir()
+    windows = platform.suffix == ".dll"
+    target = ("-target", platform.target, "-s") if compiler.cross else ("-s",)
+    flags = (*FLAGS, *platform.flags, *target, *(() if windows else ("-fPIC",)), "-I", str(HEADERS))
+    call = (*compiler.command, *flags, "-o", str(output), *units, *(() if windows else ("-lm",)))
+    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        tail = " / ".join(done.stderr.strip().splitlines()[-3:])
+        raise UserError(
+            f"{compiler.name} cannot build for {platform.name}: {tail}",
+            "Mend the compiler, or leave that platform out (--platforms).",
+        )
+    return (folder / output).read_bytes()
+
+
+def universal_binary(slices: Mapping[str, bytes]) -> bytes:
+    """One macOS library for several processors (mach-o/fat.h), of libraries by the names of their platforms."""
+    page = 1 << _UNIVERSAL_ALIGNMENT
+    header = struct.pack(">II", 0xCAFEBABE, len(slices))
+    body = b""
+    for name, library in slices.items():
+        offset = page + len(body)
+        header += struct.pack(">IIIII", *_UNIVERSAL_TYPES[name], offset, len(library), _UNIVERSAL_ALIGNMENT)
+        body += library + bytes(-len(library) % page)
+    return header.ljust(page, b"\0") + body
