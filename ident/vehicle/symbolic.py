@@ -26,7 +26,7 @@ from ident.vehicle.parameters import PARAMETER_NAMES
 
 Expression = Any  # casadi.SX has no type stubs
 
-_CORNERS: Final = ((+1, +1), (-1, +1), (+1, -1), (-1, -1))
+CORNERS: Final = ((+1, +1), (-1, +1), (+1, -1), (-1, -1))
 """Signs of (x_i, y_i) of the steering axes, order fl, rl, fr, rr; also heading and side sign."""
 
 GEOMETRY: Final = ca.SX.sym("geometry", 5)
@@ -50,7 +50,7 @@ LENGTHS: Final = Lengths(*ca.vertsplit(GEOMETRY))
 def constraint_matrix(alpha: Expression) -> Expression:
     """A(α) of (2), (8, 9): four lateral rows, then four longitudinal rows."""
     lateral, longitudinal = [], []
-    for wheel, (x_sign, y_sign) in enumerate(_CORNERS):
+    for wheel, (x_sign, y_sign) in enumerate(CORNERS):
         delta_sign, side = x_sign, y_sign
         delta = delta_sign * (alpha[0] if side > 0 else alpha[1])
         tangent = ca.vertcat(ca.cos(delta), ca.sin(delta))
