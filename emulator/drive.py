@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from emulator.encoder import wrap_signed
 from emulator.engine import Engine
 from emulator.noise import Disturbances
+from emulator.power_stage import PowerStage, PowerStageData, Trip
 from emulator.prototype import DriveData
 
 
@@ -29,6 +31,7 @@ class Drive:
     def __init__(
         self,
         data: DriveData,
+        stage: PowerStageData,
         wheel: int,
         gear_ratio: float,
         engine: Engine,
@@ -46,6 +49,7 @@ class Drive:
         self._wheel = wheel
         self._engine = engine
         self._disturbances = disturbances
+        self._stage = PowerStage(stage, data.rated_torque, data.rated_current, data.peak_current, engine.step_size)
         self._enabled = False
         self._target = self._setpoint = 0.0
         self._ramp_steps = max(1, round(data.interpolation_time / engine.step_size))
@@ -61,8 +65,32 @@ class Drive:
         """Whether the power stage is on."""
         return self._enabled
 
+    @property
+    def voltage(self) -> float:
+        """Of the DC link [V]."""
+        return self._stage.voltage
+
+    @property
+    def voltage_range(self) -> tuple[float, float]:
+        """DC-link voltages at which the chopper starts and at which the drive trips [V]."""
+        return self._stage.voltage_range
+
+    @property
+    def thermal_load(self) -> float:
+        """I2t load [-]; rated current settles at 1."""
+        return self._stage.thermal_load
+
+    def watch(self, tripped: Callable[[Trip], None]) -> None:
+        """Call `tripped` whenever the power stage trips."""
+        self._stage.watch(tripped)
+
+    def trip(self, cause: Trip) -> None:
+        """Let the protection respond to something that it has noticed."""
+        self._stage.report(cause)
+
     def enable(self) -> None:
-        """Switch the power stage on, at zero torque."""
+        """Switch the power stage on, at zero torque; an earlier trip is forgotten."""
+        self._stage.clear()
         self._enabled = True
 
     def disable(self) -> None:
@@ -72,10 +100,19 @@ class Drive:
         self._steps_left = 0
 
     def command(self, torque: float) -> None:
-        """Set-point at the motor shaft [Nm], drive's sign, limited to peak torque; void while disabled."""
+        """Set-point at the motor shaft [Nm], drive's sign, limited to peak torque; void while disabled.
+
+        It is reached over the interpolation time, as set-points of the bus are in cyclic modes.
+        """
         if self._enabled:
             self._target = min(max(torque, -self.peak_torque), self.peak_torque)
             self._steps_left = self._ramp_steps
+
+    def control(self, torque: float) -> None:
+        """Set-point of the drive's own loops, as `command`; they run as fast as the engine: no interpolation."""
+        if self._enabled:
+            self._target = min(max(torque, -self.peak_torque), self.peak_torque)
+            self._steps_left = 1
 
     def measured_torque(self) -> float:
         """Instantaneous torque at the motor shaft plus sensor noise [Nm], drive's sign."""
@@ -93,6 +130,7 @@ class Drive:
     def advance(self) -> None:
         """Move set-point and current by one engine step."""
         if not self._enabled:
+            self._stage.rest()
             return
         start = self._setpoint
         if self._steps_left:
@@ -100,3 +138,6 @@ class Drive:
             self._steps_left -= 1
         self.torque = self._keep * self.torque + self._from_start * start + self._from_end * self._setpoint
         self.wheel_torque = self._shaft_ratio * self.torque
+        trip = self._stage.advance(self.torque, self.velocity())
+        if trip is not None:
+            self._stage.report(trip)

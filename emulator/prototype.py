@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from emulator.power_stage import PowerStageData
 from emulator.rigid_bodies import RigidBodies, derive_rigid_bodies
 from ident.errors import DataFileError
 from ident.vehicle.description import find_data_file
@@ -31,6 +32,17 @@ TABLE_UNITS: Final[Mapping[str, Mapping[str, str]]] = {
         "interpolation_time": "s",
         "counts_per_revolution": "1",
         **{f"direction_{wheel}": "1" for wheel in WHEELS},
+    },
+    "power_stage": {
+        "supply_voltage": "V",
+        "link_capacitance": "F",
+        "chopper_voltage": "V",
+        "chopper_power": "W",
+        "over_voltage": "V",
+        "phase_resistance": "Ohm",
+        "peak_time": "s",
+        "overload_time": "s",
+        "stall_time": "s",
     },
     "steering_encoder": {
         "counts_per_revolution": "1",
@@ -137,7 +149,7 @@ class Prototype:
         rigid_bodies: masses and inertias of chassis, knuckles, wheels; their totals are `truth`.
         floor_friction: adhesion between wheel and floor [-].
         tyre: radial compliance of the wheels.
-        drive, encoder, noise: data sheets.
+        drive, power_stage, encoder, noise: data sheets.
     """
 
     name: str
@@ -148,6 +160,7 @@ class Prototype:
     floor_friction: float
     tyre: Tyre
     drive: DriveData
+    power_stage: PowerStageData
     encoder: EncoderData
     noise: NoiseData
 
@@ -176,6 +189,7 @@ def load_prototype(name_or_path: str | Path = "prototype") -> Prototype:
         floor_friction=tables["floor"]["friction"],
         tyre=Tyre(**tables["tyre"]),
         drive=_drive(tables["drive"], path),
+        power_stage=_power_stage(tables["power_stage"], path),
         encoder=_encoder(tables["steering_encoder"], path),
         noise=NoiseData(**tables["noise"]),
     )
@@ -230,6 +244,15 @@ def _drive(table: dict[str, float], path: Path) -> DriveData:
     return DriveData(
         counts_per_revolution=_whole(table, "counts_per_revolution", where), directions=directions, **table
     )
+
+
+def _power_stage(table: dict[str, float], path: Path) -> PowerStageData:
+    if not table["supply_voltage"] < table["chopper_voltage"] < table["over_voltage"]:
+        raise DataFileError(
+            f"{path}: power_stage: supply, chopper and over-voltage are not in ascending order.",
+            "Check the data sheet: the chopper works above the supply and below the trip level.",
+        )
+    return PowerStageData(**table)
 
 
 def _encoder(table: dict[str, float], path: Path) -> EncoderData:

@@ -80,7 +80,9 @@ class EmulatedVehicle:
         self.engine = Engine(prototype, step_size=engine_step, gui=gui, settings=solver)
         self._noise = Disturbances(prototype, seed=seed, scale=noise_scale, step=engine_step)
         ratio = prototype.geometry.gear_ratio
-        fl, rl, fr, rr = (Drive(prototype.drive, wheel, ratio, self.engine, self._noise) for wheel in range(4))
+        fl, rl, fr, rr = (
+            Drive(prototype.drive, prototype.power_stage, wheel, ratio, self.engine, self._noise) for wheel in range(4)
+        )
         self.drives = (fl, rl, fr, rr)
         left, right = (Encoder(prototype.encoder, side, self.engine, self._noise) for side in range(2))
         self.encoders = (left, right)

@@ -6,7 +6,10 @@ It stands in for the vehicle where only the protocol is of interest, without a p
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+
+from emulator.power_stage import Trip
 
 
 @dataclass
@@ -22,6 +25,19 @@ class FlywheelDrive:
     angle: float = 0.0
     speed: float = 0.0
     torque: float = 0.0
+    voltage: float = 282.0
+    voltage_range: tuple[float, float] = (380.0, 410.0)
+    thermal_load: float = 0.0
+    tripped: Callable[[Trip], None] | None = None
+
+    def watch(self, tripped: Callable[[Trip], None]) -> None:
+        """Call `tripped` on `trip`; nothing else makes this protection respond."""
+        self.tripped = tripped
+
+    def trip(self, cause: Trip) -> None:
+        """Let the protection respond."""
+        if self.tripped is not None:
+            self.tripped(cause)
 
     def enable(self) -> None:
         """Switch the power stage on, at zero torque."""
@@ -36,6 +52,10 @@ class FlywheelDrive:
     def command(self, torque: float) -> None:
         """Apply a torque [Nm] while the power stage is on."""
         self.torque = torque if self.enabled else 0.0
+
+    def control(self, torque: float) -> None:
+        """Apply a torque [Nm] while the power stage is on."""
+        self.command(torque)
 
     def measured_torque(self) -> float:
         """The torque applied [Nm]."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
+
+from emulator.power_stage import Trip
 
 
 class DriveHardware(Protocol):
@@ -21,6 +23,21 @@ class DriveHardware(Protocol):
     def counts_per_revolution(self) -> int:
         """Increments of the shaft encoder per motor revolution."""
 
+    @property
+    def voltage(self) -> float:
+        """Of the DC link [V]."""
+
+    @property
+    def voltage_range(self) -> tuple[float, float]:
+        """DC-link voltages at which the brake chopper starts and at which the protection responds [V]."""
+
+    @property
+    def thermal_load(self) -> float:
+        """I2t load [-]; rated current settles at 1."""
+
+    def watch(self, tripped: Callable[[Trip], None]) -> None:
+        """Call `tripped` whenever the protection responds."""
+
     def enable(self) -> None:
         """Switch the power stage on; the torque command starts at zero."""
 
@@ -28,7 +45,10 @@ class DriveHardware(Protocol):
         """Switch the power stage off; the shaft coasts."""
 
     def command(self, torque: float) -> None:
-        """Ask the current loop for a shaft torque [Nm]."""
+        """Ask the current loop for a shaft torque [Nm], reached over the interpolation time of the bus cycle."""
+
+    def control(self, torque: float) -> None:
+        """Ask the current loop for a shaft torque [Nm] at once, as the drive's own loops do."""
 
     def measured_torque(self) -> float:
         """Shaft torque from the measured current [Nm]."""
