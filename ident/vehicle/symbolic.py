@@ -47,23 +47,31 @@ class Lengths:
 LENGTHS: Final = Lengths(*ca.vertsplit(GEOMETRY))
 
 
-def constraint_matrix(alpha: Expression) -> Expression:
-    """A(α) of (2), (8, 9): four lateral rows, then four longitudinal rows."""
+def wheel_headings(alpha: Expression) -> Expression:
+    """δ (4,) of the wheels in the chassis: +α of their side in front, -α behind."""
+    return ca.vertcat(*(front * (alpha[0] if side > 0 else alpha[1]) for front, side in CORNERS))
+
+
+def contact_rows(headings: Expression) -> Expression:
+    """A_ch of (2) for wheel headings δ (4,), (8, 3): velocities of the contacts across, then along the wheels."""
     lateral, longitudinal = [], []
-    for wheel, (x_sign, y_sign) in enumerate(CORNERS):
-        delta_sign, side = x_sign, y_sign
-        delta = delta_sign * (alpha[0] if side > 0 else alpha[1])
+    for wheel, (x_sign, side) in enumerate(CORNERS):
+        delta = headings[wheel]
         tangent = ca.vertcat(ca.cos(delta), ca.sin(delta))
         normal = ca.vertcat(-ca.sin(delta), ca.cos(delta))
-        lever = ca.vertcat(-y_sign * LENGTHS.b / 2, x_sign * LENGTHS.l / 2)
-        offset = LENGTHS.a * side
-        steering = ca.SX.zeros(1, 2)
-        steering[0 if side > 0 else 1] = -offset * delta_sign
-        rolling = ca.SX.zeros(1, 4)
-        rolling[wheel] = -LENGTHS.r
-        lateral.append(ca.horzcat(normal.T, ca.dot(normal, lever), ca.SX.zeros(1, 6)))
-        longitudinal.append(ca.horzcat(tangent.T, ca.dot(tangent, lever) - offset, steering, rolling))
+        lever = ca.vertcat(-side * LENGTHS.b / 2, x_sign * LENGTHS.l / 2)
+        lateral.append(ca.horzcat(normal.T, ca.dot(normal, lever)))
+        longitudinal.append(ca.horzcat(tangent.T, ca.dot(tangent, lever) - LENGTHS.a * side))
     return ca.vertcat(*lateral, *longitudinal)
+
+
+def constraint_matrix(alpha: Expression) -> Expression:
+    """A(α) of (2), (8, 9): four lateral rows, then four longitudinal rows."""
+    joints = ca.SX.zeros(8, 6)
+    for wheel, (front, side) in enumerate(CORNERS):
+        joints[4 + wheel, 0 if side > 0 else 1] = -LENGTHS.a * side * front
+        joints[4 + wheel, 2 + wheel] = -LENGTHS.r
+    return ca.horzcat(contact_rows(wheel_headings(alpha)), joints)
 
 
 def odometry(alpha: Expression, steering_rates: Expression, wheel_rates: Expression) -> Expression:
