@@ -4,12 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Protocol
 
 from emulator.encoder import wrap_signed
-from emulator.engine import Engine
 from emulator.noise import Disturbances
 from emulator.power_stage import PowerStage, PowerStageData, Trip
 from emulator.prototype import DriveData
+
+
+class Shafts(Protocol):
+    """The motor shafts as their encoders take them, divided by the gear ratio; wheels fl, rl, fr, rr."""
+
+    @property
+    def step_size(self) -> float:
+        """Of the engine [s]."""
+
+    def wheel_angle(self, wheel: int) -> float:
+        """[rad]."""
+
+    def wheel_rate(self, wheel: int) -> float:
+        """[rad/s]."""
 
 
 class Drive:
@@ -34,7 +48,7 @@ class Drive:
         stage: PowerStageData,
         wheel: int,
         gear_ratio: float,
-        engine: Engine,
+        shafts: Shafts,
         disturbances: Disturbances,
     ) -> None:
         self.rated_torque = data.rated_torque
@@ -47,15 +61,15 @@ class Drive:
         self._shaft_ratio = data.directions[wheel] * gear_ratio
         self._increments = self._shaft_ratio * data.counts_per_revolution / math.tau
         self._wheel = wheel
-        self._engine = engine
+        self._shafts = shafts
         self._disturbances = disturbances
-        self._stage = PowerStage(stage, data.rated_torque, data.rated_current, data.peak_current, engine.step_size)
+        self._stage = PowerStage(stage, data.rated_torque, data.rated_current, data.peak_current, shafts.step_size)
         self._enabled = False
         self._target = self._setpoint = 0.0
-        self._ramp_steps = max(1, round(data.interpolation_time / engine.step_size))
+        self._ramp_steps = max(1, round(data.interpolation_time / shafts.step_size))
         self._steps_left = 0
         # Exact response of T' = w (s - T) over one step while s goes linearly from s0 to s1.
-        lag = data.current_loop_bandwidth * engine.step_size
+        lag = data.current_loop_bandwidth * shafts.step_size
         self._keep = math.exp(-lag)
         self._from_end = 1 - (1 - self._keep) / lag
         self._from_start = 1 - self._keep - self._from_end
@@ -120,12 +134,12 @@ class Drive:
 
     def position(self) -> int:
         """Motor position [increments], signed 32 bit wrapped, drive's sign."""
-        exact = self._increments * self._engine.wheel_angle(self._wheel)
+        exact = self._increments * self._shafts.wheel_angle(self._wheel)
         return wrap_signed(round(exact + self._disturbances.motor_dither[self._wheel]))
 
     def velocity(self) -> float:
         """Speed of the motor shaft [rad/s], drive's sign."""
-        return self._shaft_ratio * self._engine.wheel_rate(self._wheel)
+        return self._shaft_ratio * self._shafts.wheel_rate(self._wheel)
 
     def advance(self) -> None:
         """Move set-point and current by one engine step."""

@@ -13,13 +13,11 @@ from typing import Any, Final
 
 import pybullet
 
+from emulator.as_built import GRAVITY, AsBuilt
 from emulator.prototype import Prototype
 from emulator.urdf import generate_urdf, rolling_joint, steering_joint
 from ident.errors import UserError
 from ident.vehicle.geometry import WHEELS
-
-GRAVITY: Final = 9.80665
-"""Standard gravity [m/s^2]; CGPM 1901."""
 
 STAND_CLEARANCE: Final = 0.05
 """Height of the wheels above the floor on the jack-stand [m]."""
@@ -54,8 +52,16 @@ class Engine:
     The engine integrates by semi-implicit Euler: a step's velocities are those of the middle of the step, its
     positions those of the end. Coulomb friction is a velocity motor with target zero, true dry friction.
 
+    Args:
+        prototype: what its files say.
+        step_size: [s].
+        gui: show it in a window.
+        settings: of the constraint solver.
+        built: the vehicle as it is built; without deviation from the prototype when left out.
+
     Attributes:
         client: PyBullet's id of this physics world.
+        coulomb: (8,) largest torque of the dry friction in each joint, as built [Nm].
         body: PyBullet's id of the vehicle in it.
         joints: engine indices of the eight joints.
         step_size: [s].
@@ -72,14 +78,16 @@ class Engine:
         step_size: float,
         gui: bool,
         settings: SolverSettings = DEFAULT_SOLVER,
+        built: AsBuilt | None = None,
     ) -> None:
         self.step_size = step_size
-        self._prototype = prototype
+        self._built = built or AsBuilt.of(prototype)
+        self._prototype = self._built.prototype
         self._settings = settings
-        self._urdf = generate_urdf(prototype)
-        truth = prototype.truth
-        self._coulomb = [truth[symbol] / 2 for symbol in ("d_cl", "d_cl", "d_cr", "d_cr")]
-        self._coulomb += [truth["d_cw"]] * 4
+        self._urdf = generate_urdf(self._built)
+        truth = self._prototype.truth
+        self.coulomb = [truth[symbol] / 2 for symbol in ("d_cl", "d_cl", "d_cr", "d_cr")]
+        self.coulomb += [truth["d_cw"]] * 4
         self.client = _open_window() if gui else pybullet.connect(pybullet.DIRECT)
         self.place(on_stand=False, angles=[0.0] * 8)
 
@@ -99,18 +107,12 @@ class Engine:
         names = [steering_joint(wheel) for wheel in WHEELS] + [rolling_joint(wheel) for wheel in WHEELS]
         self.joints = [by_name[name] for name in names]
         self._set_surfaces()
-        self._couple(0, 1)
-        self._couple(2, 3)
+        for side, front in enumerate((0, 2)):
+            if self._built.couplings[side] is None:
+                self._couple(front, front + 1)
         for joint, angle in zip(self.joints, angles, strict=True):
             pybullet.resetJointState(self.body, joint, angle, 0.0, physicsClientId=self.client)
-        pybullet.setJointMotorControlArray(
-            self.body,
-            self.joints,
-            pybullet.VELOCITY_CONTROL,
-            targetVelocities=[0.0] * 8,
-            forces=self._coulomb,
-            physicsClientId=self.client,
-        )
+        self.set_friction(self.coulomb)
         self._states = self._previous = self._read()
 
     def step(self, torques: Sequence[float]) -> None:
@@ -122,6 +124,23 @@ class Engine:
         pybullet.stepSimulation(client)
         self._previous = self._states
         self._states = pybullet.getJointStates(self.body, self.joints, client)
+
+    def set_friction(self, torques: Sequence[float]) -> None:
+        """Largest torque of the dry friction in each joint from now on (8,) [Nm]."""
+        pybullet.setJointMotorControlArray(
+            self.body,
+            self.joints,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=[0.0] * 8,
+            forces=torques,
+            physicsClientId=self.client,
+        )
+
+    def push(self, force: tuple[float, float, float]) -> None:
+        """A force on the chassis in its own frame, at its centre of mass, for the next step [N]."""
+        pybullet.applyExternalForce(
+            self.body, -1, force, (0.0, 0.0, 0.0), pybullet.LINK_FRAME, physicsClientId=self.client
+        )
 
     def angles(self) -> list[float]:
         """(8,) joint angles [rad]."""
@@ -149,19 +168,44 @@ class Engine:
         return float(1.5 * self._states[joint][1] - 0.5 * self._previous[joint][1])
 
     def base_pose(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Position [m] and orientation quaternion (x, y, z, w) of the chassis in the world."""
+        """Position [m] of the centre and orientation quaternion (x, y, z, w) of the chassis in the world."""
         position, orientation = pybullet.getBasePositionAndOrientation(self.body, self.client)
-        return position, orientation
+        return self._centre(position, orientation), orientation
 
     def base_velocity(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Linear [m/s] and angular [rad/s] velocity of the chassis in the world, over the last step."""
         linear, angular = pybullet.getBaseVelocity(self.body, self.client)
+        arm = self._arm()
+        if arm is not None:
+            _, orientation = pybullet.getBasePositionAndOrientation(self.body, self.client)
+            turned = pybullet.rotateVector(orientation, arm)
+            linear = tuple(v + c for v, c in zip(linear, _cross(angular, turned), strict=True))
         return linear, angular
+
+    def twist(self) -> tuple[float, float, float]:
+        """(x', y', gamma') of the chassis in its own frame [m/s, m/s, rad/s], of half a step ago."""
+        (vx, vy, _), (_, _, yaw_rate) = self.base_velocity()
+        _, (_, _, qz, qw) = self.base_pose()
+        heading = 2 * math.atan2(qz, qw)
+        cosine, sine = math.cos(heading), math.sin(heading)
+        return cosine * vx + sine * vy, cosine * vy - sine * vx, yaw_rate
 
     def close(self) -> None:
         """Disconnect from the physics world."""
         if pybullet.isConnected(self.client):
             pybullet.disconnect(self.client)
+
+    def _arm(self) -> tuple[float, float, float] | None:
+        """From the chassis' centre of mass to its centre, in its frame [m]; None where they are one."""
+        x, y, z = self._prototype.rigid_bodies.chassis.centre
+        return (-x, -y, -z) if x or y or z else None
+
+    def _centre(self, position: tuple[float, ...], orientation: tuple[float, ...]) -> tuple[float, ...]:
+        arm = self._arm()
+        if arm is None:
+            return position
+        turned = pybullet.rotateVector(orientation, arm)
+        return tuple(p + t for p, t in zip(position, turned, strict=True))
 
     def _read(self) -> Any:
         return pybullet.getJointStates(self.body, self.joints, self.client)
@@ -169,7 +213,7 @@ class Engine:
     def _prepare_world(self) -> None:
         client = self.client
         pybullet.resetSimulation(physicsClientId=client)
-        pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
+        pybullet.setGravity(*self._built.gravity, physicsClientId=client)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=self.step_size,
             numSolverIterations=self._settings.iterations,
@@ -241,6 +285,15 @@ class Engine:
                 jointDamping=0.0,
                 physicsClientId=self.client,
             )
+        grip_of_weight = quarter_mass * GRAVITY * self._prototype.floor_friction
+        for joint, build in zip(self.joints[_ROLLING:], self._built.wheels, strict=True):
+            pybullet.changeDynamics(
+                self.body,
+                joint,
+                lateralFriction=build.grip,
+                spinningFriction=build.patch_torque / grip_of_weight,
+                physicsClientId=self.client,
+            )
 
     def _couple(self, front: int, rear: int) -> None:
         """Couple the steering of two units of a side: the rear turns against the front."""
@@ -262,6 +315,10 @@ class Engine:
             maxForce=self._settings.coupling_force,
             physicsClientId=self.client,
         )
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def _open_window() -> int:

@@ -1,6 +1,6 @@
 """The vehicle as URDF, generated from the prototype.
 
-Frames: x forward, y left, z up. Link `chassis` with its origin at the centre of mass; joint
+Frames: x forward, y left, z up. Link `chassis` with its origin over the centre of the four steering axes; joint
 `steering_<wheel>` about z at each corner; joint `rolling_<wheel>` about the wheel's axle (y of the knuckle),
 positive when the wheel rolls forward. The wheel touches the floor as a sphere: one contact point,
 exactly below the wheel's centre at distance r whatever the load, which is the point contact that the
@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
+from emulator.as_built import AsBuilt, WheelBuild
 from emulator.prototype import Prototype
 from emulator.rigid_bodies import RigidBody
 from ident.vehicle.geometry import WHEELS
@@ -45,13 +46,15 @@ def rolling_joint(wheel: str) -> str:
     return f"rolling_{wheel}"
 
 
-def generate_urdf(prototype: Prototype) -> str:
-    """URDF text of the prototype; masses [kg], lengths [m], inertias [kg m^2]."""
+def generate_urdf(built: AsBuilt) -> str:
+    """URDF text of a vehicle as built; masses [kg], lengths [m], inertias [kg m^2]."""
+    prototype = built.prototype
     parts = ['<?xml version="1.0"?>', f'<robot name="{prototype.name}">', *_chassis(prototype)]
     knuckles = dict(zip(WHEELS, prototype.rigid_bodies.knuckles, strict=True))
+    wheels = dict(zip(WHEELS, built.wheels, strict=True))
     for wheel in LINK_ORDER:
         parts += _knuckle(prototype, wheel, knuckles[wheel])
-        parts += _wheel(prototype, wheel)
+        parts += _wheel(prototype, wheel, wheels[wheel])
     return "\n".join([*parts, "</robot>", ""])
 
 
@@ -79,7 +82,7 @@ def _chassis(prototype: Prototype) -> Iterator[str]:
     box = f'<box size="{_vector(body.length, body.width, body.height)}"/>'
     yield '<link name="chassis">'
     yield _inertial(prototype.rigid_bodies.chassis)
-    # Seen above the wheels; the mass stays at the link's origin.
+    # Seen above the wheels; the mass stays where it is.
     lift = 2 * prototype.geometry.wheel_radius + body.height / 2 - body.centre_height
     yield _visual(box, _BODY_COLOUR, "body", xyz=_vector(0, 0, lift))
     yield "</link>"
@@ -102,15 +105,18 @@ def _knuckle(prototype: Prototype, wheel: str, body: RigidBody) -> Iterator[str]
     yield f'<limit lower="-{limit}" upper="{limit}" effort="0" velocity="0"/></joint>'
 
 
-def _wheel(prototype: Prototype, wheel: str) -> Iterator[str]:
+def _wheel(prototype: Prototype, wheel: str, build: WheelBuild) -> Iterator[str]:
     geometry = prototype.geometry
-    radius = f"{geometry.wheel_radius:.17g}"
+    radius = f"{build.radius:.17g}"
     width = _vector(TYRE_WIDTH_RATIO * geometry.wheel_radius)
     tyre = f'<cylinder radius="{radius}" length="{width}"/>'
-    offset = _vector(0, SIDE_SIGN[wheel] * geometry.wheel_offset, 0)
-    yield f'<link name="wheel_{wheel}">{_inertial(prototype.rigid_bodies.wheel)}'
-    yield _visual(tyre, _TYRE_COLOUR, "tyre", rpy=_vector(math.pi / 2, 0, 0))
-    yield f'<collision><geometry><sphere radius="{radius}"/></geometry></collision></link>'
+    # The axle of a larger wheel sits higher, so that all four wheels stand on the floor alike.
+    offset = _vector(0, SIDE_SIGN[wheel] * geometry.wheel_offset, build.radius - geometry.wheel_radius)
+    # Turned by beta about the axle, the centre stands eccentricity cos(beta + phase) below it.
+    centre = _vector(-build.eccentricity * math.sin(build.phase), 0, -build.eccentricity * math.cos(build.phase))
+    yield f'<link name="wheel_{wheel}">{_inertial(build.body)}'
+    yield _visual(tyre, _TYRE_COLOUR, "tyre", xyz=centre, rpy=_vector(math.pi / 2, 0, 0))
+    yield f'<collision><origin xyz="{centre}"/><geometry><sphere radius="{radius}"/></geometry></collision></link>'
     yield f'<joint name="{rolling_joint(wheel)}" type="continuous">'
     yield f'<parent link="knuckle_{wheel}"/><child link="wheel_{wheel}"/>'
     yield f'<origin xyz="{offset}"/><axis xyz="0 1 0"/></joint>'

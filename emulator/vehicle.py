@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Final, Self
 
 from emulator.drive import Drive
+from emulator.effects.assembly import Mechanics
+from emulator.effects.injection import inject
 from emulator.encoder import Encoder
 from emulator.engine import DEFAULT_SOLVER, Engine, SolverSettings
 from emulator.noise import Disturbances
 from emulator.prototype import Prototype
+from ident.vehicle.effects import Effect
 
 SETTLING_TIME: Final = 0.5
 """Time that the vehicle gets to come to rest on the floor [s]; it does not count as simulated time."""
@@ -54,6 +58,7 @@ class EmulatedVehicle:
         noise_scale: factor on every random source; 0 switches noise off.
         engine_step: [s].
         solver: settings of the engine's constraint solver.
+        effects: that it has beyond its prototype file.
 
     Attributes:
         drives: of the wheels fl, rl, fr, rr.
@@ -61,7 +66,7 @@ class EmulatedVehicle:
         engine: the physics below, for benchmarks and tests.
 
     Raises:
-        UserError: a window is asked for where there is no display.
+        UserError: a window is asked for where there is no display, or the vehicle cannot have these effects.
     """
 
     drives: tuple[Drive, Drive, Drive, Drive]
@@ -76,16 +81,22 @@ class EmulatedVehicle:
         noise_scale: float = 1.0,
         engine_step: float = 1e-3,
         solver: SolverSettings = DEFAULT_SOLVER,
+        effects: Sequence[Effect] = (),
     ) -> None:
-        self.engine = Engine(prototype, step_size=engine_step, gui=gui, settings=solver)
+        injection = inject(prototype, effects)
+        prototype = injection.built.prototype
+        self.engine = Engine(prototype, step_size=engine_step, gui=gui, settings=solver, built=injection.built)
+        self._mechanics = Mechanics(injection, self.engine)
         self._noise = Disturbances(prototype, seed=seed, scale=noise_scale, step=engine_step)
         ratio = prototype.geometry.gear_ratio
         fl, rl, fr, rr = (
-            Drive(prototype.drive, prototype.power_stage, wheel, ratio, self.engine, self._noise) for wheel in range(4)
+            Drive(prototype.drive, prototype.power_stage, wheel, ratio, self._mechanics.shafts, self._noise)
+            for wheel in range(4)
         )
         self.drives = (fl, rl, fr, rr)
-        left, right = (Encoder(prototype.encoder, side, self.engine, self._noise) for side in range(2))
+        left, right = (Encoder(prototype.encoder, side, self._mechanics.steering, self._noise) for side in range(2))
         self.encoders = (left, right)
+        self._mechanics.connect(self.drives)
         truth = prototype.truth
         self._viscous = [truth[symbol] / 2 for symbol in ("d_vl", "d_vl", "d_vr", "d_vr")]
         self._viscous += [truth["d_vw"]] * 4
@@ -106,7 +117,7 @@ class EmulatedVehicle:
         self._owed -= steps * step
         for _ in range(steps):
             self._step()
-        self._steps += steps
+            self._steps += 1
 
     def lift(self) -> None:
         """Put the vehicle on the jack-stand: chassis held, wheels free in the air, everything at rest.
@@ -114,6 +125,7 @@ class EmulatedVehicle:
         Angles and the state of the drives stay.
         """
         self.engine.place(on_stand=True, angles=self.engine.angles())
+        self._mechanics.settle()
 
     def lower(self) -> None:
         """Take the vehicle off the jack-stand: on the floor at the origin, settled and at rest.
@@ -126,14 +138,12 @@ class EmulatedVehicle:
     def ground_truth(self) -> GroundTruth:
         """The true state now."""
         (x, y, _), (_, _, qz, qw) = self.engine.base_pose()
-        (vx, vy, _), (_, _, yaw_rate) = self.engine.base_velocity()
         heading = 2 * math.atan2(qz, qw)
-        cosine, sine = math.cos(heading), math.sin(heading)
         angles, rates = self.engine.angles(), self.engine.mean_rates()
         return GroundTruth(
             time=self.time,
             pose=(x, y, heading),
-            twist=(cosine * vx + sine * vy, cosine * vy - sine * vx, yaw_rate),
+            twist=self.engine.twist(),
             steering_angles=(angles[0], angles[2]),
             wheel_angles=(angles[4], angles[5], angles[6], angles[7]),
             steering_rates=(rates[0], rates[2]),
@@ -160,15 +170,16 @@ class EmulatedVehicle:
         idle = [0.0] * 8
         for _ in range(round(SETTLING_TIME / self.engine.step_size)):
             self.engine.step(idle)
+        self._mechanics.settle()
 
     def _step(self) -> None:
         # Leapfrog: the forces of time t act over the step that starts at t: the torque that the drive reports
         # at t, and viscous friction by the rate at t.
         load, rates = self._noise.load, self.engine.rates()
         torques = [extra - d * rate for extra, d, rate in zip(load, self._viscous, rates, strict=True)]
-        for joint, drive in enumerate(self.drives, start=4):
-            torques[joint] += drive.wheel_torque
+        self._mechanics.act(self.time, rates, torques)
         self.engine.step(torques)
+        self._mechanics.after_step()
         for drive in self.drives:
             drive.advance()
         self._noise.advance()

@@ -9,7 +9,8 @@ import numpy as np
 import pybullet
 import pytest
 
-from emulator.engine import DEFAULT_SOLVER, GRAVITY, Engine
+from emulator.as_built import GRAVITY
+from emulator.engine import DEFAULT_SOLVER, Engine
 from emulator.prototype import Prototype, load_prototype
 
 STEP = 1e-3

@@ -11,6 +11,7 @@ import pybullet
 import pytest
 
 from emulator.prototype import Prototype, load_prototype
+from emulator.as_built import AsBuilt
 from emulator.urdf import generate_urdf
 from emulator.vehicle import EmulatedVehicle
 
@@ -141,7 +142,7 @@ def test_the_steering_has_stops_and_the_wheels_have_none(prototype: Prototype, b
 
 
 def test_people_see_cylinders_while_spheres_touch_the_floor(prototype: Prototype) -> None:
-    robot = ElementTree.fromstring(generate_urdf(prototype))
+    robot = ElementTree.fromstring(generate_urdf(AsBuilt.of(prototype)))
     for wheel in ("fl", "rl", "fr", "rr"):
         link = robot.find(f"link[@name='wheel_{wheel}']")
         assert link is not None
