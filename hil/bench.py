@@ -14,6 +14,9 @@ from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.network import DeviceNetwork
 from hil.buses.lockstep import LockstepHub
 from hil.clock import SimulatedClock
+from hil.faults import FaultInjector
+from hil.faults.devices import Slippery
+from hil.faults.hardware import TappedVehicle
 from hil.network import DEFAULT_NETWORK, load_network
 
 
@@ -23,18 +26,28 @@ class LockstepBench:
     Args:
         vehicle: the hardware that the nodes sit on; the caller closes it.
         network: network file, for the nodes and for bit rate and cycle period of the bus.
+        ground: under its wheels, to be made slippery; `emulator.ground.Ground` for the emulated vehicle.
+        seed: of the randomness of faults.
 
     Attributes:
         bus: the master's endpoint.
         clock: simulated time of the bench.
         vehicle: the hardware given.
-        devices: the nodes on it, for tests that break something.
+        faults: what can go wrong between the bus and the nodes.
+        devices: the nodes, for tests that look behind the connector.
 
     Raises:
         DataFileError: the network file is missing or malformed.
     """
 
-    def __init__(self, vehicle: VehicleHardware, network: Path = DEFAULT_NETWORK) -> None:
+    def __init__(
+        self,
+        vehicle: VehicleHardware,
+        network: Path = DEFAULT_NETWORK,
+        *,
+        ground: Slippery | None = None,
+        seed: int = 0,
+    ) -> None:
         self.vehicle = vehicle
         described = load_network(network)
         self._hub = LockstepHub(described.cycle_period, described.bit_rate, described.sync_cob_id)
@@ -42,11 +55,15 @@ class LockstepBench:
         self.clock: SimulatedClock = self._hub.clock
         description = read_network_description(network)
 
-        def make(send: Callable[[int, bytes], None]) -> DeviceNetwork:
-            self.devices = DeviceNetwork(vehicle, description, send)
-            return self.devices
+        def nodes(tapped: TappedVehicle, send: Callable[[int, bytes], None]) -> DeviceNetwork:
+            return DeviceNetwork(tapped, description, send)
+
+        def make(send: Callable[[int, bytes], None]) -> FaultInjector:
+            self.faults = FaultInjector(nodes, TappedVehicle(vehicle), send, described, ground, seed)
+            return self.faults
 
         self._hub.attach(make)
+        self.devices = self.faults.devices
 
     def open_bus(self) -> can.BusABC:
         """A further endpoint of the bus, for a listener or a second master."""

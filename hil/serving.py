@@ -11,7 +11,11 @@ import can
 from emulator.firmware.description import read_network_description
 from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.network import DeviceNetwork
+from hil.buses.frame_kinds import device_frame
 from hil.clock import Clock
+from hil.faults import FaultInjector
+from hil.faults.devices import Slippery
+from hil.faults.hardware import TappedVehicle
 from hil.network import DEFAULT_NETWORK, load_network
 from hil.realtime import steady_memory
 
@@ -52,6 +56,12 @@ class VehicleServer:
         clock: wall time.
         network: network file.
         lockstep: SYNC moves time.
+        ground: under its wheels, to be made slippery.
+        seed: of the randomness of faults.
+
+    Attributes:
+        faults: what can go wrong between the bus and the nodes.
+        report: what happened so far.
     """
 
     def __init__(
@@ -61,6 +71,8 @@ class VehicleServer:
         clock: Clock,
         network: Path = DEFAULT_NETWORK,
         lockstep: bool = False,
+        ground: Slippery | None = None,
+        seed: int = 0,
     ) -> None:
         described = load_network(network)
         self._bus = bus
@@ -68,7 +80,13 @@ class VehicleServer:
         self._lockstep = lockstep
         self._period = described.cycle_period
         self._sync_cob_id = described.sync_cob_id
-        self._devices = DeviceNetwork(vehicle, read_network_description(network), self._send)
+        description = read_network_description(network)
+
+        def nodes(tapped: TappedVehicle, send: Callable[[int, bytes], None]) -> DeviceNetwork:
+            return DeviceNetwork(tapped, description, send)
+
+        self.faults = FaultInjector(nodes, TappedVehicle(vehicle), self._send, described, ground, seed)
+        self._devices = self.faults
         self._behind = clock.now() - self._devices.time
         self._stepping = False
         self._last_sync = 0.0
@@ -119,4 +137,4 @@ class VehicleServer:
         self._devices.advance(round(instant, 9))
 
     def _send(self, can_id: int, data: bytes) -> None:
-        self._bus.send(can.Message(arbitration_id=can_id, data=data, is_extended_id=False))
+        self._bus.send(device_frame(can_id, data))

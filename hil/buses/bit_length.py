@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+from hil.buses.frame_kinds import ERROR_FRAME
+
 _CRC_POLYNOMIAL = 0x4599
 """x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1, ISO 11898-1."""
 
 UNSTUFFED_TAIL_BITS = 1 + 2 + 7 + 3
 """CRC delimiter, acknowledge slot and delimiter, end of frame, intermission."""
+
+ERROR_FRAME_BITS = 6 + 6 + 8 + 3
+"""Longest error frame: flag, echo of the other nodes, delimiter, intermission (ISO 11898-1)."""
 
 
 def _stuff_step(state: int, bit: int) -> tuple[int, int]:
@@ -86,3 +91,8 @@ def frame_bits(can_id: int, data: bytes, extended: bool = False, remote: bool = 
         crc = (crc << 8 & 0x7FFF) ^ _CRC_TABLE[crc >> 7 ^ byte]
     key = state | crc >> 7
     return bits + _STUFF_BITS[key] + _STUFF_BITS_OF_7[_NEXT_STATE[key] | crc & 0x7F]
+
+
+def device_frame_bits(can_id: int, data: bytes) -> int:
+    """Bit times of a frame of the emulated devices: data frame, or error frame where `ERROR_FRAME` is in `can_id`."""
+    return ERROR_FRAME_BITS if can_id & ERROR_FRAME else frame_bits(can_id, data)

@@ -1,65 +1,66 @@
 """A deterministic, lossless bus inside one process, whose SYNC moves simulated time.
 
-What is *not* modelled: arbitration between frames that are requested while the bus is busy (they go out in the
-order of the requests), bit errors, and the delay of delivery: a frame is delivered in the instant in which it is
-sent, while its time stamp says when its last bit would have left the wire.
+By default a frame is delivered in the instant in which it is sent, in the order of the requests, while its time stamp
+says when its last bit would have left the wire. With `delays` it waits for arbitration and is delivered with its last
+bit. What is *not* modelled in either: bit errors and retransmission.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
+from functools import partial
 
 import can
 
-from hil.buses.bit_length import frame_bits
+from hil.buses.bit_length import device_frame_bits, frame_bits
+from hil.buses.frame_kinds import ERROR_FRAME, device_frame
+from hil.buses.wire import BusLoad, Wire, arbitration_key
+from hil.buses.wired import Devices, Send, WiredDevices
 from hil.clock import SimulatedClock
-
-
-class Devices(Protocol):
-    """The emulated nodes on the bus; they answer through the function given to `LockstepHub.attach`."""
-
-    def receive(self, can_id: int, data: bytes) -> None:
-        """Take a data frame."""
-
-    def advance(self, to_time: float) -> None:
-        """Let simulated time pass up to `to_time` [s], timers and physics included."""
-
-    def next_event(self) -> float:
-        """Instant [s] of the next timer, infinite if there is none."""
-
-    @property
-    def time(self) -> float:
-        """The instant [s] that the devices have reached; inside `advance`, that of the timer that runs."""
 
 
 class LockstepHub:
     """Joins the endpoints of one bus with the emulated devices on it.
 
     SYNC number k first moves time from t_(k-1) to t_k = t_(k-1) + cycle period (not at all where somebody has
-    moved it there already), and is delivered then. Before the first SYNC, and while a master waits for frames,
-    a blocking `recv` moves time from one timer of the devices to the next.
+    moved it there already), and is sent then. Before the first SYNC, and while a master waits for frames,
+    a blocking `recv` moves time from one timer of the devices, or end of a frame, to the next.
 
     Args:
         cycle_period: time between SYNCs [s].
-        bit_rate: [bit/s], for time stamps.
+        bit_rate: [bit/s].
         sync_cob_id: identifier of the SYNC.
+        delays: frames wait for arbitration and take their bit times.
+
+    Attributes:
+        clock: simulated time.
     """
 
-    def __init__(self, cycle_period: float, bit_rate: float, sync_cob_id: int = 0x80) -> None:
+    def __init__(
+        self, cycle_period: float, bit_rate: float, sync_cob_id: int = 0x80, *, delays: bool = False
+    ) -> None:
         self._cycle_period = cycle_period
-        self._bit_time = 1.0 / bit_rate
         self._sync_cob_id = sync_cob_id
         self._endpoints: list[LockstepBus] = []
+        self._wire = Wire(bit_rate)
+        self._delays = delays
         self._devices: Devices | None = None
+        self._wired: WiredDevices | None = None
         self._last_sync: float | None = None
-        self._bus_free = 0.0
         self.clock = SimulatedClock(self._advance_devices)
 
-    def attach(self, make: Callable[[Callable[[int, bytes], None]], Devices]) -> None:
+    @property
+    def load(self) -> BusLoad:
+        """How busy the bus was."""
+        return self._wire.load
+
+    def attach(self, make: Callable[[Send], Devices]) -> None:
         """Connect the devices that `make` builds around the function by which they send frames."""
-        self._devices = make(self._send_from_devices)
+        if self._delays:
+            self._devices = self._wired = WiredDevices(make, self._wire, self._deliver_from_devices)
+        else:
+            self._devices = make(self._send_from_devices)
 
     def open(self) -> LockstepBus:
         """A new endpoint of this bus."""
@@ -73,23 +74,25 @@ class LockstepHub:
             self._endpoints.remove(bus)
 
     def send(self, message: can.Message, sender: LockstepBus) -> None:
-        """Put a frame of an endpoint on the bus; its time stamp is set to the end of the frame."""
-        can_id = message.arbitration_id
-        if can_id == self._sync_cob_id and not message.is_extended_id:
+        """Put a frame of an endpoint on the bus.
+
+        Its time stamp is set to the end of the frame, with `delays` to the instant of the request.
+        """
+        can_id, extended, remote = message.arbitration_id, message.is_extended_id, message.is_remote_frame
+        if can_id == self._sync_cob_id and not extended:
             self._pace()
-        data = bytes(message.data)
-        message.timestamp = self._occupy(
-            frame_bits(can_id, data, message.is_extended_id, message.is_remote_frame, message.dlc),
-            self.clock.now(),
-        )
-        for endpoint in self._endpoints:
-            if endpoint is not sender:
-                endpoint.deliver(_copy(message))
-        if self._devices is not None and not (message.is_extended_id or message.is_remote_frame):
-            self._devices.receive(can_id, data)
+        now = self.clock.now()
+        bits = frame_bits(can_id, bytes(message.data), extended, remote, message.dlc)
+        if self._wired is None:
+            message.timestamp = self._wire.occupy(now, bits)
+            self._deliver(message, sender)
+            return
+        message.timestamp = now
+        key = arbitration_key(can_id, extended, remote)
+        self._wired.request(sender, key, bits, partial(self._deliver_at, _copy(message), sender))
 
     def wait_for_event(self, deadline: float) -> bool:
-        """Move time to the next timer of the devices, at most to `deadline` [s]; False when that has come.
+        """Move time to the next event of the devices, at most to `deadline` [s]; False when that has come.
 
         Raises:
             CanOperationError: nothing will ever happen, and the deadline is infinite.
@@ -110,6 +113,19 @@ class LockstepHub:
         if stamp - self.clock.now() > self._cycle_period:
             self.clock.wait_until(round(stamp // self._cycle_period * self._cycle_period, 9))
 
+    def _deliver_at(self, message: can.Message, sender: LockstepBus, end: float) -> None:
+        message.timestamp = end
+        self._deliver(message, sender)
+
+    def _deliver(self, message: can.Message, sender: LockstepBus) -> None:
+        for endpoint in self._endpoints:
+            if endpoint is not sender:
+                endpoint.deliver(_copy(message))
+        if self._devices is None or message.is_extended_id or message.is_remote_frame or message.is_error_frame:
+            return
+        receive = self._devices.receive if self._wired is None else self._wired.hand_over
+        receive(message.arbitration_id, bytes(message.data))
+
     def _pace(self) -> None:
         if self._last_sync is not None:
             # Rounded so that the grid of cycles does not drift by the sum of rounding errors.
@@ -120,17 +136,14 @@ class LockstepHub:
         if self._devices is not None:
             self._devices.advance(instant)
 
-    def _occupy(self, bits: int, now: float) -> float:
-        self._bus_free = max(self._bus_free, now) + bits * self._bit_time
-        return self._bus_free
-
     def _send_from_devices(self, can_id: int, data: bytes) -> None:
         now = self.clock.now() if self._devices is None else self._devices.time
-        stamp = self._occupy(frame_bits(can_id, data), now)
+        bits = device_frame_bits(can_id, data)
+        self._deliver_from_devices(can_id, data, self._wire.occupy(now, bits, can_id >= ERROR_FRAME))
+
+    def _deliver_from_devices(self, can_id: int, data: bytes, stamp: float) -> None:
         for endpoint in self._endpoints:
-            endpoint.deliver(
-                can.Message(timestamp=stamp, arbitration_id=can_id, is_extended_id=False, data=bytearray(data))
-            )
+            endpoint.deliver(device_frame(can_id, data, stamp))
 
 
 def _copy(message: can.Message) -> can.Message:
