@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +16,7 @@ from hil.buses import open_served_bus
 from hil.clock import Clock
 from hil.network import Network
 from hil.serving import VehicleServer
+from ident.vehicle.effects import Effect
 
 
 @dataclass(frozen=True)
@@ -43,16 +44,16 @@ class Bench:
 
 
 @contextmanager
-def vehicle(prototype: str, seed: int, gui: bool) -> Iterator[EmulatedVehicle]:
-    """The emulated prototype, closed at the end."""
-    with EmulatedVehicle(load_prototype(prototype), seed=seed, gui=gui) as emulated:
+def vehicle(prototype: str, seed: int, gui: bool, effects: Sequence[Effect] = ()) -> Iterator[EmulatedVehicle]:
+    """The emulated prototype with effects, closed at the end."""
+    with EmulatedVehicle(load_prototype(prototype), seed=seed, gui=gui, effects=effects) as emulated:
         yield emulated
 
 
 @contextmanager
-def bench(prototype: str, seed: int, gui: bool, network: Path) -> Iterator[Bench]:
-    """The emulated prototype behind an in-process bus in lockstep."""
-    with vehicle(prototype, seed, gui) as emulated, LockstepBench(emulated, network) as lockstep:
+def bench(prototype: str, seed: int, gui: bool, network: Path, effects: Sequence[Effect] = ()) -> Iterator[Bench]:
+    """The emulated prototype with effects behind an in-process bus in lockstep."""
+    with vehicle(prototype, seed, gui, effects) as emulated, LockstepBench(emulated, network) as lockstep:
         yield Bench(lockstep.bus, lockstep.clock, BenchOperator(emulated))
 
 

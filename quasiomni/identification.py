@@ -21,9 +21,11 @@ from ident.campaign.steps import ORDER, PERIODS
 from ident.errors import UserError
 from ident.estimate.identify import KnownInertia
 from ident.records.record import Step
+from ident.vehicle.effects import Effect
 from ident.vehicle.parameters import Parameters
 from quasiomni.application import app, console, errors
 from quasiomni.options import (
+    EffectOption,
     GuiOption,
     InertiaOption,
     InertiaStdOption,
@@ -31,6 +33,7 @@ from quasiomni.options import (
     SeedOption,
     VehicleOption,
     load_emulation,
+    parse_effects,
 )
 
 LOCKSTEP = "emulator, in lockstep"
@@ -41,12 +44,14 @@ def demo(
     out: Annotated[Path, typer.Option(help="Run folder to write.")] = Path("runs/demo"),
     vehicle: VehicleOption = "prototype",
     seed: SeedOption = 1,
+    effect: EffectOption = None,
     gui: GuiOption = False,
 ) -> None:
     """The whole story on the emulator: boot, four steps, parameters beside the truth, lane change, report."""
     _clear_previous(out)
     order = Order(out, vehicle, None, _steps((), False, None), PERIODS, seed, None, LogFormat.BLF, LOCKSTEP, vehicle)
-    _drive_on_emulator(workflow.plan_run(order, console), order, gui)
+    effects = parse_effects(effect)
+    _drive_on_emulator(workflow.plan_run(order, console), order, effects, gui)
     workflow.identify_run(out, out, None, _truth(vehicle), console)
 
 
@@ -72,6 +77,7 @@ def campaign(
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="With --bus: the other side is an emulator that SYNC moves.")
     ] = False,
+    effect: EffectOption = None,
     gui: GuiOption = False,
 ) -> None:
     """Drive the identification steps and record every frame; on the emulator, or with --bus on a real vehicle.
@@ -80,11 +86,14 @@ def campaign(
     the room it takes. A run that was stopped keeps its finished steps: go on with --resume.
     """
     steps, inertia = _steps(skip or (), lateral, b_w), _known_inertia(b_w, b_w_std)
+    effects = parse_effects(effect)
+    if effects and bus is not None:
+        raise UserError("--effect is of the emulator, and --bus names another vehicle.", "Leave one of them out.")
     prototype, where = (vehicle, LOCKSTEP) if bus is None else ("", bus)
     order = Order(out, vehicle, network, steps, periods, seed, inertia, log_format, where, prototype)
     run = _resumed(order, context) if resume else workflow.plan_run(order, console)
     if bus is None:
-        _drive_on_emulator(run, order, gui)
+        _drive_on_emulator(run, order, effects, gui)
     else:
         _drive_on_bus(run, order, bus, ask=not yes, lockstep=lockstep)
     console.print(f"Next: [bold]quasiomni identify {out}[/bold]")
@@ -130,13 +139,14 @@ def _resumed(order: Order, context: typer.Context) -> Run:
     return run
 
 
-def _drive_on_emulator(run: Run, order: Order, gui: bool) -> None:
+def _drive_on_emulator(run: Run, order: Order, effects: Sequence[Effect], gui: bool) -> None:
     if not run.prototype:
         raise UserError(
             f"{order.out} was driven on {run.bus}, not on the emulator.", f"Go on with it there: --bus {run.bus}."
         )
     emulation = load_emulation()
-    with emulation.bench(run.prototype, run.seed, gui, run.network.path) as bench, _stop_is_no_error(order.out):
+    network = run.network.path
+    with emulation.bench(run.prototype, run.seed, gui, network, effects) as bench, _stop_is_no_error(order.out):
         workflow.drive_run(run, order, bench.bus, bench.clock, bench.operator, console, lambda: True)
 
 

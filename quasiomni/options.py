@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated
@@ -9,6 +10,8 @@ from typing import Annotated
 import typer
 
 from ident.errors import UserError
+from ident.vehicle.effect_text import parse_effect
+from ident.vehicle.effects import Effect
 
 VehicleOption = Annotated[
     str, typer.Option("--vehicle", help="Vehicle file: `prototype`, `compact`, or the path of your own.")
@@ -21,7 +24,20 @@ InertiaStdOption = Annotated[
     float | None, typer.Option("--b-w-std", help="Standard deviation of the B_w given [kg m²]; needed with --b-w.")
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the excitation and of all emulated noise.")]
+EffectOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--effect",
+        help="NAME@PLACE=SIZE that the emulated vehicle has, e.g. `stribeck@steering_left=6Nm`; repeat for more. "
+        "Noted nowhere in the run: name it again to --resume.",
+    ),
+]
 GuiOption = Annotated[bool, typer.Option("--gui", help="Show the emulated vehicle in a window.")]
+
+
+def parse_effects(texts: Sequence[str] | None) -> tuple[Effect, ...]:
+    """The effects that were asked for."""
+    return tuple(parse_effect(text) for text in texts or ())
 
 
 def load_emulation() -> ModuleType:

@@ -13,7 +13,7 @@ from hil.campaign.folder import network_file_of
 from hil.clock import WallClock
 from hil.network import load_network
 from quasiomni.application import app, console
-from quasiomni.options import GuiOption, NetworkOption, SeedOption, load_emulation
+from quasiomni.options import EffectOption, GuiOption, NetworkOption, SeedOption, load_emulation, parse_effects
 
 
 class Stand(StrEnum):
@@ -32,6 +32,7 @@ def emulate(
     stand: Annotated[Stand, typer.Option(help="On the floor, or on the jack-stand, wheels free.")] = Stand.FLOOR,
     lockstep: Annotated[bool, typer.Option("--lockstep", help="Time moves with the master's SYNC.")] = False,
     duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
+    effect: EffectOption = None,
     gui: GuiOption = False,
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
@@ -39,7 +40,7 @@ def emulate(
     network_file = network or network_file_of(prototype)
     end = None if duration is None else time.monotonic() + duration
     with (
-        emulation.vehicle(prototype, seed, gui) as vehicle,
+        emulation.vehicle(prototype, seed, gui, parse_effects(effect)) as vehicle,
         emulation.server_bus(bus, load_network(network_file)) as opened,
     ):
         if stand is Stand.JACK:
