@@ -62,22 +62,23 @@ def load_payload(prototype: Prototype, mass: float, inertia: float) -> Prototype
 
 
 def shift_centre(prototype: Prototype, x: float, y: float) -> Prototype:
-    """The vehicle's centre of mass moved to (x, y) [m] from its centre; its yaw inertia about the centre stays.
+    """The vehicle's centre of mass moved to (x, y) [m] from its centre; its yaw inertia about that centre of mass stays.
 
     Raises:
-        UserError: the inertia about the centre is too small for the shift.
+        UserError: the yaw inertia is too small for the shift.
     """
     chassis = prototype.rigid_bodies.chassis
     lever = prototype.truth["m_ch"] / chassis.mass
     centre = (lever * x, lever * y, 0.0)
     roll, pitch, yaw = chassis.inertia
-    about_mass_centre = yaw - chassis.mass * (centre[0] ** 2 + centre[1] ** 2)
-    if about_mass_centre <= abs(roll - pitch):
+    # The chassis goes further out than the vehicle's centre of mass, so it spreads less about its own.
+    own_yaw = yaw + prototype.truth["m_ch"] * (x**2 + y**2) - chassis.mass * (centre[0] ** 2 + centre[1] ** 2)
+    if own_yaw <= abs(roll - pitch):
         raise UserError(
             f"com_offset@chassis: no body with this yaw inertia has its mass {math.hypot(x, y):.2f} m off its centre.",
             "Give a smaller offset.",
         )
-    return _with_chassis(prototype, RigidBody(chassis.mass, centre, (roll, pitch, about_mass_centre)))
+    return _with_chassis(prototype, RigidBody(chassis.mass, centre, (roll, pitch, own_yaw)))
 
 
 def make_wheels_heavy(prototype: Prototype, mass: float) -> Prototype:

@@ -39,6 +39,22 @@ class Step(enum.StrEnum):
     LANE_CHANGE = "lane_change"
 
 
+def base_step(name: str) -> Step | None:
+    """The known step that a step is a variant of: `straight` for itself and for `straight_dither`.
+
+    A variant is named by the step, an underscore, and what is different; it is driven in the same mode and moves the
+    same coordinate, so the same equations hold.
+
+    Args:
+        name: of a step in a record.
+
+    Returns:
+        The step, None for a user's own step of another kind.
+    """
+    matching = [step for step in Step if name == step or name.startswith(f"{step}_")]
+    return max(matching, key=len, default=None)
+
+
 @dataclass(frozen=True)
 class Segment:
     """One uninterrupted run of one step.
