@@ -39,6 +39,7 @@ class Block(enum.Enum):
     PARAMETER = "p"
     OUTPUT = "y"
     MODE = "mode"
+    INDICATOR = "z"
 
 
 class Inputs(enum.StrEnum):
