@@ -1,0 +1,40 @@
+"""Wheel contacts that give a little: what turns constraints into forces.
+
+    F_i = -c s_i / sqrt(1 + (c |s_i| / (μ_i N_i))²)
+
+s_i (2,) is the velocity of contact i over the floor, c the creep stiffness, μ_i N_i the largest force. It is smooth,
+opposes the slip in its direction, and for c → ∞ the wheels roll.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import casadi as ca
+
+from fmu.model.symbols import Symbols
+from ident.vehicle.effect_terms import GRAVITY, EffectTerm
+from ident.vehicle.effects import EffectName
+from ident.vehicle.symbolic import CORNERS, Expression
+
+_LEAST_LOAD: Final = 1e-3
+"""Part of a quarter of the weight that a wheel keeps however far the centre of mass is off: no division by zero."""
+
+
+def static_loads(p: Symbols, terms: Sequence[EffectTerm]) -> Expression:
+    """Loads of the contacts (4,) [N] on a level floor at rest, for the centre of mass of `com_offset`."""
+    mass = p["m_ch"] + sum(term["mass"] for term in terms if term.name is EffectName.PAYLOAD)
+    ahead = sum((term["x"] for term in terms if term.name is EffectName.COM_OFFSET), ca.SX(0))
+    left = sum((term["y"] for term in terms if term.name is EffectName.COM_OFFSET), ca.SX(0))
+    shares = [1 + front * 2 * ahead / p["wheelbase"] + side * 2 * left / p["track_width"] for front, side in CORNERS]
+    return mass * GRAVITY / 4 * ca.vertcat(*(ca.fmax(share, _LEAST_LOAD) for share in shares))
+
+
+def contact_forces(slip: Expression, loads: Expression, p: Symbols) -> Expression:
+    """Forces of the floor on the wheels (8,) [N], ordered as the slip (8,) [m/s]: across, then along."""
+    across, along = slip[:4], slip[4:]
+    creep = p["creep_stiffness"]
+    limits = p.wheels("friction_limit_{}") * loads
+    softening = ca.sqrt(1 + (creep / limits) ** 2 * (across**2 + along**2))
+    return -creep * ca.vertcat(across / softening, along / softening)

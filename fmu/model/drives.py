@@ -1,0 +1,35 @@
+"""From the inputs to the torques that the drives report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+import casadi as ca
+
+from fmu.model.symbols import Symbols
+from fmu.variables import Inputs
+from ident.vehicle.symbolic import Expression
+
+_SHARPNESS: Final = 4
+"""Of the limit: at half of it 1.5 % of the torque is missing."""
+
+
+def _torque_inputs(x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
+    return u.wheels("torque_{}"), ca.SX.zeros(0)
+
+
+def _speed_loops(x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
+    """Proportional and integral action with a smooth limit; at the limit the integral follows the torque."""
+    error = u.wheels("speed_{}") - x.wheels("beta_{}_dot")
+    wanted = p["drive_gain"] * error + x.wheels("integral_{}")
+    limit = p["drive_torque_limit"]
+    torque = wanted / (1 + (wanted / limit) ** _SHARPNESS) ** (1 / _SHARPNESS)
+    return torque, p["drive_integral_gain"] * error - (wanted - torque) / p["drive_unwind_time"]
+
+
+DRIVES: Final[Mapping[Inputs, Callable[[Symbols, Symbols, Symbols], tuple[Expression, Expression]]]] = MappingProxyType(
+    {Inputs.TORQUE: _torque_inputs, Inputs.SPEED: _speed_loops}
+)
+"""By the inputs: from states, inputs and parameters to torques (4,) [Nm] and rates of the integral states [Nm/s]."""

@@ -1,0 +1,234 @@
+"""C sources of the model, from its equations and its table of variables.
+
+CasADi writes the equations as C; each function gets plain arrays for arguments, and the table is written beside it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from types import MappingProxyType
+from typing import Any, Final
+
+import casadi as ca
+
+from fmu.model.equations import Equations, equations
+from fmu.variables import Block, Inputs, Variable, VariableTable
+from ident.vehicle.effects import Effect
+from ident.vehicle.symbolic import Expression
+
+COUPLED: Final = 9
+"""The first states, the rates, are those that the equations couple; the solver eliminates the others."""
+
+TOLERANCE: Final = 1e-5
+"""Of the solver, where nobody sets one."""
+
+FIRST_STEP: Final = 1e-3
+"""Length that the first internal step tries [s]."""
+
+_WRITTEN: Final = ("core.h", "core.c", "solver.c", "qo_internal.h")
+"""Files of the core that are written by hand."""
+
+_HELPERS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "sq": "static double qo_sq(double x) { return x * x; }",
+        "fabs": "static double qo_fabs(double x) { return fabs(x); }",
+        "fmax": "static double qo_fmax(double x, double y) { return x > y ? x : y; }",
+        "fmin": "static double qo_fmin(double x, double y) { return x < y ? x : y; }",
+        "sign": "static double qo_sign(double x) { return x < 0 ? -1 : x > 0 ? 1 : x; }",
+    }
+)
+"""What CasADi calls beyond <math.h>."""
+
+
+@dataclass(frozen=True)
+class Core:
+    """The model in C.
+
+    Attributes:
+        files: name -> text; compile all that end in `.c`.
+        dependencies: derivative or output -> the states and inputs that it depends on, in the order of the table.
+    """
+
+    files: Mapping[str, str]
+    dependencies: Mapping[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class _Routine:
+    """A C function to be: `void qo_eq_<name>(const double *<argument>, ..., double *<result>, ...)`."""
+
+    name: str
+    arguments: Mapping[str, Expression]
+    results: Mapping[str, Expression]
+
+
+def generate_core(table: VariableTable, effects: Sequence[Effect], inputs: Inputs) -> Core:
+    """The model for a table of variables, and the effects and inputs that it was made for."""
+    model = equations(table, effects, inputs)
+    routines, jacobian_size = _routines(model)
+    written = {name: (resources.files("fmu.model") / name).read_text(encoding="utf-8") for name in _WRITTEN}
+    generated = {
+        "qo_sizes.h": _sizes(table, jacobian_size, model.z.numel()),
+        "qo_table.h": _table(table),
+        "qo_equations.h": _prototypes(routines),
+        "qo_equations.c": _definitions(routines),
+    }
+    return Core(MappingProxyType({**written, **generated}), MappingProxyType(_dependencies(model, table)))
+
+
+def _routines(model: Equations) -> tuple[list[_Routine], int]:
+    point = {"x": model.x, "u": model.u, "p": model.p}
+    jacobian = ca.jacobian(model.xd, model.x)
+    routines = [
+        _Routine("derivatives", point, {"xd": model.xd}),
+        _Routine("outputs", point, {"y": model.y}),
+        _Routine("mode_distances", point, {"z": model.z}),
+        _Routine("jacobian", point, {"jacobian": _nonzeros(jacobian)}),
+        *_eliminations(jacobian.sparsity()),
+        *_directional(model, point),
+    ]
+    return routines, jacobian.nnz()
+
+
+def _nonzeros(matrix: Expression) -> Expression:
+    return ca.vertcat(*matrix.nonzeros())
+
+
+def _eliminations(pattern: Any) -> list[_Routine]:
+    """The system (shift I - J) k = right, reduced to its coupled states: its matrix by rows, its side, its solution.
+
+    The others do not couple among each other beyond a triangle, so what they add is written out, without a loop.
+    """
+    values, shift = ca.SX.sym("jacobian", pattern.nnz()), ca.SX.sym("shift")
+    right, coupled = ca.SX.sym("right", pattern.size1()), ca.SX.sym("coupled", COUPLED)
+    matrix = shift * ca.SX.eye(pattern.size1()) - ca.SX(pattern, values)
+    first, rest = slice(None, COUPLED), slice(COUPLED, None)
+    reduced = matrix[first, first] - matrix[first, rest] @ ca.solve(matrix[rest, rest], matrix[rest, first])
+    side = right[first] - matrix[first, rest] @ ca.solve(matrix[rest, rest], right[rest])
+    others = ca.solve(matrix[rest, rest], right[rest] - matrix[rest, first] @ coupled)
+    system = {"jacobian": values, "shift": shift}
+    return [
+        _Routine("schur", system, {"matrix": ca.densify(ca.vec(reduced.T))}),
+        _Routine("eliminate", {**system, "right": right}, {"coupled": side}),
+        _Routine("expand", {**system, "right": right, "coupled": coupled}, {"solution": ca.vertcat(coupled, others)}),
+    ]
+
+
+def _directional(model: Equations, point: Mapping[str, Expression]) -> list[_Routine]:
+    seeds = {f"d{name}": ca.SX.sym(f"d{name}", symbols.numel()) for name, symbols in point.items()}
+    stacked, results = ca.vertcat(*point.values()), ca.vertcat(model.xd, model.y)
+    forward = ca.jtimes(results, stacked, ca.vertcat(*seeds.values()))
+    weights = {"lxd": ca.SX.sym("lxd", model.xd.numel()), "ly": ca.SX.sym("ly", model.y.numel())}
+    adjoint = ca.jtimes(results, stacked, ca.vertcat(*weights.values()), True)
+    sizes = [0, model.x.numel(), model.x.numel() + model.u.numel(), stacked.numel()]
+    return [
+        _Routine(
+            "jacobian_vector",
+            {**point, **seeds},
+            {"sxd": forward[: model.xd.numel()], "sy": forward[model.xd.numel() :]},
+        ),
+        _Routine(
+            "vector_jacobian",
+            {**point, **weights},
+            {f"a{name}": adjoint[sizes[part] : sizes[part + 1]] for part, name in enumerate(point)},
+        ),
+    ]
+
+
+def _dependencies(model: Equations, table: VariableTable) -> dict[str, tuple[str, ...]]:
+    knowns = [row.name for block in (Block.STATE, Block.INPUT) for row in table.block(block)]
+    unknowns = [row.name for block in (Block.DERIVATIVE, Block.OUTPUT) for row in table.block(block)]
+    pattern = ca.jacobian_sparsity(ca.vertcat(model.xd, model.y), ca.vertcat(model.x, model.u))
+    found: dict[str, list[int]] = {name: [] for name in unknowns}
+    for row, column in zip(*pattern.get_triplet(), strict=True):
+        found[unknowns[row]].append(column)
+    return {name: tuple(knowns[column] for column in sorted(columns)) for name, columns in found.items()}
+
+
+def _signature(routine: _Routine) -> str:
+    arguments = [f"const double *{name}" for name in routine.arguments]
+    results = [f"double *{name}" for name in routine.results]
+    return f"void qo_eq_{routine.name}({', '.join(arguments + results)})"
+
+
+def _prototypes(routines: Sequence[_Routine]) -> str:
+    lines = [f"{_signature(routine)};" for routine in routines]
+    return _guarded("QO_EQUATIONS_H", "The equations of the model.", lines)
+
+
+def _guarded(guard: str, comment: str, lines: Sequence[str]) -> str:
+    return "\n".join(
+        [f"/* {comment} Generated. */", f"#ifndef {guard}", f"#define {guard}", "", *lines, "", "#endif", ""]
+    )
+
+
+def _definitions(routines: Sequence[_Routine]) -> str:
+    bodies = [_definition(routine) for routine in routines]
+    used = {name for body in bodies for name in re.findall(r"\bqo_(\w+)\(", body) if not name.startswith("eq_")}
+    helpers = [_HELPERS[name] for name in sorted(used)]
+    head = ["/* The equations of the model. Generated. */", '#include "qo_equations.h"', "", "#include <math.h>", ""]
+    return "\n".join([*head, *helpers, "", *bodies])
+
+
+def _definition(routine: _Routine) -> str:
+    """The body that CasADi writes, arguments and results being plain arrays that are there."""
+    dense = [ca.densify(result) for result in routine.results.values()]
+    function = ca.Function(routine.name, list(routine.arguments.values()), ca.cse(dense))
+    generator = ca.CodeGenerator("equations.c")
+    generator.add(function)
+    match = re.search(r"static int casadi_f0\([^)]*\) \{\n(.*?)\n *return 0;\n\}", generator.dump(), re.DOTALL)
+    if match is None:
+        raise RuntimeError("This version of CasADi writes functions in a way that is not known here.")
+    body = match[1].replace("casadi_real ", "double ").replace("casadi_", "qo_")
+    for place, name in enumerate(routine.arguments):
+        body = re.sub(rf"arg\[{place}\]\? arg\[{place}\]\[(\d+)\] : 0", rf"{name}[\1]", body)
+    for place, name in enumerate(routine.results):
+        body = re.sub(rf"if \(res\[{place}\]!=0\) res\[{place}\]\[(\d+)\]", rf"{name}[\1]", body)
+    unused = [f"  (void){name};" for name in routine.arguments if not re.search(rf"\b{name}\[", body)]
+    return "\n".join([_signature(routine), "{", body, *unused, "}", ""])
+
+
+def _sizes(table: VariableTable, jacobian_size: int, indicators: int) -> str:
+    sizes = {
+        "NX": len(table.block(Block.STATE)),
+        "NU": len(table.block(Block.INPUT)),
+        "NP": len(table.block(Block.PARAMETER)),
+        "NY": len(table.block(Block.OUTPUT)),
+        "NZ": indicators,
+        "NV": COUPLED,
+        "NJ": jacobian_size,
+    }
+    lines = [f"#define QO_{name} {size}" for name, size in sizes.items()]
+    lines += [f"#define QO_TOLERANCE {TOLERANCE!r}", f"#define QO_FIRST_STEP {FIRST_STEP!r}"]
+    return _guarded("QO_SIZES_H", "Sizes of the model.", lines)
+
+
+def _table(table: VariableTable) -> str:
+    lines = [
+        "#include <math.h>",
+        "",
+        "typedef struct {",
+        "    const char *name;",
+        "    double start, minimum, maximum, nominal;",
+        "    int positive;",
+        "} qo_row;",
+        "",
+    ]
+    for name, block in (("states", Block.STATE), ("inputs", Block.INPUT), ("parameters", Block.PARAMETER)):
+        lines += [f"static const qo_row qo_{name}[] = {{", *map(_row, table.block(block)), "};", ""]
+    names = [f'    "{row.name}",' for row in table.block(Block.OUTPUT)]
+    return _guarded(
+        "QO_TABLE_H",
+        "The table of variables.",
+        [*lines, "static const char *const qo_output_names[] = {", *names, "};"],
+    )
+
+
+def _row(row: Variable) -> str:
+    minimum = "-INFINITY" if row.minimum is None else repr(float(row.minimum))
+    maximum = "INFINITY" if row.maximum is None else repr(float(row.maximum))
+    start = repr(float(row.start or 0.0))
+    return f'    {{"{row.name}", {start}, {minimum}, {maximum}, {row.nominal!r}, {int(row.positive)}}},'

@@ -1,0 +1,269 @@
+/* The integrator: a Rosenbrock method, linearly implicit, stiffly accurate and L-stable, with step size control.
+ *
+ * Rodas3 of A. Sandu et al., Benchmarking stiff ODE solvers for atmospheric chemistry problems II: Rosenbrock
+ * solvers, Atmospheric Environment 31 (1997) 3459-3472: four stages, order 3, embedded order 2. In the form without
+ * products by the Jacobian (Hairer, Wanner, Solving Ordinary Differential Equations II, section IV.7) stage i solves
+ *
+ *     (I/(g h) - J) k_i = f(x + sum a_ij k_j) + sum c_ij k_j / h
+ *
+ * Only the first states, the rates, are coupled; the others follow from them and are eliminated before and after. What
+ * is left is a dense system of QO_NV equations.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "core.h"
+#include "qo_equations.h"
+#include "qo_internal.h"
+#include "qo_table.h"
+
+#define STAGES 4
+#define MAX_ATTEMPTS 200000
+#define LONGEST_STEP 1e3
+#define SHORTEST_STEP 1e-15
+#define NEGLIGIBLE 1e-30
+
+static const double GAMMA = 0.5;
+static const double A[STAGES][STAGES] = {{0.0}, {0.0}, {2.0}, {2.0, 0.0, 1.0}};
+static const double C[STAGES][STAGES] = {{0.0}, {4.0}, {1.0, -1.0}, {1.0, -1.0, -8.0 / 3.0}};
+static const double B[STAGES] = {2.0, 0.0, 1.0, 1.0};
+static const double E[STAGES] = {0.0, 0.0, 0.0, 1.0};
+/* Whether a stage has an argument of its own; the second one shares that of the first. */
+static const int EVALUATES[STAGES] = {1, 0, 1, 1};
+static const double ORDER_OF_ERROR = 3.0;
+
+typedef struct {
+    double shift; /* 1/(g h) */
+    double jacobian[QO_NJ];
+    double matrix[QO_NV][QO_NV];
+    int pivot[QO_NV];
+} linear_system;
+
+/* LU decomposition with row pivoting, in place. Whether there is one. */
+static int decompose(linear_system *system) {
+    int column, row, k;
+    for (column = 0; column < QO_NV; ++column) {
+        int best = column;
+        for (row = column + 1; row < QO_NV; ++row) {
+            if (fabs(system->matrix[row][column]) > fabs(system->matrix[best][column])) {
+                best = row;
+            }
+        }
+        system->pivot[column] = best;
+        if (best != column) {
+            double held[QO_NV];
+            memcpy(held, system->matrix[column], sizeof held);
+            memcpy(system->matrix[column], system->matrix[best], sizeof held);
+            memcpy(system->matrix[best], held, sizeof held);
+        }
+        if (!(fabs(system->matrix[column][column]) > 0.0)) {
+            return 0;
+        }
+        for (row = column + 1; row < QO_NV; ++row) {
+            double factor = system->matrix[row][column] / system->matrix[column][column];
+            system->matrix[row][column] = factor;
+            for (k = column + 1; k < QO_NV; ++k) {
+                system->matrix[row][k] -= factor * system->matrix[column][k];
+            }
+        }
+    }
+    return 1;
+}
+
+static void substitute(const linear_system *system, double *v) {
+    int row, k;
+    for (row = 0; row < QO_NV; ++row) {
+        double held = v[system->pivot[row]];
+        v[system->pivot[row]] = v[row];
+        v[row] = held;
+    }
+    for (row = 0; row < QO_NV; ++row) {
+        for (k = 0; k < row; ++k) {
+            v[row] -= system->matrix[row][k] * v[k];
+        }
+    }
+    for (row = QO_NV - 1; row >= 0; --row) {
+        for (k = row + 1; k < QO_NV; ++k) {
+            v[row] -= system->matrix[row][k] * v[k];
+        }
+        v[row] /= system->matrix[row][row];
+    }
+}
+
+/* Whether the system for a step of h, at the Jacobian that it has, can be solved. */
+static int prepare(linear_system *system, double h) {
+    system->shift = 1.0 / (GAMMA * h);
+    qo_eq_schur(system->jacobian, &system->shift, &system->matrix[0][0]);
+    return decompose(system);
+}
+
+static void solve(const linear_system *system, const double *right, double *k) {
+    double coupled[QO_NV];
+    qo_eq_eliminate(system->jacobian, &system->shift, right, coupled);
+    substitute(system, coupled);
+    qo_eq_expand(system->jacobian, &system->shift, right, coupled, k);
+}
+
+static void add(double *sum, const double *weights, double (*k)[QO_NX], int count, double scale) {
+    int stage, index;
+    for (stage = 0; stage < count; ++stage) {
+        double weight = weights[stage] * scale;
+        if (weight != 0.0) {
+            for (index = 0; index < QO_NX; ++index) {
+                sum[index] += weight * k[stage][index];
+            }
+        }
+    }
+}
+
+/* Largest part of the error over its bound; *worst is the state that has it. */
+static double error_ratio(const qo_model *model, const double *next, const double *error, int *worst) {
+    double largest = 0.0;
+    int index;
+    for (index = 0; index < QO_NX; ++index) {
+        double size = fmax(fabs(model->x[index]), fabs(next[index]));
+        double ratio = fabs(error[index]) / (model->tolerance * (qo_states[index].nominal + size));
+        if (!(ratio <= largest)) {
+            largest = ratio;
+            *worst = index;
+        }
+        if (!isfinite(next[index]) || !isfinite(ratio)) {
+            *worst = index;
+            return INFINITY;
+        }
+    }
+    return largest;
+}
+
+/* A step of h from the derivative f: the state after it, and its error ratio. */
+static double attempt(const qo_model *model, linear_system *system, const double *f, double h, double *next,
+                      int *worst) {
+    double k[STAGES][QO_NX];
+    double slope[QO_NX], error[QO_NX];
+    int stage;
+    if (!prepare(system, h)) {
+        *worst = 0;
+        return INFINITY;
+    }
+    memcpy(slope, f, sizeof slope);
+    for (stage = 0; stage < STAGES; ++stage) {
+        double right[QO_NX];
+        if (EVALUATES[stage] && stage > 0) {
+            double argument[QO_NX];
+            memcpy(argument, model->x, sizeof argument);
+            add(argument, A[stage], k, stage, 1.0);
+            qo_eq_derivatives(argument, model->u, model->p, slope);
+        }
+        memcpy(right, slope, sizeof right);
+        add(right, C[stage], k, stage, 1.0 / h);
+        solve(system, right, k[stage]);
+    }
+    memcpy(next, model->x, QO_NX * sizeof *next);
+    add(next, B, k, STAGES, 1.0);
+    memset(error, 0, sizeof error);
+    add(error, E, k, STAGES, 1.0);
+    return error_ratio(model, next, error, worst);
+}
+
+/* Factor on the step length after an error ratio. */
+static double growth(double ratio) {
+    if (!isfinite(ratio)) {
+        return 0.1;
+    }
+    return fmin(5.0, fmax(0.1, 0.9 * pow(fmax(ratio, 1e-8), -1.0 / ORDER_OF_ERROR)));
+}
+
+/* A vehicle at rest decays into numbers that processors handle slowly; they mean nothing. */
+static void flush(double *x) {
+    int index;
+    for (index = 0; index < QO_NX; ++index) {
+        if (fabs(x[index]) < NEGLIGIBLE) {
+            x[index] = 0.0;
+        }
+    }
+}
+
+static qo_status give_up(qo_model *model, int worst) {
+    return qo_fail(model, QO_DISCARD, "However short the step, state ", qo_states[worst].name,
+                   " is not accurate.");
+}
+
+/* One step of at most h that the tolerance accepts; y stays. */
+static qo_status integrate(qo_model *model, double h, double *taken) {
+    linear_system system;
+    double f[QO_NX], next[QO_NX];
+    double tried = fmin(fmax(model->step, SHORTEST_STEP), h);
+    int worst = 0, rejected = 0;
+    qo_eq_derivatives(model->x, model->u, model->p, f);
+    qo_eq_jacobian(model->x, model->u, model->p, system.jacobian);
+    for (;;) {
+        double ratio = attempt(model, &system, f, tried, next, &worst);
+        double proposed = tried * (ratio <= 1.0 && rejected ? fmin(1.0, growth(ratio)) : growth(ratio));
+        if (ratio <= 1.0) {
+            /* A step cut short by the end of the communication step says nothing against a longer one. */
+            model->step = fmin(tried < model->step ? fmax(proposed, model->step) : proposed, LONGEST_STEP);
+            *taken = tried;
+            flush(next);
+            memcpy(model->x, next, sizeof next);
+            return QO_OK;
+        }
+        rejected = 1;
+        model->step = tried = proposed;
+        if (tried < SHORTEST_STEP) {
+            return give_up(model, worst);
+        }
+    }
+}
+
+static qo_status check_length(qo_model *model, double h) {
+    if (!isfinite(h) || h <= 0.0) {
+        return qo_fail(model, QO_ERROR, "The length of the ", "step", " must be greater than zero.");
+    }
+    return qo_check(model);
+}
+
+qo_status qo_advance(qo_model *model, double h, double *taken) {
+    qo_model before = *model;
+    qo_status status = check_length(model, h);
+    if (status == QO_OK && (status = integrate(model, h, taken)) == QO_OK) {
+        status = qo_outputs(model);
+    }
+    if (status != QO_OK) {
+        memcpy(before.message, model->message, sizeof before.message);
+        *model = before;
+    }
+    return status;
+}
+
+/* What is left of h; the last step ends at h exactly, and is not a splinter of rounding. */
+static qo_status integrate_all(qo_model *model, double h) {
+    double done = 0.0;
+    int attempts;
+    for (attempts = 0; attempts < MAX_ATTEMPTS; ++attempts) {
+        double taken = 0.0;
+        qo_status status = integrate(model, h - done, &taken);
+        if (status != QO_OK) {
+            return status;
+        }
+        done += taken;
+        if (h - done <= 1e-12 * h) {
+            return QO_OK;
+        }
+    }
+    return qo_fail(model, QO_DISCARD, "The ", "step", " takes too many internal steps: shorten it.");
+}
+
+qo_status qo_step(qo_model *model, double h) {
+    qo_model before = *model;
+    int changed;
+    qo_status status = check_length(model, h);
+    if (status == QO_OK && (status = integrate_all(model, h)) == QO_OK &&
+        (status = qo_outputs(model)) == QO_OK) {
+        status = qo_update_discrete(model, &changed);
+    }
+    if (status != QO_OK) {
+        memcpy(before.message, model->message, sizeof before.message);
+        *model = before;
+    }
+    return status;
+}
