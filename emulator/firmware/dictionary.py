@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from enum import IntEnum
 from functools import lru_cache, partial
 from io import StringIO
@@ -14,27 +15,39 @@ from canopen.objectdictionary import ODArray, ODRecord, ODVariable
 from canopen.objectdictionary.eds import import_eds
 from durand.datatypes import DatatypeEnum
 from durand.object_dictionary import ObjectDictionary, Record, Variable
-from durand.services.sdo.server import SDODomainAbort
 
 
 class AbortCode(IntEnum):
-    """SDO abort codes of CiA 301, table 22, as far as our own checks use them."""
+    """SDO abort codes of CiA 301, table 22, as far as these nodes have a use for them."""
 
+    TOGGLE_BIT = 0x05030000
+    TIMED_OUT = 0x05040000
+    COMMAND_SPECIFIER = 0x05040001
+    BLOCK_SIZE = 0x05040002
+    SEQUENCE_NUMBER = 0x05040003
+    CHECKSUM = 0x05040004
     UNSUPPORTED_ACCESS = 0x06010000
+    WRITE_ONLY = 0x06010001
+    READ_ONLY = 0x06010002
     SUBINDEX_ZERO_NOT_ZERO = 0x06010003
     OBJECT_MISSING = 0x06020000
     NOT_MAPPABLE = 0x06040041
     PDO_LENGTH_EXCEEDED = 0x06040042
     PARAMETER_INCOMPATIBLE = 0x06040043
+    LENGTH_MISMATCH = 0x06070010
+    TOO_LONG = 0x06070012
+    TOO_SHORT = 0x06070013
     SUBINDEX_MISSING = 0x06090011
     VALUE_RANGE_EXCEEDED = 0x06090030
     VALUE_TOO_HIGH = 0x06090031
     VALUE_TOO_LOW = 0x06090032
+    CANNOT_STORE = 0x08000020
     DEVICE_STATE = 0x08000022
+    NO_DATA = 0x08000024
 
 
 class AbortError(Exception):
-    """A write is refused with an SDO abort code."""
+    """An access is refused with an SDO abort code."""
 
     def __init__(self, code: AbortCode) -> None:
         super().__init__(code.name)
@@ -50,6 +63,9 @@ STRUCT_CODES = {
     DatatypeEnum.UNSIGNED32: "I",
 }
 """Data types that a PDO can carry -> `struct` code."""
+
+STORE_EDS = 0x1021
+"""The object in which a device carries its own EDS."""
 
 _ACCESS = {"rww": "rw", "rwr": "rw"}
 """CiA 306 access types with a PDO direction in them -> what SDO may do."""
@@ -93,10 +109,13 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
         super().__init__()
         self.mappable: set[tuple[int, int]] = set()
         self._pdo_writers: dict[tuple[int, int], Callable[[int], None]] = {}
-        for item in _parse(eds.read_text(encoding="utf-8"), node_id).values():
+        content = eds.read_text(encoding="utf-8")
+        for item in _parse(content, node_id).values():
             # Indices below 20h are the dummy types of the EDS, not objects of the device.
             if item.index >= 0x20:
                 self[item.index] = self._convert(item)
+        if STORE_EDS in self:
+            self.on_read(STORE_EDS, 0, content.encode)
 
     def _convert(self, item: ODVariable | ODRecord | ODArray) -> Any:
         if isinstance(item, ODVariable):
@@ -127,20 +146,13 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
         """The value that an SDO read would give."""
         return int(self.read(index, subindex))
 
-    def on_read(self, index: int, subindex: int, read: Callable[[], int]) -> None:
+    def on_read(self, index: int, subindex: int, read: Callable[[], int | bytes]) -> None:
         """Let `read` give the value of an object."""
         self.set_read_callback(index, subindex, read)
 
     def on_write(self, index: int, subindex: int, write: Callable[[int], None]) -> None:
         """Call `write` with a value before it is stored; it may refuse by raising `AbortError`."""
-
-        def guarded(value: int) -> None:
-            try:
-                write(value)
-            except AbortError as refusal:
-                raise SDODomainAbort(refusal.code, (index, subindex)) from refusal
-
-        self.validate_callbacks[index, subindex].add(guarded)
+        self.validate_callbacks[index, subindex].add(write)
 
     def on_pdo_write(self, index: int, subindex: int, write: Callable[[int], None]) -> None:
         """Let an RPDO write this object through `write` instead of the way an SDO goes."""
@@ -154,16 +166,65 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
         """A function that writes the object, for an RPDO; a refused value leaves it unchanged."""
         return self._pdo_writers.get((index, subindex)) or partial(self._write_checked, index, subindex)
 
-    def _write_checked(self, index: int, subindex: int, value: int) -> None:
-        variable = self.lookup(index, subindex)
-        if variable.minimum <= value <= variable.maximum:
-            try:
-                self.write(index, subindex, value, downloaded=True)
-            except SDODomainAbort:
-                # A PDO has no way to answer (CiA 301): the object keeps its value.
-                return
+    def find(self, index: int, subindex: int) -> Variable:
+        """The description of an object.
 
-    def restore(self, first: int = 0x1000, last: int = 0xFFFF) -> None:
-        """Forget every value written to the objects from `first` to `last`: the EDS defaults hold again."""
+        Raises:
+            AbortError: 0602 0000h no such object, 0609 0011h no such sub-index.
+        """
+        try:
+            return self.lookup(index, subindex)
+        except KeyError as error:
+            missing = AbortCode.SUBINDEX_MISSING if index in self else AbortCode.OBJECT_MISSING
+            raise AbortError(missing) from error
+
+    def lookup(self, index: int, subindex: int | None = None) -> Any:
+        """The object, or its entry at a sub-index.
+
+        Raises:
+            KeyError: there is none (durand 0.5.0 gives a plain variable whatever the sub-index).
+        """
+        if subindex and index in self._variables:
+            raise KeyError(index, subindex)
+        return super().lookup(index, subindex)
+
+    def entries(self) -> Iterator[tuple[int, int, Variable]]:
+        """Every (index, sub-index, variable), in order."""
+        for index, item in self:
+            if isinstance(item, Variable):
+                yield index, 0, item
+            else:
+                for subindex, variable in item:
+                    yield index, subindex, variable
+
+    def check(self, index: int, subindex: int, value: Any) -> None:
+        """Refuse a value outside the limits of the object.
+
+        Raises:
+            AbortError: 0609 0031h, 0609 0032h.
+        """
+        variable = self.lookup(index, subindex)
+        if variable.maximum is not None and value > variable.maximum:
+            raise AbortError(AbortCode.VALUE_TOO_HIGH)
+        if variable.minimum is not None and value < variable.minimum:
+            raise AbortError(AbortCode.VALUE_TOO_LOW)
+
+    def restore(
+        self, first: int = 0x1000, last: int = 0xFFFF, stored: Mapping[tuple[int, int], int | bytes] | None = None
+    ) -> None:
+        """Forget every value written to the objects from `first` to `last`: defaults or `stored` values hold again."""
         for key in [key for key in self._data if first <= key[0] <= last]:
             del self._data[key]
+        for key, value in (stored or {}).items():
+            if first <= key[0] <= last:
+                self._data[key] = value
+
+    def written(self) -> dict[tuple[int, int], int | bytes]:
+        """The values that differ from the defaults of the EDS."""
+        return {key: value for key, value in self._data.items() if value != self.lookup(*key).value}
+
+    def _write_checked(self, index: int, subindex: int, value: int) -> None:
+        # A PDO has no way to answer (CiA 301): a refused value leaves the object as it is.
+        with suppress(AbortError):
+            self.check(index, subindex, value)
+            self.write(index, subindex, value, downloaded=True)

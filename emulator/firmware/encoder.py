@@ -47,6 +47,9 @@ class EncoderApplication:
     def rpdo_applied(self) -> None:
         """An encoder has no RPDO."""
 
+    def rpdo_missing(self) -> None:
+        """An encoder has no RPDO."""
+
     def connection_lost(self) -> None:
         """Nothing moves by itself that would have to stop."""
 

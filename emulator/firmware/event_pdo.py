@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from emulator.firmware.pdo import Tpdo
 from emulator.firmware.timers import Timer, Timers
+from emulator.firmware.tpdo import Tpdo
 
 
 class EventSender:

@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from emulator.firmware.dictionary import AbortCode, AbortError, Dictionary
+from emulator.firmware.nodebus import NodeBus
 from emulator.firmware.timers import Timer, Timers
 
-_CONSUMERS = 4
+ERROR_CONTROL = 0x700
+"""Identifier of the heartbeat of a node, less its node id."""
+
+_HIGHEST_NODE_ID = 0x7F
 
 
 class HeartbeatProducer:
@@ -42,31 +46,51 @@ class HeartbeatProducer:
 
 
 class HeartbeatConsumer:
-    """Watches the nodes in 1016h; monitoring of a node starts with its first heartbeat."""
+    """Watches the nodes in 1016h; monitoring of a node starts with its first heartbeat.
 
-    def __init__(self, dictionary: Dictionary, timers: Timers, lost: Callable[[int], None]) -> None:
+    Args:
+        dictionary: holds 1016h.
+        timers: simulated time.
+        bus: where heartbeats come from.
+        lost: called with the node id when a heartbeat is missing.
+        found: called when none is missing any more.
+    """
+
+    def __init__(
+        self,
+        dictionary: Dictionary,
+        timers: Timers,
+        bus: NodeBus,
+        lost: Callable[[int], None],
+        found: Callable[[], None],
+    ) -> None:
         self._dictionary = dictionary
         self._timers = timers
+        self._bus = bus
         self._lost = lost
+        self._found = found
+        self._entries = range(1, dictionary.lookup(0x1016, 0).value + 1)
         self._periods: dict[int, float] = {}
         self._deadlines: dict[int, float] = {}
         self._watch: dict[int, Timer] = {}
-        for subindex in range(1, _CONSUMERS + 1):
+        self._missing: set[int] = set()
+        for subindex in self._entries:
             dictionary.on_write(0x1016, subindex, self._writer(subindex))
 
     def reset(self) -> None:
         """Take the nodes from the dictionary and wait for their first heartbeats."""
-        self._configure([self._dictionary.value(0x1016, k) for k in range(1, _CONSUMERS + 1)])
+        self._missing.clear()
+        self._configure([self._dictionary.value(0x1016, k) for k in self._entries])
 
-    def receive(self, node_id: int) -> None:
-        """A heartbeat of `node_id` has arrived."""
-        period = self._periods.get(node_id)
-        if period is None:
-            return
+    def receive(self, can_id: int, _data: bytes) -> None:
+        """A heartbeat has arrived, or a boot-up, which is one too."""
+        node_id = can_id - ERROR_CONTROL
         # Moving the deadline is cheaper than a new timer for every heartbeat; the timer looks when it is due.
-        self._deadlines[node_id] = self._timers.now + period
+        self._deadlines[node_id] = self._timers.now + self._periods[node_id]
         if node_id not in self._watch:
-            self._watch[node_id] = self._timers.after(period, lambda: self._check(node_id))
+            self._watch[node_id] = self._timers.after(self._periods[node_id], lambda: self._check(node_id))
+        if self._missing:
+            self._forget(self._missing - {node_id})
 
     def _check(self, node_id: int) -> None:
         remaining = self._deadlines[node_id] - self._timers.now
@@ -74,13 +98,16 @@ class HeartbeatConsumer:
             self._watch[node_id] = self._timers.after(remaining, lambda: self._check(node_id))
             return
         del self._watch[node_id]
+        self._missing.add(node_id)
         self._lost(node_id)
 
     def _writer(self, subindex: int) -> Callable[[int], None]:
         def write(value: int) -> None:
-            entries = [self._dictionary.value(0x1016, k) for k in range(1, _CONSUMERS + 1)]
+            if value >> 16 & 0xFF > _HIGHEST_NODE_ID:
+                raise AbortError(AbortCode.PARAMETER_INCOMPATIBLE)
+            entries = [self._dictionary.value(0x1016, k) for k in self._entries]
             entries[subindex - 1] = value
-            nodes = [entry >> 16 & 0x7F for entry in entries if entry & 0xFFFF and entry >> 16 & 0x7F]
+            nodes = [_node(entry) for entry in entries if _watches(entry)]
             if len(nodes) != len(set(nodes)):
                 raise AbortError(AbortCode.PARAMETER_INCOMPATIBLE)
             self._configure(entries)
@@ -91,6 +118,24 @@ class HeartbeatConsumer:
         for timer in self._watch.values():
             timer.cancel()
         self._watch.clear()
-        self._periods = {
-            entry >> 16 & 0x7F: (entry & 0xFFFF) / 1000.0 for entry in entries if entry & 0xFFFF and entry >> 16 & 0x7F
-        }
+        for node_id in self._periods:
+            self._bus.unsubscribe(ERROR_CONTROL + node_id, self.receive)
+        self._periods = {_node(entry): (entry & 0xFFFF) / 1000.0 for entry in entries if _watches(entry)}
+        for node_id in self._periods:
+            self._bus.subscribe(ERROR_CONTROL + node_id, self.receive)
+        self._forget(self._missing & set(self._periods))
+
+    def _forget(self, still_missing: set[int]) -> None:
+        ended = bool(self._missing) and not still_missing
+        self._missing = still_missing
+        if ended:
+            self._found()
+
+
+def _node(entry: int) -> int:
+    return entry >> 16 & _HIGHEST_NODE_ID
+
+
+def _watches(entry: int) -> bool:
+    """A node id and a time: without either the entry is not used."""
+    return bool(entry & 0xFFFF and _node(entry))

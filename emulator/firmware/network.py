@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from emulator.firmware.description import (
     DRIVE_ROLES,
@@ -13,10 +15,24 @@ from emulator.firmware.description import (
 from emulator.firmware.drive import DriveApplication
 from emulator.firmware.encoder import EncoderApplication
 from emulator.firmware.hardware import VehicleHardware
-from emulator.firmware.node import Application, Node, NodeBus
+from emulator.firmware.node import Application, Node
+from emulator.firmware.nodebus import NodeBus, Routes
+from emulator.firmware.storage import Memory, VolatileMemory
 from emulator.firmware.timers import Timers
 
-_HEARTBEATS = range(0x701, 0x780)
+_FRAME_TIME = 135e-6
+"""When the other nodes hear a frame of a node [s]: 135 bits, 8 bytes with all stuff bits, at 1 Mbit/s."""
+
+_IN_FLIGHT = 64
+"""Frames between the nodes that may wait for the wire; further ones are lost, as in full transmit buffers."""
+
+
+@dataclass(frozen=True)
+class _SyncGroup:
+    """The nodes that listen to one SYNC, and whether they all take it without a number in it."""
+
+    nodes: tuple[Node, ...]
+    plain: bool
 
 
 class DeviceNetwork:
@@ -26,6 +42,7 @@ class DeviceNetwork:
         vehicle: the hardware they sit on.
         description: which node is where.
         send: transmits a frame (CAN identifier, data).
+        memory: where stored parameters outlive the nodes; without one, they outlive resets only.
     """
 
     def __init__(
@@ -33,17 +50,22 @@ class DeviceNetwork:
         vehicle: VehicleHardware,
         description: NetworkDescription,
         send: Callable[[int, bytes], None],
+        memory: Memory | None = None,
     ) -> None:
         self._vehicle = vehicle
         self._send = send
+        self._memory = VolatileMemory() if memory is None else memory
         self._timers = Timers(vehicle.time)
         self._moved = vehicle.time
-        self._routes: dict[int, list[Callable[[int, bytes], None]]] = {}
-        self._sync_cob_id = description.sync_cob_id
-        self.nodes = {node.node_id: self._make_node(node) for node in description.nodes}
-        self._find_listeners()
-        for node in self._in_order:
-            node.power_on()
+        self.nodes: dict[int, Node] = {}
+        self._groups: dict[int, _SyncGroup] = {}
+        self._in_flight: deque[tuple[NodeBus, int, bytes]] = deque()
+        self._free = 0.0
+        self._routes = Routes(self._transmit, self._produce_sync, self._find_listeners)
+        for node in description.nodes:
+            self.nodes[node.node_id] = self._make_node(node)
+        for made in self.nodes.values():
+            made.power_on()
 
     @property
     def time(self) -> float:
@@ -52,18 +74,17 @@ class DeviceNetwork:
 
     def receive(self, can_id: int, data: bytes) -> None:
         """Take a data frame from the bus; the answers go out before this returns."""
-        if can_id == self._sync_cob_id:
-            self._sync()
-            return
+        group = self._groups.get(can_id)
+        if group is not None:
+            self._sync(group.nodes, group.plain, data)
         # A copy, because a handler may subscribe anew (NMT, PDO parameters).
-        for handler in tuple(self._routes.get(can_id, ())):
+        for _, handler in tuple(self._routes.data.get(can_id, ())):
             handler(can_id, data)
-        if can_id == 0:
-            for node in self._in_order:
-                node.nmt.receive(data)
-        elif can_id in _HEARTBEATS:
-            for node in self._in_order:
-                node.consumer.receive(can_id - 0x700)
+
+    def request(self, can_id: int) -> None:
+        """Take a remote frame from the bus; the answers go out before this returns."""
+        for _, answer in tuple(self._routes.remote.get(can_id, ())):
+            answer()
 
     def advance(self, to_time: float) -> None:
         """Let time pass up to `to_time` [s]: physics, and the timers of the nodes in their order."""
@@ -94,16 +115,49 @@ class DeviceNetwork:
         self._find_listeners()
 
     def _find_listeners(self) -> None:
-        self._in_order = tuple(node for node in self.nodes.values() if node.network.connected)
+        listeners = [node for node in self.nodes.values() if node.network.connected]
+        self._groups = {
+            can_id: _SyncGroup(nodes, not any(node.sync.counted for node in nodes))
+            for can_id in {node.network.sync_id for node in listeners}
+            for nodes in [tuple(node for node in listeners if node.network.sync_id == can_id)]
+        }
 
-    def _sync(self) -> None:
-        for node in self._in_order:
+    def _sync(self, nodes: tuple[Node, ...], plain: bool, data: bytes) -> None:
+        if data or not plain:
+            nodes = tuple(node for node in nodes if node.accepts_sync(data))
+        for node in nodes:
             node.latch()
-        frames = [frame for node in self._in_order for frame in node.sync_frames()]
+        frames = [(can_id, data, node) for node in nodes for can_id, data in node.sync_frames()]
         # All nodes ask for the bus at once: the lowest identifier wins the arbitration.
-        frames.sort()
-        for can_id, data in frames:
-            self._send(can_id, data)
+        frames.sort(key=_identifier)
+        for can_id, data, node in frames:
+            self._transmit(node.network, can_id, data)
+
+    def _produce_sync(self, can_id: int, data: bytes) -> None:
+        self._send(can_id, data)
+        self.receive(can_id, data)
+
+    def _transmit(self, origin: NodeBus, can_id: int, data: bytes) -> None:
+        self._send(can_id, data)
+        if can_id in self._routes.data or can_id in self._groups:
+            self._let_others_hear(origin, can_id, data)
+
+    def _let_others_hear(self, origin: NodeBus, can_id: int, data: bytes) -> None:
+        # One after the other, when the last bit has left the wire: PDOs that answer PDOs take time, as on a real bus.
+        if len(self._in_flight) == _IN_FLIGHT:
+            return
+        self._in_flight.append((origin, can_id, data))
+        self._free = max(self._free, self._timers.now) + _FRAME_TIME
+        self._timers.after(self._free - self._timers.now, self._hear)
+
+    def _hear(self) -> None:
+        origin, can_id, data = self._in_flight.popleft()
+        group = self._groups.get(can_id)
+        if group is not None:
+            self._sync(tuple(node for node in group.nodes if node.network is not origin), group.plain, data)
+        for owner, handler in tuple(self._routes.data.get(can_id, ())):
+            if owner is not origin:
+                handler(can_id, data)
 
     def _move(self, instant: float) -> None:
         # Counted here, because an engine of fixed steps shows no fractions of them in its own time.
@@ -118,5 +172,9 @@ class DeviceNetwork:
                 return DriveApplication(node, self._vehicle.drives[DRIVE_ROLES.index(description.role)])
             return EncoderApplication(node, self._vehicle.encoders[ENCODER_ROLES.index(description.role)])
 
-        bus = NodeBus(self._routes, self._send)
-        return Node(description.node_id, description.eds, bus, self._timers, application)
+        bus = NodeBus(self._routes)
+        return Node(description.node_id, description.eds, bus, self._timers, self._memory, application)
+
+
+def _identifier(frame: tuple[int, bytes, Node]) -> int:
+    return frame[0]

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import IntEnum
 
-from durand.callback_handler import CallbackHandler, FailMode
-from durand.services.nmt import StateEnum as NmtState
 
-__all__ = ["NmtCommand", "NmtSlave", "NmtState"]
+class NmtState(IntEnum):
+    """NMT states; the value is that of heartbeat and node guarding."""
+
+    INITIALISATION = 0x00
+    STOPPED = 0x04
+    OPERATIONAL = 0x05
+    PRE_OPERATIONAL = 0x7F
 
 
 class NmtCommand(IntEnum):
@@ -29,22 +33,29 @@ _TARGETS = {
 
 
 class NmtSlave:
-    """NMT state of one node; `state_callbacks` is what durand's SDO server subscribes to.
+    """NMT state of one node.
 
     Args:
         node_id: whom commands address, besides everybody (0).
         initialise: called in a reset, with True when the application is reset too; sends nothing.
         boot_up: sends the boot-up message.
+        changed: told every new state.
     """
 
-    def __init__(self, node_id: int, initialise: Callable[[bool], None], boot_up: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        node_id: int,
+        initialise: Callable[[bool], None],
+        boot_up: Callable[[], None],
+        changed: Callable[[NmtState], None],
+    ) -> None:
         self._node_id = node_id
         self._initialise = initialise
         self._boot_up = boot_up
+        self._changed = changed
         self.state = NmtState.INITIALISATION
-        self.state_callbacks = CallbackHandler(FailMode.FIRST_FAIL)
 
-    def receive(self, data: bytes) -> None:
+    def receive(self, _can_id: int, data: bytes) -> None:
         """Take an NMT message; one of a wrong length, to others or unknown is ignored."""
         if len(data) != 2 or data[1] not in (0, self._node_id):
             return
@@ -61,7 +72,7 @@ class NmtSlave:
         self.enter(NmtState.PRE_OPERATIONAL)
 
     def enter(self, state: NmtState) -> None:
-        """Change the state and tell the services, if it is another one."""
+        """Change the state and tell so, if it is another one."""
         if state is not self.state:
             self.state = state
-            self.state_callbacks.call(state)
+            self._changed(state)

@@ -7,18 +7,22 @@ from pathlib import Path
 from typing import Protocol
 
 from emulator.firmware.dictionary import Dictionary
-from emulator.firmware.emergency import Emergency, ErrorCode, ErrorRegister
-from emulator.firmware.event_pdo import EventSender
-from emulator.firmware.heartbeat import HeartbeatConsumer, HeartbeatProducer
+from emulator.firmware.emergency import Emergency, ErrorCode
+from emulator.firmware.guarding import NodeGuarding
+from emulator.firmware.heartbeat import ERROR_CONTROL, HeartbeatConsumer, HeartbeatProducer
 from emulator.firmware.nmt import NmtSlave, NmtState
-from emulator.firmware.pdo import PdoIndices, Rpdo, Tpdo
+from emulator.firmware.nodebus import NodeBus
+from emulator.firmware.pdos import Pdos
 from emulator.firmware.sdo import SdoServer
+from emulator.firmware.storage import Memory, ParameterStorage
+from emulator.firmware.sync import SyncService
 from emulator.firmware.timers import Timers
-
-_PDOS = 4
 
 _ERROR_BEHAVIOUR = {0: NmtState.PRE_OPERATIONAL, 1: None, 2: NmtState.STOPPED}
 """1029h:1 -> the NMT state that a communication error leads to from operational (CiA 301, 7.5.2.32)."""
+
+_TALKING = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
+"""NMT states with SDO, EMCY and SYNC (CiA 301, table 38)."""
 
 
 class Application(Protocol):
@@ -33,98 +37,58 @@ class Application(Protocol):
     def rpdo_applied(self) -> None:
         """All values of an RPDO have been written."""
 
+    def rpdo_missing(self) -> None:
+        """An RPDO did not come within its event timer; 8250h has been reported."""
+
     def sample(self) -> None:
         """SYNC: take the process values of this instant."""
 
     def connection_lost(self) -> None:
-        """The heartbeat of a node in 1016h is missing."""
-
-
-class NodeBus:
-    """The subscriptions of one node, as durand's services want them.
-
-    Args:
-        routes: CAN identifier -> handlers, shared by all nodes of the network.
-        send: transmits a frame.
-    """
-
-    def __init__(
-        self, routes: dict[int, list[Callable[[int, bytes], None]]], send: Callable[[int, bytes], None]
-    ) -> None:
-        self._routes = routes
-        self._mine: dict[int, Callable[[int, bytes], None]] = {}
-        self._transmit = send
-        self.connected = True
-
-    def send(self, cob_id: int, data: bytes) -> None:
-        """Transmit a frame; nothing leaves a node that is off the bus."""
-        if self.connected:
-            self._transmit(cob_id, data)
-
-    def connect(self) -> None:
-        """Hear and send again."""
-        if not self.connected:
-            self.connected = True
-            for cob_id, callback in self._mine.items():
-                self._routes.setdefault(cob_id, []).append(callback)
-
-    def disconnect(self) -> None:
-        """Neither hear nor send until `connect`; the subscriptions are kept."""
-        if self.connected:
-            self.connected = False
-            for cob_id, callback in self._mine.items():
-                self._routes[cob_id].remove(callback)
-
-    def add_subscription(self, cob_id: int, callback: Callable[[int, bytes], None]) -> None:
-        """Call `callback` with every frame of this identifier."""
-        self.remove_subscription(cob_id)
-        self._mine[cob_id] = callback
-        if self.connected:
-            self._routes.setdefault(cob_id, []).append(callback)
-
-    def remove_subscription(self, cob_id: int) -> None:
-        """Stop listening to an identifier."""
-        callback = self._mine.pop(cob_id, None)
-        if callback is not None and self.connected:
-            self._routes[cob_id].remove(callback)
+        """The heartbeat of a node in 1016h, or the guarding of the master, is missing."""
 
 
 class Node:
-    """A node as durand's SDO server expects it (`node_id`, `network`, `object_dictionary`, `nmt`), and more.
+    """A node on a bus.
 
     Args:
         node_id: 1 to 127.
         eds: the EDS file of the device.
-        network: its side of the bus.
+        bus: its CAN controller.
         timers: simulated time.
+        memory: where stored parameters outlive it.
         make_application: builds the device profile on this node.
+
+    Attributes:
+        object_dictionary, nmt, sync, emergency, timers: services that device profiles use.
+        pdos: its PDOs.
     """
 
     def __init__(
         self,
         node_id: int,
         eds: Path,
-        network: NodeBus,
+        bus: NodeBus,
         timers: Timers,
+        memory: Memory,
         make_application: Callable[[Node], Application],
     ) -> None:
         self.node_id = node_id
-        self.network = network
+        self.network = bus
         self.timers = timers
-        self.object_dictionary = Dictionary(eds, node_id)
-        self.nmt = NmtSlave(node_id, self._initialise, self._send_boot_up)
-        self.nmt.state_callbacks.add(self._nmt_changed)
-        self.sdo_server = SdoServer(self)
-        self.emergency = Emergency(self.object_dictionary, self._send_emergency)
-        self.producer = HeartbeatProducer(self.object_dictionary, timers, self._send_heartbeat)
-        self.consumer = HeartbeatConsumer(self.object_dictionary, timers, self._heartbeat_lost)
-        self.rpdos = [self._make_rpdo(k) for k in range(_PDOS) if 0x1400 + k in self.object_dictionary]
-        self.tpdos = [self._make_tpdo(k) for k in range(_PDOS) if 0x1800 + k in self.object_dictionary]
-        self.senders = [EventSender(tpdo, timers, network.send) for tpdo in self.tpdos]
-        self._sync_rpdos: list[Rpdo] = []
-        self._sync_tpdos: list[Tpdo] = []
-        self._subscribed: list[int] = []
+        objects = self.object_dictionary = Dictionary(eds, node_id)
+        self.nmt = NmtSlave(node_id, self._initialise, self._send_boot_up, self._nmt_changed)
+        self.emergency = Emergency(objects, timers, self._send_emergency)
+        self.sync = SyncService(objects, timers, bus.listen_to_sync, self._produce_sync)
+        self._sdo = SdoServer(objects, timers, self._send_sdo)
+        self._storage = ParameterStorage(objects, memory, node_id, lambda: self.nmt.state is not NmtState.OPERATIONAL)
+        self._producer = HeartbeatProducer(objects, timers, self._send_heartbeat)
+        self._consumer = HeartbeatConsumer(objects, timers, bus, self._heartbeat_lost, self._heartbeat_found)
+        self._guarding = NodeGuarding(objects, timers, self._send_guarding, self._guarding_lost, self._heartbeat_found)
+        self.pdos = Pdos(self)
         self.application = make_application(self)
+        bus.subscribe(0x000, self.nmt.receive)
+        bus.subscribe(0x600 + node_id, self._take_sdo)
+        bus.answer_remote(ERROR_CONTROL + node_id, self._answer_guarding)
 
     def power_on(self) -> None:
         """Boot: initialise, send the boot-up message, become pre-operational."""
@@ -145,83 +109,72 @@ class Node:
     def bus_on(self) -> None:
         """The CAN controller has recovered from bus-off."""
         self.network.connect()
-        self.emergency.report(ErrorCode.BUS_OFF_RECOVERED, ErrorRegister.COMMUNICATION)
+        self.emergency.report_communication(ErrorCode.BUS_OFF_RECOVERED)
+        self.emergency.end_communication(ErrorCode.BUS_OFF_RECOVERED)
+
+    def accepts_sync(self, data: bytes) -> bool:
+        """Whether a SYNC is one that this node is configured for; one of another length is an error."""
+        if self.sync.accepts(data):
+            self.emergency.end_communication(ErrorCode.SYNC_LENGTH)
+            return True
+        if self.nmt.state in _TALKING:
+            self.emergency.report_communication(ErrorCode.SYNC_LENGTH, len(data))
+        return False
 
     def latch(self) -> None:
         """SYNC: apply the waiting RPDOs, then take the process values of this instant."""
         if self.nmt.state is NmtState.OPERATIONAL:
-            for rpdo in self._sync_rpdos:
+            for rpdo in self.pdos.sync_rpdos:
                 rpdo.sync()
             self.application.sample()
+            for tpdo in self.pdos.sampled_tpdos:
+                tpdo.sample()
 
     def sync_frames(self) -> list[tuple[int, bytes]]:
         """The TPDOs that go out with this SYNC."""
-        return [(tpdo.can_id, tpdo.data()) for tpdo in self._sync_tpdos if tpdo.due_at_sync()]
+        counter = self.sync.counter
+        return [(tpdo.can_id, tpdo.data()) for tpdo in self.pdos.sync_tpdos if tpdo.due_at_sync(counter)]
 
     def notify_event(self) -> None:
         """Something worth an event-driven TPDO has happened."""
         if self.nmt.state is NmtState.OPERATIONAL:
-            for sender in self.senders:
-                sender.event()
-
-    def _make_rpdo(self, k: int) -> Rpdo:
-        return Rpdo(
-            self.object_dictionary,
-            PdoIndices(0x1400 + k, 0x1600 + k),
-            self._pdo_changed,
-            lambda: self.application.rpdo_applied(),
-            self._report_length,
-        )
-
-    def _make_tpdo(self, k: int) -> Tpdo:
-        return Tpdo(self.object_dictionary, PdoIndices(0x1800 + k, 0x1A00 + k), self._pdo_changed)
+            self.pdos.event()
 
     def _initialise(self, application: bool) -> None:
-        self.object_dictionary.restore(0x1000, 0xFFFF if application else 0x1FFF)
-        self.sdo_server.reset()
-        for pdo in (*self.rpdos, *self.tpdos):
-            pdo.load()
-        self.producer.reset()
-        self.consumer.reset()
+        self.object_dictionary.restore(0x1000, 0xFFFF if application else 0x1FFF, self._storage.stored())
+        self._sdo.reset()
+        if application:
+            self.emergency.reset()
+        self.pdos.load()
+        self.sync.reset()
+        self._producer.reset()
+        self._consumer.reset()
+        self._guarding.reset()
         if application:
             self.application.reset()
 
     def _nmt_changed(self, state: NmtState) -> None:
-        for pdo in (*self.rpdos, *self.tpdos):
-            pdo.stale = True
         # The application first: a TPDO that starts with the new state shows what the state made of it.
         self.application.nmt_changed(state)
-        self._wire_pdos()
+        self.pdos.wire(state is NmtState.OPERATIONAL)
+        self.sync.run(state in _TALKING)
 
-    def _pdo_changed(self) -> None:
-        self._wire_pdos()
+    def _take_sdo(self, can_id: int, data: bytes) -> None:
+        if self.nmt.state in _TALKING:
+            self._sdo.receive(can_id, data)
 
-    def _wire_pdos(self) -> None:
-        serving = self.nmt.state is NmtState.OPERATIONAL
-        rpdos = [rpdo for rpdo in self.rpdos if serving and rpdo.valid]
-        tpdos = [tpdo for tpdo in self.tpdos if serving and tpdo.valid]
-        for pdo in (*rpdos, *tpdos):
-            pdo.compile_if_stale()
-        self._sync_rpdos = [rpdo for rpdo in rpdos if rpdo.synchronous]
-        self._sync_tpdos = [tpdo for tpdo in tpdos if tpdo.synchronous]
-        for sender in self.senders:
-            sender.enable(sender.tpdo in tpdos and not sender.tpdo.synchronous)
-        self._subscribe(rpdos)
-
-    def _subscribe(self, rpdos: list[Rpdo]) -> None:
-        for cob_id in self._subscribed:
-            self.network.remove_subscription(cob_id)
-        self._subscribed = [rpdo.can_id for rpdo in rpdos]
-        for rpdo in rpdos:
-            self.network.add_subscription(rpdo.can_id, rpdo.receive)
-
-    def _report_length(self, too_long: bool) -> None:
-        code = ErrorCode.PDO_TOO_LONG if too_long else ErrorCode.PDO_LENGTH
-        self.emergency.report(code, ErrorRegister.COMMUNICATION)
-
-    def _heartbeat_lost(self, _node_id: int) -> None:
-        self.emergency.report(ErrorCode.HEARTBEAT, ErrorRegister.COMMUNICATION)
+    def _heartbeat_lost(self, node_id: int) -> None:
+        self.emergency.report_communication(ErrorCode.HEARTBEAT, node_id)
         self._connection_lost()
+
+    def _heartbeat_found(self) -> None:
+        self.emergency.end_communication(ErrorCode.HEARTBEAT)
+
+    def _guarding_lost(self) -> None:
+        self._heartbeat_lost(0)
+
+    def _answer_guarding(self) -> None:
+        self._guarding.request(self.nmt.state)
 
     def _connection_lost(self) -> None:
         self.application.connection_lost()
@@ -229,12 +182,21 @@ class Node:
         if target is not None and self.nmt.state is NmtState.OPERATIONAL:
             self.nmt.enter(target)
 
+    def _produce_sync(self, can_id: int, data: bytes) -> None:
+        self.network.produce_sync(can_id, data)
+
     def _send_boot_up(self) -> None:
-        self.network.send(0x700 + self.node_id, b"\x00")
+        self.network.send(ERROR_CONTROL + self.node_id, b"\x00")
 
     def _send_heartbeat(self) -> None:
-        self.network.send(0x700 + self.node_id, bytes((self.nmt.state,)))
+        self.network.send(ERROR_CONTROL + self.node_id, bytes((self.nmt.state,)))
+
+    def _send_guarding(self, value: int) -> None:
+        self.network.send(ERROR_CONTROL + self.node_id, bytes((value,)))
+
+    def _send_sdo(self, data: bytes) -> None:
+        self.network.send(0x580 + self.node_id, data)
 
     def _send_emergency(self, cob_id: int, data: bytes) -> None:
-        if self.nmt.state in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):
+        if self.nmt.state in _TALKING:
             self.network.send(cob_id, data)

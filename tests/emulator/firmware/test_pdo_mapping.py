@@ -64,13 +64,13 @@ def test_an_rpdo_may_skip_bytes_by_dummy_mapping(wire) -> None:
 
 
 def test_the_mapping_of_an_existing_pdo_cannot_be_changed(wire) -> None:
-    assert wire.write(1, 0x1A00, 0, b"\x00") == 0x08000022
-    assert wire.write(1, 0x1A00, 1, entry(0x6041, 0, 16)) == 0x08000022
+    assert wire.write(1, 0x1A00, 0, b"\x00") == 0x06010000
+    assert wire.write(1, 0x1A00, 1, entry(0x6041, 0, 16)) == 0x06010000
 
 
 def test_entries_cannot_be_written_before_the_count_is_zero(wire) -> None:
     switch_off(wire)
-    assert wire.write(1, 0x1A00, 1, entry(0x6041, 0, 16)) == 0x06010003
+    assert wire.write(1, 0x1A00, 1, entry(0x6041, 0, 16)) == 0x06010000
 
 
 REFUSED = {
@@ -164,7 +164,7 @@ def test_event_timer_and_inhibit_time_hold(wire) -> None:
 
 def test_an_rpdo_of_the_wrong_length_is_reported_and_a_short_one_is_not_applied(wire) -> None:
     wire.nmt(0x01, 1)
-    assert (0x081, struct.pack("<HB5x", 0x8210, 0x11)) in wire.send(0x201, b"\x06")
+    assert (0x081, struct.pack("<HBH3x", 0x8210, 0x11, 1)) in wire.send(0x201, b"\x06")
     assert wire.read(1, 0x6041) & 0x4F == 0x40
     frames = wire.send(0x201, struct.pack("<Hhi", 0x06, 0, 0))
     assert any(can_id == 0x081 and data[:2] == b"\x20\x82" for can_id, data in frames)

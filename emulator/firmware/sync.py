@@ -1,0 +1,109 @@
+"""SYNC consumer and producer of a node: 1005h, 1006h, 1019h (CiA 301, 7.2.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from emulator.firmware.cob_ids import IDENTIFIER, check_change, check_cob_id
+from emulator.firmware.dictionary import AbortCode, AbortError, Dictionary
+from emulator.firmware.timers import Timer, Timers
+
+PRODUCES = 1 << 30
+"""Bit of 1005h: this node is the producer."""
+
+_COUNTER_MAX = 240
+
+
+class SyncService:
+    """What one node knows of the SYNC.
+
+    Args:
+        dictionary: holds 1005h, 1006h and 1019h.
+        timers: simulated time.
+        listen: told which CAN identifier is the SYNC, and when numbers in it begin or end.
+        produce: transmits a SYNC (CAN identifier, data), and lets this node act on it.
+
+    Attributes:
+        counter: the number in the last SYNC, 0 where SYNCs are not numbered.
+    """
+
+    def __init__(
+        self,
+        dictionary: Dictionary,
+        timers: Timers,
+        listen: Callable[[int], None],
+        produce: Callable[[int, bytes], None],
+    ) -> None:
+        self._dictionary = dictionary
+        self._timers = timers
+        self._listen = listen
+        self._produce = produce
+        self._timer: Timer | None = None
+        self._running = False
+        self._cob_id = 0
+        self._period = 0
+        self._overflow = 0
+        self.counter = 0
+        dictionary.on_write(0x1005, 0, self._write_cob_id)
+        dictionary.on_write(0x1006, 0, self._write_period)
+        dictionary.on_write(0x1019, 0, self._write_overflow)
+
+    @property
+    def counted(self) -> bool:
+        """SYNCs carry a number."""
+        return self._overflow > 0
+
+    def reset(self) -> None:
+        """Take everything from the dictionary."""
+        read = self._dictionary.value
+        self._cob_id, self._period, self._overflow = read(0x1005), read(0x1006), read(0x1019)
+        self.counter = 0
+        self._listen(self._cob_id & IDENTIFIER)
+
+    def run(self, running: bool) -> None:
+        """Produce or not, as the NMT state allows."""
+        self._running = running
+        self._restart()
+
+    def accepts(self, data: bytes) -> bool:
+        """Whether a SYNC has the length that it should have; takes its number."""
+        if len(data) != (1 if self._overflow else 0):
+            return False
+        self.counter = data[0] if data else 0
+        return True
+
+    def _restart(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._running and self._cob_id & PRODUCES and self._period:
+            self._timer = self._timers.after(self._period * 1e-6, self._send)
+
+    def _send(self) -> None:
+        self._timer = self._timers.after(self._period * 1e-6, self._send)
+        following = self.counter % self._overflow + 1 if self._overflow else 0
+        self._produce(self._cob_id & IDENTIFIER, bytes((following,)) if following else b"")
+
+    def _write_cob_id(self, value: int) -> None:
+        check_cob_id(value)
+        # The identifier of a producer must not change while it produces.
+        check_change(self._cob_id, value, switch=PRODUCES, off=False)
+        started = bool(value & PRODUCES and not self._cob_id & PRODUCES)
+        self._cob_id = value
+        if started:
+            self.counter = 0
+        self._listen(value & IDENTIFIER)
+        self._restart()
+
+    def _write_period(self, value: int) -> None:
+        self._period = value
+        self._restart()
+
+    def _write_overflow(self, value: int) -> None:
+        if self._period:
+            raise AbortError(AbortCode.DEVICE_STATE)
+        if value == 1 or value > _COUNTER_MAX:
+            raise AbortError(AbortCode.VALUE_RANGE_EXCEEDED)
+        self._overflow = value
+        self.counter = 0
+        self._listen(self._cob_id & IDENTIFIER)
