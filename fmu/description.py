@@ -1,0 +1,242 @@
+"""`modelDescription.xml` of FMI 2.0 and 3.0, from one table of variables."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
+from xml.etree import ElementTree as xml
+
+from fmu.interface import LOG_CATEGORIES, MODEL_IDENTIFIER, Interface, initial_of, number
+from fmu.units import DisplayUnit
+from fmu.variables import Block, Causality, Variable
+
+NAMING: Final = "structured"
+"""Names like `der(x_dot)` and `slope.chassis.angle` are parts of a hierarchy."""
+
+
+class FmiVersion(enum.StrEnum):
+    """Versions of the standard."""
+
+    FMI2 = "2"
+    FMI3 = "3"
+
+
+def model_description(interface: Interface, version: FmiVersion, token: str, sources: Sequence[str]) -> bytes:
+    """The file, UTF-8.
+
+    Args:
+        interface: what to describe.
+        version: of FMI.
+        token: instantiation token (GUID in FMI 2.0).
+        sources: C files, for FMI 2.0; FMI 3.0 has `buildDescription.xml` for them.
+    """
+    return document(_WRITERS[version](interface, token, sources))
+
+
+def document(root: xml.Element) -> bytes:
+    """An XML file, indented."""
+    xml.indent(root, "  ")
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + xml.tostring(root, encoding="utf-8") + b"\n"
+
+
+def _common(interface: Interface) -> dict[str, str]:
+    return {
+        "modelName": interface.name,
+        "description": interface.description,
+        "version": interface.version,
+        "copyright": interface.copyright,
+        "license": interface.license,
+        "generationTool": interface.tool,
+        "variableNamingConvention": NAMING,
+    }
+
+
+def _write_fmi2(interface: Interface, token: str, sources: Sequence[str]) -> xml.Element:
+    indicators = str(len(interface.table.block(Block.INDICATOR)))
+    root = xml.Element(
+        "fmiModelDescription", fmiVersion="2.0", guid=token, **_common(interface), numberOfEventIndicators=indicators
+    )
+    for kind, flags in _KINDS_FMI2.items():
+        element = xml.SubElement(root, kind, modelIdentifier=MODEL_IDENTIFIER, **flags)
+        files = xml.SubElement(element, "SourceFiles")
+        for name in sources:
+            xml.SubElement(files, "File", name=name)
+    _units(root, interface)
+    _categories(root)
+    _experiment(root, interface)
+    variables = xml.SubElement(root, "ModelVariables")
+    for row in interface.table.variables:
+        _variable_fmi2(variables, row, interface)
+    structure = xml.SubElement(root, "ModelStructure")
+    groups = {
+        "Outputs": interface.outputs,
+        "Derivatives": interface.table.block(Block.DERIVATIVE),
+        "InitialUnknowns": interface.initial_unknowns,
+    }
+    for name, rows in groups.items():
+        group = xml.SubElement(structure, name)
+        for row in rows:
+            known = None if name == "InitialUnknowns" else interface.dependencies_of(row)
+            xml.SubElement(group, "Unknown", {"index": str(row.value_reference + 1), **_dependencies(known, first=1)})
+    return root
+
+
+def _write_fmi3(interface: Interface, token: str, _sources: Sequence[str]) -> xml.Element:
+    root = xml.Element("fmiModelDescription", fmiVersion="3.0", instantiationToken=token, **_common(interface))
+    for kind, flags in _KINDS_FMI3.items():
+        xml.SubElement(root, kind, modelIdentifier=MODEL_IDENTIFIER, **flags)
+    _units(root, interface)
+    _categories(root)
+    _experiment(root, interface)
+    variables = xml.SubElement(root, "ModelVariables")
+    for row in interface.table.variables:
+        _variable_fmi3(variables, row, interface)
+    structure = xml.SubElement(root, "ModelStructure")
+    groups = {
+        "Output": interface.outputs,
+        "ContinuousStateDerivative": interface.table.block(Block.DERIVATIVE),
+        "InitialUnknown": interface.initial_unknowns,
+        "EventIndicator": interface.table.block(Block.INDICATOR),
+    }
+    for name, rows in groups.items():
+        for row in rows:
+            known = None if name == "InitialUnknown" else interface.dependencies_of(row)
+            attributes = {"valueReference": str(row.value_reference), **_dependencies(known, first=0)}
+            xml.SubElement(structure, name, attributes)
+    return root
+
+
+def _dependencies(known: Sequence[Variable] | None, *, first: int) -> dict[str, str]:
+    """FMI 2.0 counts variables from one, FMI 3.0 names value references. At initialization all that is set counts."""
+    if known is None:
+        return {}
+    return {"dependencies": " ".join(str(row.value_reference + first) for row in known)}
+
+
+_WRITERS: Final[Mapping[FmiVersion, Callable[[Interface, str, Sequence[str]], xml.Element]]] = MappingProxyType(
+    {FmiVersion.FMI2: _write_fmi2, FmiVersion.FMI3: _write_fmi3}
+)
+
+_STATE_FMI2: Final = {
+    "canNotUseMemoryManagementFunctions": "true",
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+    "providesDirectionalDerivative": "true",
+}
+_KINDS_FMI2: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
+    {
+        "ModelExchange": _STATE_FMI2,
+        "CoSimulation": {
+            "canHandleVariableCommunicationStepSize": "true",
+            "maxOutputDerivativeOrder": "1",
+            **_STATE_FMI2,
+        },
+    }
+)
+
+_STATE_FMI3: Final = {
+    "canGetAndSetFMUState": "true",
+    "canSerializeFMUState": "true",
+    "providesDirectionalDerivatives": "true",
+    "providesAdjointDerivatives": "true",
+}
+_KINDS_FMI3: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
+    {
+        "ModelExchange": _STATE_FMI3,
+        "CoSimulation": {
+            "canHandleVariableCommunicationStepSize": "true",
+            "maxOutputDerivativeOrder": "1",
+            "providesIntermediateUpdate": "true",
+            "canReturnEarlyAfterIntermediateUpdate": "true",
+            "mightReturnEarlyFromDoStep": "true",
+            "hasEventMode": "true",
+            **_STATE_FMI3,
+        },
+    }
+)
+
+
+def _units(root: xml.Element, interface: Interface) -> None:
+    definitions = xml.SubElement(root, "UnitDefinitions")
+    for unit in interface.units:
+        element = xml.SubElement(definitions, "Unit", name=unit.name)
+        xml.SubElement(element, "BaseUnit", {base: str(power) for base, power in unit.exponents.items()})
+        for display in unit.display:
+            _display_unit(element, display)
+
+
+def _display_unit(element: xml.Element, display: DisplayUnit) -> None:
+    xml.SubElement(element, "DisplayUnit", name=display.name, factor=number(display.factor))
+
+
+def _categories(root: xml.Element) -> None:
+    categories = xml.SubElement(root, "LogCategories")
+    for name, text in LOG_CATEGORIES.items():
+        xml.SubElement(categories, "Category", name=name, description=text)
+
+
+def _experiment(root: xml.Element, interface: Interface) -> None:
+    values = interface.experiment
+    xml.SubElement(
+        root,
+        "DefaultExperiment",
+        startTime=number(values.start_time),
+        stopTime=number(values.stop_time),
+        tolerance=number(values.tolerance),
+        stepSize=number(values.step_size),
+    )
+
+
+def _head(row: Variable) -> dict[str, str]:
+    head = {
+        "name": row.name,
+        "valueReference": str(row.value_reference),
+        "description": row.description,
+        "causality": row.causality.value,
+        "variability": row.variability.value,
+    }
+    if initial_of(row):
+        head["initial"] = initial_of(row)
+    return head
+
+
+def _bounds(row: Variable, write: Callable[[float], str]) -> dict[str, str]:
+    bounds = {"min": row.minimum, "max": row.maximum}
+    return {name: write(value) for name, value in bounds.items() if value is not None}
+
+
+def _real(row: Variable) -> dict[str, str]:
+    values = {"unit": row.unit}
+    if row.display_unit:
+        values["displayUnit"] = row.display_unit
+    values |= _bounds(row, number)
+    if row.block is Block.STATE:
+        values["nominal"] = number(row.nominal)
+    if row.start is not None:
+        values["start"] = number(row.start)
+    return values
+
+
+def _variable_fmi2(parent: xml.Element, row: Variable, interface: Interface) -> None:
+    element = xml.SubElement(parent, "ScalarVariable", _head(row))
+    if row.block is Block.MODE:
+        xml.SubElement(element, "Integer", _bounds(row, lambda value: str(int(value))))
+        return
+    values = _real(row)
+    if row.state:
+        values["derivative"] = str(interface.table[row.state].value_reference + 1)
+    xml.SubElement(element, "Real", values)
+
+
+def _variable_fmi3(parent: xml.Element, row: Variable, interface: Interface) -> None:
+    if row.block is Block.MODE:
+        xml.SubElement(parent, "Int32", _head(row) | _bounds(row, lambda value: str(int(value))))
+        return
+    values = _head(row) | _real(row)
+    if row.state:
+        values["derivative"] = str(interface.table[row.state].value_reference)
+    if row.causality is Causality.OUTPUT:
+        values["intermediateUpdate"] = "true"
+    xml.SubElement(parent, "Float64", values)

@@ -1,0 +1,1 @@
+"""The FMI functions in C, on the model of `fmu.model`."""

@@ -1,0 +1,287 @@
+/* Life of an instance: creation, messages, modes, saved states. */
+#include "instance.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MESSAGE_SIZE 512
+
+const char *const qo_category_names[QO_CATEGORIES] = {"logStatusError", "logStatusDiscard", "logStatusWarning",
+                                                      "logEvents"};
+
+static const struct {
+    qo_mode mode;
+    const char *name;
+} mode_names[] = {
+    {QO_INSTANTIATED, "before initialization"}, {QO_INITIALIZATION, "in initialization mode"},
+    {QO_EVENT, "in event mode"},                {QO_CONTINUOUS_TIME, "in continuous-time mode"},
+    {QO_STEP, "in step mode"},                  {QO_TERMINATED, "after termination"},
+};
+
+static int is_finite(double value)
+{
+    return value - value == 0.0;
+}
+
+qo_instance *qo_new(qo_interface interface, const char *name, int logging, void *environment,
+                    void (*callback)(void), qo_write write)
+{
+    size_t length = name == NULL ? 0 : strlen(name);
+    qo_instance *me = calloc(1, sizeof *me);
+    if (me == NULL) {
+        return NULL;
+    }
+    me->name = malloc(length + 1);
+    if (me->name == NULL) {
+        free(me);
+        return NULL;
+    }
+    if (length > 0) {
+        memcpy(me->name, name, length);
+    }
+    me->name[length] = '\0';
+    me->interface = interface;
+    me->environment = environment;
+    me->callback = callback;
+    me->write = write;
+    qo_set_logging(me, logging, 0, NULL);
+    qo_reset(me);
+    return me;
+}
+
+void qo_free(qo_instance *me)
+{
+    if (me != NULL) {
+        free(me->name);
+        free(me);
+    }
+}
+
+static qo_category category_of(qo_answer answer)
+{
+    switch (answer) {
+    case QO_ANSWER_OK: return QO_LOG_EVENTS;
+    case QO_ANSWER_WARNING: return QO_LOG_WARNING;
+    case QO_ANSWER_DISCARD: return QO_LOG_DISCARD;
+    default: return QO_LOG_ERROR;
+    }
+}
+
+qo_answer qo_tell(const qo_instance *me, qo_answer answer, const char *format, ...)
+{
+    qo_category category = category_of(answer);
+    int index = 0;
+    char message[MESSAGE_SIZE];
+    va_list arguments;
+    if (me->callback == NULL || !(me->categories & category)) {
+        return answer;
+    }
+    while (category >> index != 1) {
+        index++;
+    }
+    va_start(arguments, format);
+    vsnprintf(message, sizeof message, format, arguments);
+    va_end(arguments);
+    me->write(me, answer, qo_category_names[index], message);
+    return answer;
+}
+
+qo_answer qo_pass(const qo_instance *me, qo_status status)
+{
+    static const qo_answer answers[] = {QO_ANSWER_OK, QO_ANSWER_DISCARD, QO_ANSWER_ERROR};
+    return status == QO_OK ? QO_ANSWER_OK : qo_tell(me, answers[status], "%s", me->now.model.message);
+}
+
+qo_answer qo_trial(const qo_instance *me, qo_status status)
+{
+    return status == QO_OK ? QO_ANSWER_OK : qo_tell(me, QO_ANSWER_DISCARD, "%s", me->now.model.message);
+}
+
+/* Errors are always told: an importer that asks for silence still wants to know why a call was refused. */
+qo_answer qo_set_logging(qo_instance *me, int on, size_t n, const char *const categories[])
+{
+    int chosen = 0, category;
+    size_t i;
+    for (i = 0; i < n; i++) {
+        for (category = 0; category < QO_CATEGORIES; category++) {
+            if (categories[i] != NULL && strcmp(categories[i], qo_category_names[category]) == 0) {
+                break;
+            }
+        }
+        if (category == QO_CATEGORIES) {
+            return qo_tell(me, QO_ANSWER_ERROR, "There is no log category \"%s\".",
+                           categories[i] == NULL ? "" : categories[i]);
+        }
+        chosen |= 1 << category;
+    }
+    chosen = n == 0 ? (1 << QO_CATEGORIES) - 1 : chosen;
+    me->categories = (on ? chosen : 0) | QO_LOG_ERROR;
+    return QO_ANSWER_OK;
+}
+
+int qo_allowed(const qo_instance *me, const char *function, int modes)
+{
+    size_t i;
+    const char *now = "in an unknown mode";
+    if (me->now.mode & modes) {
+        return 1;
+    }
+    for (i = 0; i < sizeof mode_names / sizeof mode_names[0]; i++) {
+        now = me->now.mode == (int)mode_names[i].mode ? mode_names[i].name : now;
+    }
+    qo_tell(me, QO_ANSWER_ERROR, "%s may not be called %s.", function, now);
+    return 0;
+}
+
+int qo_allowed_as(const qo_instance *me, const char *function, qo_interface interface, int modes)
+{
+    if (me->interface != interface) {
+        qo_tell(me, QO_ANSWER_ERROR, "%s is a function of %s; this instance is for %s.", function,
+                interface == QO_CO_SIMULATION ? "co-simulation" : "model exchange",
+                interface == QO_CO_SIMULATION ? "model exchange" : "co-simulation");
+        return 0;
+    }
+    return qo_allowed(me, function, modes);
+}
+
+qo_answer qo_set_up(qo_instance *me, const qo_experiment *experiment)
+{
+    const double start = experiment->start_time, stop = experiment->stop_time;
+    if (!is_finite(start)) {
+        return qo_tell(me, QO_ANSWER_ERROR, "startTime is not a finite number.");
+    }
+    if (experiment->has_stop_time && !(stop >= start)) {
+        return qo_tell(me, QO_ANSWER_ERROR, "stopTime is before startTime %.17g, or no number.", start);
+    }
+    if (experiment->has_tolerance && !(experiment->tolerance > 0.0 && experiment->tolerance < 1.0)) {
+        return qo_tell(me, QO_ANSWER_ERROR, "tolerance must be above 0 and below 1.");
+    }
+    me->now.time = start;
+    me->now.stop_time = experiment->has_stop_time ? stop : HUGE_VAL;
+    if (experiment->has_tolerance) {
+        me->now.model.tolerance = experiment->tolerance;
+    }
+    return QO_ANSWER_OK;
+}
+
+qo_answer qo_exit_initialization(qo_instance *me, qo_mode next)
+{
+    int changed;
+    qo_answer answer = qo_update(me, &changed);
+    if (answer == QO_ANSWER_OK) {
+        me->now.mode = (int)next;
+    }
+    return answer;
+}
+
+qo_answer qo_reset(qo_instance *me)
+{
+    memset(&me->now, 0, sizeof me->now);
+    qo_init(&me->now.model);
+    me->now.stop_time = HUGE_VAL;
+    me->now.mode = QO_INSTANTIATED;
+    return QO_ANSWER_OK;
+}
+
+/* A saved state is a snapshot behind a mark, so that what another model or version has saved is refused. */
+typedef struct {
+    char mark[QO_MARK_SIZE];
+    qo_snapshot snapshot;
+} saved;
+
+static int is_saved(const qo_instance *me, const saved *state)
+{
+    if (state == NULL || memcmp(state->mark, qo_mark, QO_MARK_SIZE) != 0) {
+        qo_tell(me, QO_ANSWER_ERROR, "That is no saved state of this model.");
+        return 0;
+    }
+    return 1;
+}
+
+qo_answer qo_save(qo_instance *me, void **state)
+{
+    saved *copy;
+    if (state == NULL || (*state != NULL && !is_saved(me, *state))) {
+        return qo_tell(me, QO_ANSWER_ERROR, "There is no place to save the state to.");
+    }
+    copy = *state == NULL ? malloc(sizeof *copy) : *state;
+    if (copy == NULL) {
+        return qo_tell(me, QO_ANSWER_ERROR, "There is no memory for a saved state.");
+    }
+    memcpy(copy->mark, qo_mark, QO_MARK_SIZE);
+    memcpy(&copy->snapshot, &me->now, sizeof copy->snapshot);
+    *state = copy;
+    return QO_ANSWER_OK;
+}
+
+qo_answer qo_restore(qo_instance *me, const void *state)
+{
+    const saved *copy = state;
+    if (!is_saved(me, copy)) {
+        return QO_ANSWER_ERROR;
+    }
+    memcpy(&me->now, &copy->snapshot, sizeof me->now);
+    return QO_ANSWER_OK;
+}
+
+qo_answer qo_forget(qo_instance *me, void **state)
+{
+    if (state == NULL || *state == NULL) {
+        return QO_ANSWER_OK;
+    }
+    if (!is_saved(me, *state)) {
+        return QO_ANSWER_ERROR;
+    }
+    free(*state);
+    *state = NULL;
+    return QO_ANSWER_OK;
+}
+
+size_t qo_serialized_size(void)
+{
+    return sizeof(saved);
+}
+
+qo_answer qo_serialize(qo_instance *me, const void *state, char bytes[], size_t size)
+{
+    if (!is_saved(me, state)) {
+        return QO_ANSWER_ERROR;
+    }
+    if (bytes == NULL || size < sizeof(saved)) {
+        return qo_tell(me, QO_ANSWER_ERROR, "A saved state takes %lu bytes.", (unsigned long)sizeof(saved));
+    }
+    memcpy(bytes, state, sizeof(saved));
+    return QO_ANSWER_OK;
+}
+
+/* Bytes may come from anywhere: a snapshot that no instance can have written is refused. */
+static int is_sound(qo_snapshot *snapshot)
+{
+    const int mode = snapshot->mode;
+    snapshot->model.message[QO_MESSAGE_SIZE - 1] = '\0';
+    return mode > 0 && (mode & QO_ANY_MODE) == mode && (mode & (mode - 1)) == 0 && is_finite(snapshot->time) &&
+           qo_check(&snapshot->model) == QO_OK;
+}
+
+qo_answer qo_deserialize(qo_instance *me, const char bytes[], size_t size, void **state)
+{
+    saved *copy;
+    if (state == NULL || bytes == NULL || size != sizeof(saved)) {
+        return qo_tell(me, QO_ANSWER_ERROR, "A saved state takes %lu bytes.", (unsigned long)sizeof(saved));
+    }
+    copy = malloc(sizeof *copy);
+    if (copy == NULL) {
+        return qo_tell(me, QO_ANSWER_ERROR, "There is no memory for a saved state.");
+    }
+    memcpy(copy, bytes, sizeof *copy);
+    if (!is_saved(me, copy) || !is_sound(&copy->snapshot)) {
+        free(copy);
+        return qo_tell(me, QO_ANSWER_ERROR, "These bytes are no saved state of this model.");
+    }
+    *state = copy;
+    return QO_ANSWER_OK;
+}

@@ -1,0 +1,99 @@
+/* The co-simulation step: through the model's own solver, stopping at events where the importer wants to know. */
+#include <math.h>
+
+#include "instance.h"
+
+/* Instants closer than this share of a step are one: importers add up rounding errors. */
+#define SAME_INSTANT 1e-6
+
+/* To what an event is told to lie [s]. */
+#define EVENT_RESOLUTION 1e-6
+
+static double rounding(double time)
+{
+    return 1e-12 * fabs(time);
+}
+
+static qo_answer check(const qo_instance *me, double time, double size)
+{
+    const double slack = SAME_INSTANT * size + rounding(time);
+    if (!(size > 0.0) || size - size != 0.0) {
+        return qo_tell(me, QO_ANSWER_ERROR, "communicationStepSize must be a positive number.");
+    }
+    if (!(fabs(time - me->now.time) <= slack)) {
+        return qo_tell(me, QO_ANSWER_ERROR, "currentCommunicationPoint must be %.17g, where the last step ended.",
+                       me->now.time);
+    }
+    if (time + size > me->now.stop_time + slack) {
+        return qo_tell(me, QO_ANSWER_ERROR, "communicationStepSize leads beyond stopTime %.17g.", me->now.stop_time);
+    }
+    return QO_ANSWER_OK;
+}
+
+/* Whether k of (9) would be another one now. */
+static qo_status look_for_event(const qo_model *model, int *event)
+{
+    qo_model copy = *model;
+    return qo_update_discrete(&copy, event);
+}
+
+/* Internal steps up to `size`, or to an event, or to where the importer asks to return, where it allows that. */
+static qo_status advance(qo_instance *me, double time, double size, qo_step_end *end)
+{
+    qo_model *model = &me->now.model;
+    double done = 0.0, longest = size;
+    while (done < size && !end->early) {
+        const qo_model before = *model;
+        double taken;
+        qo_status status = qo_advance(model, fmin(longest, size - done), &taken);
+        if (status == QO_OK && me->events_told) {
+            status = look_for_event(model, &end->event);
+        }
+        if (status != QO_OK) {
+            return status;
+        }
+        if (end->event && me->early_return && taken > EVENT_RESOLUTION) {
+            *model = before;
+            longest = taken / 2;
+            continue;
+        }
+        longest = 2 * taken;
+        done = taken < size - done ? done + taken : size;
+        me->now.time = end->time = time + done;
+        end->early = end->event && me->early_return;
+        if (me->between != NULL) {
+            me->now.known = QO_KNOWN_OUTPUTS;
+            end->early |= me->between(me);
+        }
+        end->early &= done < size;
+    }
+    return QO_OK;
+}
+
+qo_answer qo_do_step(qo_instance *me, double time, double size, qo_step_end *end)
+{
+    const qo_model before = me->now.model;
+    const double before_time = me->now.time;
+    qo_status status;
+    end->time = me->now.time;
+    end->event = end->early = 0;
+    if (check(me, time, size) != QO_ANSWER_OK) {
+        return QO_ANSWER_ERROR;
+    }
+    if (me->events_told || me->between != NULL) {
+        status = advance(me, time, size, end);
+    } else {
+        status = qo_step(&me->now.model, size);
+        end->time = time + size;
+    }
+    if (status != QO_OK) {
+        const qo_answer answer = qo_pass(me, status);
+        me->now.model = before;
+        me->now.time = end->time = before_time;
+        me->now.known = 0;
+        return answer;
+    }
+    me->now.time = end->time;
+    me->now.known = QO_KNOWN_OUTPUTS;
+    return QO_ANSWER_OK;
+}
