@@ -99,7 +99,10 @@ class VehicleServer:
                 message = self._bus.recv(_IDLE)
                 if message is None:
                     self._follow_clock()
-                elif not (message.is_extended_id or message.is_remote_frame or message.is_error_frame):
+                elif message.is_remote_frame and not message.is_extended_id:
+                    self._follow_clock()
+                    self._devices.receive_remote(message.arbitration_id)
+                elif not (message.is_extended_id or message.is_error_frame):
                     self._take(message.arbitration_id, bytes(message.data))
         return self.report
 

@@ -81,7 +81,7 @@ class DeviceNetwork:
         for _, handler in tuple(self._routes.data.get(can_id, ())):
             handler(can_id, data)
 
-    def request(self, can_id: int) -> None:
+    def receive_remote(self, can_id: int) -> None:
         """Take a remote frame from the bus; the answers go out before this returns."""
         for _, answer in tuple(self._routes.remote.get(can_id, ())):
             answer()

@@ -37,9 +37,7 @@ class LockstepHub:
         clock: simulated time.
     """
 
-    def __init__(
-        self, cycle_period: float, bit_rate: float, sync_cob_id: int = 0x80, *, delays: bool = False
-    ) -> None:
+    def __init__(self, cycle_period: float, bit_rate: float, sync_cob_id: int = 0x80, *, delays: bool = False) -> None:
         self._cycle_period = cycle_period
         self._sync_cob_id = sync_cob_id
         self._endpoints: list[LockstepBus] = []
@@ -121,7 +119,10 @@ class LockstepHub:
         for endpoint in self._endpoints:
             if endpoint is not sender:
                 endpoint.deliver(_copy(message))
-        if self._devices is None or message.is_extended_id or message.is_remote_frame or message.is_error_frame:
+        if self._devices is None or message.is_extended_id or message.is_error_frame:
+            return
+        if message.is_remote_frame:
+            self._devices.receive_remote(message.arbitration_id)
             return
         receive = self._devices.receive if self._wired is None else self._wired.hand_over
         receive(message.arbitration_id, bytes(message.data))

@@ -15,6 +15,9 @@ class Devices(Protocol):
     def receive(self, can_id: int, data: bytes) -> None:
         """Take a data frame."""
 
+    def receive_remote(self, can_id: int) -> None:
+        """Take a remote frame."""
+
     def advance(self, to_time: float) -> None:
         """Let simulated time pass up to `to_time` [s], timers and physics included."""
 
@@ -63,6 +66,10 @@ class WiredDevices:
     def hand_over(self, can_id: int, data: bytes) -> None:
         """Give the devices a frame that has been on the wire."""
         self._devices.receive(can_id, data)
+
+    def receive_remote(self, can_id: int) -> None:
+        """Give the devices a remote frame that has been on the wire."""
+        self._devices.receive_remote(can_id)
 
     def advance(self, to_time: float) -> None:
         """Let time pass up to `to_time` [s]: timers, physics, and the frames on the wire."""

@@ -109,6 +109,10 @@ class FaultInjector:
         else:
             self.devices.receive(can_id, data)
 
+    def receive_remote(self, can_id: int) -> None:
+        """Take a remote frame of the master; faults act on data frames only."""
+        self.devices.receive_remote(can_id)
+
     def advance(self, to_time: float) -> None:
         """Let time pass up to `to_time` [s]: faults, physics, and the timers of the nodes."""
         while self._rules or self._agenda.next_event() <= to_time:
