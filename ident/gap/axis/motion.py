@@ -1,0 +1,132 @@
+"""Speed and acceleration of an axis whose sampling, noise and repeats are not known beforehand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, signal
+
+from ident.errors import EstimationError
+from ident.estimate.axis.processing import smoothed
+from ident.estimate.filters import differentiate
+from ident.records.axis_record import AxisRecord, AxisSignals
+
+Array = NDArray[np.float64]
+
+LARGEST_CUTOFF: Final = 0.4
+"""Of the position filter, over the sampling frequency."""
+ROWS_CUTOFF: Final = 0.4
+"""Cutoff of the filter on all columns over that of the position filter: sign(v) then sees the velocity itself."""
+SPECTRUM_SEGMENTS: Final = 8
+STUCK_SPEED: Final = 0.01
+"""Over the 95th percentile of the speed: below it for longer than the filter's memory, an axis rests."""
+REPEAT_MISMATCH: Final = 0.03
+"""Rms difference of two repeats of a motion over its standard deviation, at most."""
+ALMOST_WHOLE: Final = 0.95
+"""Part of a repeat that must be there for it to count."""
+FEWEST_ROWS: Final = 60
+"""Independent rows that a diagnosis needs."""
+
+
+@dataclass(frozen=True)
+class AxisMotion:
+    """Smoothed motion of an axis.
+
+    Attributes:
+        position, velocity, acceleration: (N,) [m or rad, and per s, s²].
+        effort: (N,) measured, unfiltered [N or Nm].
+        moving: (N,) false where the axis rests and at the ends, where filters have not settled.
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    effort: Array
+    moving: NDArray[np.bool_]
+
+
+def position_cutoff(record: AxisRecord) -> float:
+    """Cutoff for the positions of a record [rad/s]: where the noise of their second derivative begins to prevail.
+
+    The power spectrum of the acceleration falls with the motion and rises with the fourth power of the frequency where
+    noise is left; its smoothed minimum lies between, and the smallest over the axes is taken.
+    """
+    rate = 1 / record.sample_time
+    lowest = min(20 / (len(record) * record.sample_time), LARGEST_CUTOFF * rate)
+    found = [_quietest(axis.position, rate) for axis in record.axes]
+    return 2 * math.pi * float(np.clip(min(found), lowest, LARGEST_CUTOFF * rate))
+
+
+def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float) -> AxisMotion:
+    """Motion of an axis by a zero-phase filter of `cutoff` [rad/s] and central differences.
+
+    Raises:
+        EstimationError: the record is too short for the filter, or the axis does not move.
+    """
+    dt = record.sample_time
+    memory = 4 / (ROWS_CUTOFF * cutoff)
+    if len(record) * dt * ROWS_CUTOFF * cutoff / (2 * math.pi) < FEWEST_ROWS / 3:
+        raise EstimationError(
+            f"{record.source} lasts {len(record) * dt:.3g} s, too short for its bandwidth of "
+            f"{cutoff / (2 * math.pi):.3g} Hz.",
+            "Record longer, at least some ten strokes.",
+        )
+    position = smoothed(axis.position, cutoff, dt)
+    velocity = differentiate(position, dt)
+    speed = float(np.percentile(np.abs(velocity), 95))
+    if not speed * len(record) * dt > 1e-9 or np.ptp(axis.position) < 1e-9:
+        raise EstimationError(f"{record.source}: {axis.label} does not move.", "Record it while it is driven.")
+    resting = ndimage.binary_opening(np.abs(velocity) < STUCK_SPEED * speed, np.ones(max(1, round(memory / dt))))
+    moving = ~ndimage.binary_dilation(resting, np.ones(2 * round(memory / dt) + 1))
+    ends = max(1, round(2 * memory / dt))
+    moving[:ends] = moving[-ends:] = False
+    return AxisMotion(position, velocity, differentiate(velocity, dt), axis.effort, moving)
+
+
+def with_repeats(record: AxisRecord) -> NDArray[np.int64]:
+    """Number of the repeat of every sample (N,): as recorded, or found in the positions; -1 throughout without any."""
+    if np.unique(record.period[record.period >= 0]).size >= 2:
+        return record.period
+    length = _repeat_length(np.stack([axis.position for axis in record.axes], axis=1))
+    if length is None:
+        return np.full(len(record), -1, dtype=np.int64)
+    period = np.arange(len(record)) // length
+    if len(record) - period[-1] * length < ALMOST_WHOLE * length:
+        period[period == period[-1]] = -1
+    return np.asarray(period, dtype=np.int64)
+
+
+def _quietest(position: Array, rate: float) -> float:
+    acceleration = np.diff(position, 2) * rate**2
+    length = max(16, len(acceleration) // SPECTRUM_SEGMENTS)
+    frequency, power = signal.welch(acceleration, rate, nperseg=min(length, len(acceleration)), detrend="constant")
+    bands = np.geomspace(frequency[1], rate / 2, 40)
+    level = [np.mean(power[(frequency >= low) & (frequency <= 1.3 * low)]) for low in bands[:-4]]
+    return float(bands[int(np.nanargmin(level))])
+
+
+def _repeat_length(positions: Array) -> int | None:
+    """Samples after which all positions (N, n) come back, at least twice; None where they do not."""
+    samples = len(positions)
+    lags = np.arange(samples // 2 + 1)
+    mismatch = np.zeros(len(lags))
+    for position in (positions - positions.mean(axis=0)).T:
+        spectrum = np.fft.rfft(position, 2 * samples)
+        products = np.fft.irfft(np.abs(spectrum) ** 2)[: len(lags)]
+        energy = np.concatenate([[0.0], np.cumsum(position**2)])
+        pairs = energy[samples - lags] + energy[samples] - energy[lags]
+        variance = max(float(np.mean(position**2)), np.finfo(float).tiny)
+        mismatch = np.maximum(mismatch, (pairs - 2 * products) / ((samples - lags) * variance))
+    left = np.flatnonzero(mismatch > 0.5)
+    if not left.size:
+        return None
+    close = np.flatnonzero(mismatch[left[0] :] < REPEAT_MISMATCH**2) + left[0]
+    if not close.size:
+        return None
+    ends = np.flatnonzero(np.diff(close) > 1)
+    first = close[: ends[0] + 1] if ends.size else close
+    return int(first[np.argmin(mismatch[first])])

@@ -1,0 +1,231 @@
+"""What the rows say for each candidate: likelihood ratios beside the baseline, and surrogates to measure them against.
+
+A candidate's columns are first made orthogonal to the whitened baseline: what the parameters of the model can absorb is
+no evidence. Under no effect, the signs of stretches of the whitened residual are arbitrary; flipping them at random
+gives the distribution of the largest ratio over all candidates (max statistic, so that many candidates cost what they
+must) and the factor by which a candidate's ratio scatters more than white noise would make it. Repeats have been
+averaged before, so that what repeats keeps repeating in a surrogate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.gap.rows import Column
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+VISIBLE: Final = 0.02
+"""Part of a column that the baseline must leave for it to count as visible."""
+RANK: Final = 1e-7
+"""Smallest singular value, relative to the largest, of a baseline column that counts."""
+
+
+@dataclass(frozen=True)
+class White:
+    """Whitened regression, rows of prior knowledge behind those of the records.
+
+    Attributes:
+        target: (n,).
+        baseline: (n, p + c) columns of the model, and of effects that are taken as given.
+        columns: (n, K) of all candidates.
+        stretch: (n,) number of the stretch whose sign is flipped as one, increasing.
+        confirming: (n,) rows that take no part in the fit.
+    """
+
+    target: Array
+    baseline: Array
+    columns: Array
+    stretch: NDArray[np.int64]
+    confirming: Mask
+
+
+@dataclass(frozen=True)
+class Directions:
+    """Orthonormal directions that each variant of a candidate adds to the baseline.
+
+    Attributes:
+        basis: (n, D).
+        places: of every variant in the basis; empty where the baseline absorbs it.
+        residual: (n,) target minus its projection on the baseline.
+        volume: log of the determinant of each variant's columns beside the baseline.
+    """
+
+    basis: Array
+    places: tuple[slice, ...]
+    residual: Array
+    volume: Array
+
+    @property
+    def sizes(self) -> Array:
+        """Number of directions of every variant."""
+        return np.array([place.stop - place.start for place in self.places])
+
+    def ratios(self, amplitudes: Array) -> Array:
+        """Sums of squared amplitudes (..., D) over the directions of every variant, (..., V)."""
+        squares = np.concatenate([np.zeros((*amplitudes.shape[:-1], 1)), np.cumsum(amplitudes**2, axis=-1)], axis=-1)
+        starts = [place.start for place in self.places]
+        stops = [place.stop for place in self.places]
+        return np.asarray(squares[..., stops] - squares[..., starts])
+
+
+def directions(white: White, layout: Sequence[Column], rows: Mask | None = None) -> Directions:
+    """Directions beside the baseline, in all rows or in some."""
+    chosen = slice(None) if rows is None else rows
+    base = orthonormal(white.baseline[chosen])
+    target, columns = white.target[chosen], white.columns[chosen]
+    residual = target - base @ (base.T @ target)
+    left = columns - base @ (base.T @ columns)
+    full = np.linalg.norm(white.columns, axis=0)
+    parts, places, volumes, end = [np.zeros((len(target), 0))], [], [], 0
+    for column in layout:
+        scale = np.where(full[column.place] > 0, full[column.place], 1.0)
+        vectors, singular, _ = np.linalg.svd(left[:, column.place] / scale, full_matrices=False)
+        count = int(np.sum(singular > VISIBLE))
+        parts.append(vectors[:, :count])
+        places.append(slice(end, end + count))
+        volumes.append(2 * float(np.sum(np.log(np.maximum(singular, VISIBLE)))))
+        end += count
+    return Directions(np.hstack(parts), tuple(places), residual, np.array(volumes))
+
+
+def orthonormal(columns: Array) -> Array:
+    """Orthonormal basis of columns of any scale, dependent ones left out."""
+    norms = np.linalg.norm(columns, axis=0)
+    scaled = columns[:, norms > 0] / norms[norms > 0]
+    vectors, singular, _ = np.linalg.svd(scaled, full_matrices=False)
+    return np.asarray(vectors[:, singular > RANK * singular.max(initial=0.0)])
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Evidence for every variant on top of a baseline.
+
+    Attributes:
+        amplitudes: (D,) of the residual along the directions.
+        surrogates: (M, D) the same, signs of stretches flipped.
+        scale: (V,) how much more than white noise the ratio scatters, at least 1.
+        log_evidence: (V,) half the scaled ratio, less the price of its coefficients; -inf where nothing is visible.
+        log_predictive: (V,) log Bayes factor of the confirming rows, given the fitted ones; 0 without any.
+        significance: probability of so large a maximum over all variants without any effect.
+    """
+
+    directions: Directions
+    amplitudes: Array
+    surrogates: Array
+    scale: Array
+    log_evidence: Array
+    log_predictive: Array
+    significance: float
+
+
+def gather(
+    white: White, layout: Sequence[Column], signs: Array, residual: Array | None = None, excluded: Mask | None = None
+) -> Evidence:
+    """Evidence for every variant.
+
+    Args:
+        white: the regression.
+        layout: of its columns.
+        signs: (M, J) of +1 and -1, one a stretch.
+        residual: (n,) that surrogates are made of; None: what the baseline leaves.
+        excluded: (V,) variants that do not compete.
+    """
+    found = directions(white, layout)
+    amplitudes = found.basis.T @ found.residual
+    surrogates = _flipped(found.basis, found.residual if residual is None else residual, white.stretch, signs)
+    sizes = found.sizes
+    spread = found.ratios(surrogates).mean(axis=0) / np.maximum(sizes, 1)
+    scale = np.maximum(spread, 1.0)
+    price = 0.5 * sizes * math.log(len(white.target))
+    competing = (sizes > 0) if excluded is None else (sizes > 0) & ~excluded
+    evidence = np.where(competing, 0.5 * found.ratios(amplitudes) / scale - price, -np.inf)
+    by_chance = np.where(competing, 0.5 * found.ratios(surrogates) / scale - price, -np.inf)
+    return Evidence(
+        directions=found,
+        amplitudes=amplitudes,
+        surrogates=surrogates,
+        scale=scale,
+        log_evidence=evidence,
+        log_predictive=_predictive(white, layout, found, amplitudes, scale),
+        significance=_significance(evidence.max(initial=-np.inf), by_chance.max(axis=1, initial=-np.inf)),
+    )
+
+
+def _flipped(basis: Array, residual: Array, stretch: NDArray[np.int64], signs: Array) -> Array:
+    starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
+    return np.asarray(signs @ np.add.reduceat(basis * residual[:, None], starts, axis=0))
+
+
+def _significance(found: float, by_chance: Array) -> float:
+    return float((1 + np.sum(by_chance >= found)) / (1 + len(by_chance)))
+
+
+def _predictive(white: White, layout: Sequence[Column], found: Directions, amplitudes: Array, scale: Array) -> Array:
+    """Log Bayes factor that the confirming rows add, the coefficients known from the fit as well as it shows them.
+
+    For Gaussian noise and flat priors it is half the gain of the likelihood ratio less half the gain of the
+    log-determinant: a coefficient that the fit got wrong predicts the confirming rows worse than none.
+    """
+    if not white.confirming.any():
+        return np.zeros(len(layout))
+    fitted = directions(white, layout, ~white.confirming)
+    before = fitted.ratios(fitted.basis.T @ fitted.residual)
+    return np.asarray(0.5 * (found.ratios(amplitudes) - before) / scale - 0.5 * (found.volume - fitted.volume))
+
+
+@dataclass(frozen=True)
+class PairEvidence:
+    """The best pair of variants, and how probable so good a pair is by chance."""
+
+    first: int
+    second: int
+    log_evidence: float
+    significance: float
+
+
+def best_pair(evidence: Evidence, owners: Sequence[int], rows: int) -> PairEvidence | None:
+    """The pair of variants of two candidates with the largest joint evidence; None where no two are visible."""
+    visible = np.flatnonzero(np.isfinite(evidence.log_evidence))
+    best: tuple[float, int, int] = (-np.inf, -1, -1)
+    by_chance = np.full(len(evidence.surrogates), -np.inf)
+    for first, second in combinations(visible.tolist(), 2):
+        if owners[first] == owners[second]:
+            continue
+        joint, surrogate = _joint(evidence, first, second, rows)
+        best = max(best, (joint, first, second))
+        by_chance = np.maximum(by_chance, surrogate)
+    if best[1] < 0:
+        return None
+    return PairEvidence(best[1], best[2], best[0], _significance(best[0], by_chance))
+
+
+def _joint(evidence: Evidence, first: int, second: int, rows: int) -> tuple[float, Array]:
+    places = [evidence.directions.places[index] for index in (first, second)]
+    picked = np.r_[places[0], places[1]]
+    basis = evidence.directions.basis[:, picked]
+    values, vectors = np.linalg.eigh(basis.T @ basis)
+    kept = values > VISIBLE
+    turn = vectors[:, kept] / np.sqrt(values[kept])
+    scale = max(evidence.scale[first], evidence.scale[second])
+    price = 0.5 * int(kept.sum()) * math.log(rows)
+    joint = 0.5 * float(np.sum((evidence.amplitudes[picked] @ turn) ** 2)) / scale - price
+    return joint, 0.5 * np.sum((evidence.surrogates[:, picked] @ turn) ** 2, axis=1) / scale - price
+
+
+def cosines(evidence: Evidence, index: int) -> Array:
+    """Largest cosine between directions of one variant and those of every other (V,), 0 where nothing is visible."""
+    found = evidence.directions
+    mine = found.basis[:, found.places[index]]
+    overlap = mine.T @ found.basis
+    return np.array(
+        [np.linalg.norm(overlap[:, place], 2) if place.stop > place.start else 0.0 for place in found.places]
+    )
