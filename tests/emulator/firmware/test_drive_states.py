@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from emulator.firmware.drive_states import TRANSITIONS, Command, State, StateMachine
+from emulator.firmware.drive.states import TRANSITIONS, Command, State, StateMachine
 
 # CiA 402-2, figure 4, as an edge list: (transition, from, to, who causes it).
 DIAGRAM = [
@@ -44,7 +44,7 @@ def command_of(controlword: int, state: str) -> str:
 
 def machine_in(state: State, may_resume: bool = True) -> tuple[StateMachine, list[int]]:
     taken: list[int] = []
-    machine = StateMachine(taken.append, lambda: may_resume)
+    machine = StateMachine(taken.append, lambda number: number != 16 or may_resume)
     machine.state = state
     return machine, taken
 

@@ -113,13 +113,13 @@ class StateMachine:
 
     Args:
         on_transition: carries out what the transition means for the hardware.
-        may_resume: whether transition 16 (quick stop active to operation enabled) is supported now; it is
-            where the quick stop option code makes the drive stay in quick stop active.
+        ready: asked before a transition that a command causes; False leaves the state as it is. The drive so
+            refuses what it does not support now, and puts off what a ramp has to come before.
     """
 
-    def __init__(self, on_transition: Callable[[int], None], may_resume: Callable[[], bool]) -> None:
+    def __init__(self, on_transition: Callable[[int], None], ready: Callable[[int], bool]) -> None:
         self._on_transition = on_transition
-        self._may_resume = may_resume
+        self._ready = ready
         self._reset_level = False
         self.state = State.NOT_READY_TO_SWITCH_ON
 
@@ -141,7 +141,7 @@ class StateMachine:
     def command(self, command: Command) -> None:
         """Carry out a command as the table says."""
         for number in REACTIONS.get((self.state, command), ()):
-            if number != 16 or self._may_resume():
+            if self._ready(number):
                 self.take(number)
 
     def take(self, number: int) -> None:

@@ -1,0 +1,155 @@
+"""One axis: set-points and measurements, velocity and torque control towards the power stage."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Final
+
+from emulator.firmware.drive.parameters import Parameters
+from emulator.firmware.hardware import DriveHardware
+
+TICK: Final = 0.001
+"""Period of the drive's own loops [s]; the current loop below is the hardware's."""
+
+_SPAN: Final = 1 << 32
+_HALF: Final = 1 << 31
+
+
+def wrap(count: int) -> int:
+    """`count` in a signed 32-bit register."""
+    return (count + _HALF) % _SPAN - _HALF
+
+
+def approach(value: float, target: float, step: float) -> float:
+    """`value` moved towards `target` by at most `step`."""
+    return min(value + step, target) if target > value else max(value - step, target)
+
+
+@dataclass
+class Setpoints:
+    """What the master has written, in the units of the objects."""
+
+    controlword: int = 0
+    target_torque: int = 0
+    target_velocity: int = 0
+    target_position: int = 0
+    torque_offset: int = 0
+    velocity_offset: int = 0
+    position_offset: int = 0
+
+    def clear(self) -> None:
+        """Nothing is asked for."""
+        for field in fields(self):
+            setattr(self, field.name, 0)
+
+
+class Axis:
+    """Control of one motor shaft; the motor's sign, rad and Nm inside, increments and per mille for the objects.
+
+    The velocity loop is a PI controller with the inertia of the load fed forward. Its integral part stands
+    still while the torque is limited.
+
+    Args:
+        hardware: power stage, motor and encoder.
+        parameters: gains and limits.
+
+    Attributes:
+        points: set-points of the master.
+        torque_demand: [per mille of rated torque].
+        velocity_demand: [rad/s].
+        position_demand: [increments], counted without end.
+        limited: torque, speed or position is not what was asked for.
+    """
+
+    def __init__(self, hardware: DriveHardware, parameters: Parameters) -> None:
+        self.hardware = hardware
+        self.parameters = parameters
+        self.points = Setpoints()
+        self.permille = hardware.rated_torque / 1000.0
+        self.increments = hardware.counts_per_revolution / math.tau
+        self.torque_demand = 0
+        self.velocity_demand = 0.0
+        self.position_demand = 0.0
+        self.limited = False
+        self.home = 0
+        self._integral = 0.0
+
+    def reset(self) -> None:
+        """Power-on: nothing asked for, the encoder's own zero."""
+        self.points.clear()
+        self.home = 0
+        self.release()
+
+    def release(self) -> None:
+        """No demand: the power is off."""
+        self.torque_demand = 0
+        self.velocity_demand = 0.0
+        self.position_demand = float(self.position())
+        self.limited = False
+        self._integral = 0.0
+
+    def position(self) -> int:
+        """6064h [increments]."""
+        return wrap(self.hardware.position() - self.home)
+
+    def velocity(self) -> float:
+        """Of the shaft [rad/s]."""
+        return self.hardware.velocity()
+
+    def following_error(self) -> float:
+        """Position demand less position, by the shorter way round the 32-bit register [increments]."""
+        return (self.position_demand - self.position() + _HALF) % _SPAN - _HALF
+
+    def take_over(self) -> None:
+        """Start velocity control without a jump: from the present speed and the torque asked for last."""
+        self.velocity_demand = self.velocity()
+        self._integral = self.torque_demand * self.permille
+
+    def control_torque(self, permille: float) -> None:
+        """Ask for a torque from the drive's own ramp, within all limits."""
+        self._command(permille * self.permille)
+
+    def control_velocity(self, acceleration: float, extra: float = 0.0, share: float = 1.0) -> None:
+        """One step of the velocity loop towards `velocity_demand`.
+
+        Args:
+            acceleration: of the demand, fed forward through the inertia of the load [rad/s^2].
+            extra: torque to add [Nm].
+            share: of the torque limit that may be used [-].
+        """
+        parameters = self.parameters
+        error = self.velocity_demand - self.velocity()
+        direct = parameters.velocity_gain * error + parameters.load_inertia * acceleration + extra
+        step = parameters.velocity_gain * error * TICK / parameters.velocity_integration_time
+        if not self._command(direct + self._integral + step, share) or step * (direct + self._integral) < 0.0:
+            self._integral += step
+
+    def _command(self, torque: float, share: float = 1.0) -> bool:
+        """Ask the current loop for a torque [Nm]; whether it was limited."""
+        high = self.parameters.highest_torque * self.permille * share
+        low = self.parameters.lowest_torque * self.permille * share
+        allowed = min(max(self._governed(torque), low), high)
+        self.hardware.control(allowed)
+        self.torque_demand = round(allowed / self.permille)
+        self.limited = allowed != torque
+        return self.limited
+
+    def _governed(self, torque: float) -> float:
+        """The torque less what would drive the motor beyond 6080h, by the gain of the velocity loop."""
+        velocity = self.velocity()
+        excess = abs(velocity) - self.parameters.max_motor_speed
+        if excess <= 0.0 or torque * velocity <= 0.0:
+            return torque
+        return math.copysign(max(0.0, abs(torque) - self.parameters.velocity_gain * excess), torque)
+
+    def follow_torque(self) -> None:
+        """Cyclic synchronous torque: hand the set-point of the bus to the current loop."""
+        points, parameters = self.points, self.parameters
+        target = points.target_torque + points.torque_offset
+        demand = min(max(target, parameters.lowest_torque), parameters.highest_torque)
+        if abs(self.hardware.velocity()) > parameters.max_motor_speed:
+            demand = round(self._governed(demand * self.permille) / self.permille)
+        self.torque_demand = demand
+        self.limited = demand != target
+        self.hardware.command(demand * self.permille)
