@@ -1,0 +1,1 @@
+"""The gap of the platform: rows, candidates, visibility, simulation."""

@@ -1,0 +1,333 @@
+"""A record of the platform as a regression: blocks of the dynamic and the kinematic channel, columns of every cause."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from ident.errors import RecordError
+from ident.estimate.equations import ROWS, RowsOfStep
+from ident.estimate.filters import Processing, moving_rows, zero_phase
+from ident.gap.problem import Block, Candidate, Channel, Nominal, Problem, Variant
+from ident.gap.vehicle import rows
+from ident.gap.vehicle.library import DRIFTS, TermCause, placed_parameters, term_causes
+from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
+from ident.gap.vehicle.signals import Signals, decimation, signals_of
+from ident.gap.vehicle.transforms import Setting, TransformCause, transform_causes
+from ident.records.record import Record, Step
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effects import EffectName
+from ident.vehicle.geometry import Geometry
+from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES, PARAMETER_UNITS, Parameters
+from ident.vehicle.vectorised import Vectorised
+
+Array = NDArray[np.float64]
+Cause = TermCause | TransformCause
+
+DIAGNOSED: Final = tuple(step for step in ROWS if step is not Step.LANE_CHANGE)
+"""Steps that causes are looked for in; the lane change is kept for judging what was found."""
+
+OVERSAMPLED: Final = 3.0
+"""Rate at which rows are evaluated, in units of the cutoff of the smoothed signals over π."""
+
+PRIOR_WEIGHT: Final = 1e-4
+"""Of the vehicle file's guesses against the rows, per unit-norm column: only what no row shows is taken from them."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Rows of one channel of one segment before they are evaluated.
+
+    Attributes:
+        channel: kinematic or dynamic.
+        step: the segment's own name.
+        spec: rows that the step has.
+        inputs: (M, INPUTS) at a rate that the smoothed signals allow.
+        sample_time: of them [s].
+        factor: every how manieth becomes a row of a block.
+        moving: (M,) rows to be used.
+        period: (M,).
+        record: for messages.
+    """
+
+    channel: Channel
+    step: str
+    spec: RowsOfStep
+    inputs: Array
+    sample_time: float
+    factor: int
+    moving: tuple[NDArray[np.bool_], ...]
+    period: NDArray[np.int64]
+    record: str
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of its rows, a block each."""
+        if self.channel is Channel.DYNAMIC:
+            return self.spec.coordinates
+        return rows.kinematic_coordinates(self.spec)
+
+
+@dataclass(frozen=True)
+class Context:
+    """What all rows share.
+
+    Attributes:
+        geometry: of the vehicle.
+        processing: filters and thresholds.
+        parameters: p (11,) at which columns are taken.
+    """
+
+    geometry: Geometry
+    processing: Processing
+    parameters: Array
+
+    def filtered(self, values: Array, source: Source) -> Array:
+        """Columns (M, ...) through the filter, thinned to the rows of the source's blocks."""
+        return zero_phase(values, self.processing.cutoff, source.sample_time)[:: source.factor]
+
+
+def build_problem(
+    record: Record,
+    vehicle: VehicleDescription,
+    model: Parameters | None = None,
+    *,
+    effects: Sequence[EffectName] = tuple(EffectName),
+    steps: Sequence[Step] = DIAGNOSED,
+    processing: Processing | None = None,
+) -> Problem:
+    """Rows and causes of a record.
+
+    Args:
+        record: of a campaign.
+        vehicle: its geometry is taken as true, its prior only for what no row shows.
+        model: values being judged; None: they are refitted, and changed values are no cause.
+        effects: that are looked for.
+        steps: whose rows are used, variants of them included.
+        processing: filters and thresholds.
+
+    Raises:
+        RecordError: none of the steps is in the record.
+    """
+    processing = processing or Processing()
+    sources = sources_of(record, vehicle.geometry, steps, processing)
+    values = model.values if model else fitted_parameters(sources, vehicle, processing)
+    context = Context(vehicle.geometry, processing, values)
+    causes = _causes(effects, model is not None)
+    units = [unit for cause in causes if isinstance(cause, TermCause) for v in cause.variants for unit in v.units]
+    tables = [_table(source, context, units) for source in sources]
+    blocks = [block for source, table in zip(sources, tables, strict=True) for block in _blocks(source, table, context)]
+    columns = iter(range(_COLUMNS, _COLUMNS + len(units)))
+    return Problem(
+        names=PARAMETER_NAMES,
+        units=tuple(PARAMETER_UNITS.values()),
+        blocks=tuple(blocks),
+        candidates=tuple(_candidate(cause, columns, sources, tables, context) for cause in causes),
+        nominal=Nominal(model.values, model.std) if model else None,
+    )
+
+
+def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], processing: Processing) -> list[Source]:
+    """Rows of a record that belong to the steps.
+
+    Raises:
+        RecordError: there are none.
+    """
+    found = [
+        source
+        for signals in signals_of(record, geometry, processing)
+        if (spec := _spec(signals.segment.step, steps)) is not None
+        for source in _sources(signals, spec, processing)
+    ]
+    if not found:
+        raise RecordError(
+            f"{record.source} holds none of the steps of a diagnosis.",
+            f"It needs some of {', '.join(steps)} by these names in the channel step.",
+        )
+    return found
+
+
+def _spec(step: str, steps: Sequence[Step]) -> RowsOfStep | None:
+    """Rows of a step or of a variant of it, which is named `<step>_<variant>`."""
+    return next((ROWS[known] for known in steps if step == known or step.startswith(f"{known}_")), None)
+
+
+def _sources(signals: Signals, spec: RowsOfStep, processing: Processing) -> Iterable[Source]:
+    segment = signals.segment
+    factor = decimation(segment, processing.cutoff)
+    most = max(1, int(np.pi / (OVERSAMPLED * processing.signal_cutoff * segment.sample_time)))
+    stride = next(stride for stride in range(min(most, factor), 0, -1) if factor % stride == 0)
+    inputs = signals.as_inputs()
+    inputs[:, rows.SLICES["torques"]] = zero_phase(
+        inputs[:, rows.SLICES["torques"]], processing.signal_cutoff, segment.sample_time
+    )
+    common = {
+        "step": segment.step,
+        "spec": spec,
+        "inputs": inputs[::stride],
+        "sample_time": segment.sample_time * stride,
+        "factor": factor // stride,
+        "period": segment.period[::stride],
+        "record": signals.record,
+    }
+    dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)
+    yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
+    names = rows.kinematic_coordinates(spec)
+    if names:
+        rolling = _near_motion(signals, processing)[::stride]
+        yield Source(channel=Channel.KINEMATIC, moving=(rolling,) * len(names), **common)  # type: ignore[arg-type]
+
+
+def _moving(signals: Signals, spec: RowsOfStep, coordinate: str, processing: Processing) -> NDArray[np.bool_]:
+    joints = [joint - 3 for joint in spec.joints]
+    if spec.mode is None:
+        joints = [2 + spec.coordinates.index(coordinate)]
+    elif coordinate == "x":
+        joints = [2, 3, 4, 5]
+    return moving_rows(signals.joint_rates[:, joints], processing, signals.segment.sample_time)
+
+
+def _near_motion(signals: Signals, processing: Processing) -> NDArray[np.bool_]:
+    """Rows in or near motion, away from the ends of the filter: where nothing moves, no constraint can be broken."""
+    dt = signals.segment.sample_time
+    width = 2 * round(processing.guard / dt) + 1
+    moving = np.any(np.abs(signals.joint_rates) > processing.moving, axis=1)
+    near = ndimage.binary_dilation(moving, np.ones(width, dtype=bool))
+    near[: width // 2] = near[-(width // 2) :] = False
+    return np.asarray(near)
+
+
+def fitted_parameters(sources: Sequence[Source], vehicle: VehicleDescription, processing: Processing) -> Array:
+    """p (11,) by least squares over the dynamic rows; what they do not show stays at the vehicle file's guesses."""
+    prior = vehicle.prior.values
+    context = Context(vehicle.geometry, processing, prior)
+    normal, right = np.zeros((2, len(prior), len(prior)))[0], np.zeros(len(prior))
+    for source in sources:
+        if source.channel is Channel.DYNAMIC:
+            table = _table(source, context, [])
+            for row, moving in enumerate(source.moving):
+                kept = table[moving[:: source.factor], row]
+                theta = kept[:, 1:_COLUMNS] * prior
+                normal += theta.T @ theta
+                right += theta.T @ (-kept[:, 0] - theta.sum(axis=1))
+    scale = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
+    weighted = normal / np.outer(scale, scale) + PRIOR_WEIGHT * np.eye(len(prior))
+    return np.asarray(prior * (1 + np.linalg.solve(weighted, right / scale) / scale))
+
+
+_COLUMNS: Final = 1 + len(PARAMETER_NAMES)
+"""Columns of a table before those of the causes: residual at p = 0, then Θ."""
+
+
+def _table(source: Source, context: Context, units: Sequence[rows.UnitTerm]) -> Array:
+    """Filtered residual at p = 0, regressor and columns of a source: (N, rows, 12 + units)."""
+    make = rows.linearised_dynamic if source.channel is Channel.DYNAMIC else rows.linearised_kinematic
+    constants = (context.geometry.as_vector(), np.array([COULOMB_EPSILON]), context.parameters)
+    return context.filtered(make(source.spec, units)(source.inputs, *constants), source)
+
+
+def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
+    """One block a coordinate; the target is what baseline and causes add up to."""
+    for row, name in enumerate(source.coordinates):
+        motion = coordinate_motion(source.inputs, source.spec, name, context.geometry)
+        position, rate, acceleration = (values[:: source.factor] for values in motion)
+        target = -table[:, row, 0]
+        load = context.filtered(np.abs(source.inputs[:, rows.SLICES["torques"]]).sum(axis=1), source)
+        yield Block(
+            record=source.record,
+            channel=source.channel,
+            step=source.step,
+            coordinate=name,
+            unit=_unit(source.channel, name),
+            sample_time=source.sample_time * source.factor,
+            bandwidth=context.processing.cutoff,
+            target=target,
+            baseline=table[:, row, 1:_COLUMNS],
+            moving=source.moving[row][:: source.factor],
+            period=source.period[:: source.factor],
+            regions=regions_of(position, rate, acceleration, load),
+            features=features_of(position, rate, acceleration, load),
+        )
+
+
+def _unit(channel: Channel, coordinate: str) -> str:
+    if channel is Channel.KINEMATIC:
+        return "m/s"
+    return "N" if coordinate in ("x", "y") else "Nm"
+
+
+def _causes(effects: Sequence[EffectName], judged: bool) -> list[Cause]:
+    names = tuple(name for name in effects if judged or name not in DRIFTS)
+    return [*term_causes(names), *transform_causes(names)]
+
+
+def _candidate(
+    cause: Cause, columns: Iterator[int], sources: Sequence[Source], tables: Sequence[Array], context: Context
+) -> Candidate:
+    if isinstance(cause, TransformCause):
+        variants: tuple[Variant, ...] = (Variant(_probed(cause, sources, context)),)
+    else:
+        variants = tuple(
+            Variant(_picked([next(columns) for _ in variant.units], tables), variant.start)
+            for variant in cause.variants
+        )
+    return Candidate(
+        effect=cause.name,
+        where=cause.where,
+        parameters=placed_parameters(cause.name, cause.where),
+        variants=variants,
+        contribution=_contribution(cause, sources, context),
+        drift=cause.name in DRIFTS,
+    )
+
+
+def _picked(columns: list[int], tables: Sequence[Array]) -> tuple[Array | None, ...]:
+    """The columns of every block; None where they are all zero."""
+    blocks = [table[:, row][:, columns] for table in tables for row in range(table.shape[1])]
+    return tuple(block if np.any(block) else None for block in blocks)
+
+
+def _probed(cause: TransformCause, sources: Sequence[Source], context: Context) -> tuple[Array | None, ...]:
+    changes = _changes(cause, sources, context, np.array([cause.probe]), context.parameters)
+    return tuple(None if change is None else change[:, None] / cause.probe for change in changes)
+
+
+def _contribution(
+    cause: Cause, sources: Sequence[Source], context: Context
+) -> Callable[[Array, Array], Sequence[Array | None]]:
+    return lambda values, parameters: _changes(cause, sources, context, values, parameters)
+
+
+def _changes(
+    cause: Cause, sources: Sequence[Source], context: Context, values: Array, parameters: Array
+) -> list[Array | None]:
+    """What a cause of given numbers adds to every block, exactly."""
+    found: list[Array | None] = []
+    for source in sources:
+        change = context.filtered(_change(cause, source, context, values, parameters), source)
+        found += [column if np.any(column) else None for column in change.T]
+    return found
+
+
+def _change(cause: Cause, source: Source, context: Context, values: Array, parameters: Array) -> Array:
+    """The same for one source before the filter (M, rows)."""
+    constants = (context.geometry.as_vector(), np.array([COULOMB_EPSILON]), parameters)
+    plain = _exact(source, None)
+    before = plain(source.inputs, *constants, np.zeros(0))
+    if isinstance(cause, TermCause):
+        after = _exact(source, cause)(source.inputs, *constants, values)
+    else:
+        setting = Setting(context.geometry, parameters, source.sample_time)
+        changed = cause.transform(source.inputs, cause.place, float(values[0]), setting)
+        after = plain(changed, *constants, np.zeros(0))
+    return np.asarray((after - before)[..., 0])
+
+
+def _exact(source: Source, cause: TermCause | None) -> Vectorised:
+    make = rows.exact_dynamic if source.channel is Channel.DYNAMIC else rows.exact_kinematic
+    return make(source.spec, None, "") if cause is None else make(source.spec, cause.name, cause.where)

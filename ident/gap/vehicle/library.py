@@ -1,0 +1,146 @@
+"""The library of causes: how each effect becomes linear in a few numbers, and which of its parameters are tried."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.gap.vehicle.rows import UnitTerm
+from ident.vehicle.effect_terms import EffectTerm, neutral_values
+from ident.vehicle.effects import EFFECTS, EffectName, EffectParameter
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """How the equations depend on an effect's parameters.
+
+    Attributes:
+        linear: parameters in which the rows are linear near zero.
+        angle: of the first of them, where the pair is a size and a direction or phase; two columns then.
+        tried: values of nonlinear parameters.
+    """
+
+    linear: tuple[str, ...]
+    angle: str | None = None
+    tried: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+
+SHAPES: Final[Mapping[EffectName, Shape]] = MappingProxyType(
+    {
+        EffectName.STRIBECK: Shape(("amplitude",), tried={"velocity": (0.1, 0.2, 0.3, 0.5, 0.8)}),
+        EffectName.ASYMMETRIC_COULOMB: Shape(("imbalance",)),
+        EffectName.ASYMMETRIC_VISCOUS: Shape(("imbalance",)),
+        EffectName.QUADRATIC_DRAG: Shape(("coefficient",)),
+        EffectName.SLOPE: Shape(("angle",), angle="direction"),
+        EffectName.COM_OFFSET: Shape(("x", "y")),
+        EffectName.PAYLOAD: Shape(("mass", "inertia")),
+        EffectName.TORQUE_GAIN: Shape(("error",)),
+        EffectName.TORQUE_BIAS: Shape(("bias",)),
+        EffectName.TORQUE_RIPPLE: Shape(("amplitude",), angle="phase", tried={"order": (1.0, 2.0, 3.0, 4.0, 6.0)}),
+        EffectName.WHEEL_RADIUS: Shape(("error",)),
+        EffectName.WHEEL_ECCENTRICITY: Shape(("amplitude",), angle="phase"),
+        EffectName.STEERING_OFFSET: Shape(("offset",)),
+        EffectName.SCRUB: Shape(("torque",)),
+        EffectName.STEERING_UNIT_MASS: Shape(("mass",)),
+        EffectName.PARAMETER_CHANGE: Shape(("change",)),
+    }
+)
+"""Effects that are terms of the equations."""
+
+DRIFTS: Final = (EffectName.PARAMETER_CHANGE, EffectName.PAYLOAD)
+"""Effects that a refit of the parameters absorbs: causes only where the model's values are given."""
+
+
+@dataclass(frozen=True)
+class UnitVariant:
+    """One choice of an effect's nonlinear parameters.
+
+    Attributes:
+        units: one a column.
+        start: coefficients of the columns -> values of all parameters, in the order of the effect's.
+    """
+
+    units: tuple[UnitTerm, ...]
+    start: Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class TermCause:
+    """An effect of SHAPES at a place.
+
+    Attributes:
+        name, where: which.
+        variants: at least one.
+    """
+
+    name: EffectName
+    where: str
+    variants: tuple[UnitVariant, ...]
+
+    @property
+    def parameters(self) -> tuple[EffectParameter, ...]:
+        """As listed in the table of effects, with the units of this place."""
+        return placed_parameters(self.name, self.where)
+
+
+def placed_parameters(name: EffectName, where: str) -> tuple[EffectParameter, ...]:
+    """Parameters of an effect, with the units that they have at a place."""
+    spec = EFFECTS[name]
+    return tuple(
+        EffectParameter(entry.name, spec.unit(entry.name, where), entry.meaning, entry.default)
+        for entry in spec.parameters
+    )
+
+
+def term_causes(names: Sequence[EffectName]) -> list[TermCause]:
+    """All places of the effects named that are terms."""
+    return [
+        TermCause(name, where, tuple(_variants(name, where)))
+        for name in names
+        if name in SHAPES
+        for where in EFFECTS[name].places
+    ]
+
+
+def _variants(name: EffectName, where: str) -> list[UnitVariant]:
+    shape = SHAPES[name]
+    grid = itertools.product(*shape.tried.values())
+    return [_variant(name, where, shape, dict(zip(shape.tried, values, strict=True))) for values in grid]
+
+
+def _variant(name: EffectName, where: str, shape: Shape, held: dict[str, float]) -> UnitVariant:
+    base = neutral_values(EffectTerm(name, where, {})) | held
+    if shape.angle is None:
+        units = tuple(_unit(name, where, base, linear) for linear in shape.linear)
+    else:
+        angles = (0.0, math.pi / 2)
+        units = tuple(_unit(name, where, base | {shape.angle: angle}, shape.linear[0]) for angle in angles)
+    order = [entry.name for entry in EFFECTS[name].parameters]
+
+    def start(coefficients: Array) -> Array:
+        return np.array([(base | _numbers(shape, coefficients))[parameter] for parameter in order])
+
+    return UnitVariant(units, start)
+
+
+def _unit(name: EffectName, where: str, values: dict[str, float], linear: str) -> UnitTerm:
+    symbol = ca.SX.sym(f"{name}.{where}.{linear}")
+    return UnitTerm(EffectTerm(name, where, {**values, linear: symbol}), symbol)
+
+
+def _numbers(shape: Shape, coefficients: Array) -> dict[str, float]:
+    """Size and angle from the two columns, or the linear parameters as they are."""
+    if shape.angle is None:
+        return dict(zip(shape.linear, coefficients.tolist(), strict=True))
+    along, across = coefficients.tolist()
+    return {shape.linear[0]: math.hypot(along, across), shape.angle: math.atan2(across, along)}

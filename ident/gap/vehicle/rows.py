@@ -1,0 +1,234 @@
+"""Rows of the kinematic and dynamic channel with effects in them, generated from the symbolic model.
+
+Both are written as what must be zero: with p the parameters, θ the effects' numbers, and z what was measured,
+
+    dynamic    H_k′ᵀ (Θ′ p′ + f - B u′)                               generalized force
+    kinematic  (1 - A_ch′ A_ch′⁺) (A_α α̇′ + A_β′ β̇), longitudinal rows   velocity
+
+so that baseline, target and the columns of effects are derivatives of one expression.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.estimate.equations import RowsOfStep
+from ident.vehicle import symbolic
+from ident.vehicle.effect_terms import (
+    EffectTerm,
+    State,
+    added_forces,
+    changed_parameters,
+    on_radii,
+    rolling_radii,
+    shaft_torques,
+    symbolic_term,
+    true_steering,
+)
+from ident.vehicle.effects import EffectName
+from ident.vehicle.geometry import WHEELS
+from ident.vehicle.kinematics import GENERALIZED_VELOCITIES
+from ident.vehicle.modes import Mode
+from ident.vehicle.parameters import PARAMETER_NAMES
+from ident.vehicle.symbolic import CORNERS, LENGTHS, Expression
+from ident.vehicle.vectorised import Vectorised
+
+Array = NDArray[np.float64]
+
+_SIZES: Final = {
+    "heading": 1,
+    "alpha": 2,
+    "beta": 4,
+    "alpha_rate": 2,
+    "beta_rate": 4,
+    "alpha_acceleration": 2,
+    "beta_acceleration": 4,
+    "torques": 4,
+    "twist": 2,
+    "twist_rate": 2,
+}
+_ENDS: Final = np.cumsum(list(_SIZES.values())).tolist()
+SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS, strict=True)}
+"""What was measured, as columns of one array; `twist` is that of the two steering couplings."""
+
+INPUTS: Final = _ENDS[-1]
+"""Number of those columns."""
+
+DIFFERENCES: Final = ("front_rear_left", "front_rear_right", "left_right")
+"""What wheels that drive a rigid vehicle can disagree in: [m/s] at the floor."""
+
+_SENSES: Final = {
+    Mode.STEERED: (+1, +1, +1, +1),
+    Mode.ROTATION: (-1, -1, +1, +1),
+    Mode.LATERAL: (-1, +1, +1, -1),
+}
+"""Sense in which each wheel rolls when the mode's coordinate moves forward."""
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """The symbols behind INPUTS."""
+
+    all: Expression
+    heading: Expression
+    alpha: Expression
+    beta: Expression
+    alpha_rate: Expression
+    beta_rate: Expression
+    alpha_acceleration: Expression
+    beta_acceleration: Expression
+    torques: Expression
+    twist: Expression
+    twist_rate: Expression
+
+
+def _inputs() -> _Inputs:
+    z = ca.SX.sym("z", INPUTS)
+    return _Inputs(z, *(z[columns] for columns in SLICES.values()))
+
+
+def dynamic_coordinates(spec: RowsOfStep) -> tuple[str, ...]:
+    """Names of the dynamic rows of a mode, or of wheels in the air."""
+    return tuple(f"beta_{wheel}" for wheel in WHEELS) if spec.mode is None else GENERALIZED_VELOCITIES[spec.mode]
+
+
+def kinematic_coordinates(spec: RowsOfStep) -> tuple[str, ...]:
+    """Names of the kinematic rows of a step."""
+    if spec.mode is None:
+        return ()
+    if spec.mode is Mode.ALIGNMENT:
+        side = spec.coordinates[0].removeprefix("alpha_")
+        return tuple(f"roll_{wheel}" for wheel in WHEELS if wheel.endswith(side))
+    return DIFFERENCES
+
+
+def dynamic_rows(mode: Mode | None, z: _Inputs, parameters: Expression, terms: Sequence[EffectTerm]) -> Expression:
+    """Generalized forces that must sum to zero, (n_k,), or (4,) with the wheels in the air."""
+    alpha, radii = true_steering(terms, z.alpha), rolling_radii(terms, z.beta)
+    rates, accelerations = _lifted(z) if mode is None else _on_the_floor(z, alpha, radii)
+    state = State(z.heading, alpha, z.beta, rates, accelerations)
+    inertial = symbolic.regressor(rates, accelerations) @ changed_parameters(terms, parameters)
+    driving = symbolic.input_matrix() @ shaft_torques(terms, z.torques, z.beta)
+    total = inertial + added_forces(terms, state, parameters) - driving
+    if mode is None:
+        return total[5:]
+    return on_radii(symbolic.complement(mode, alpha), radii).T @ total
+
+
+def kinematic_rows(spec: RowsOfStep, z: _Inputs, terms: Sequence[EffectTerm]) -> Expression:
+    """Velocities that rolling wheels do not have, in `kinematic_coordinates` [m/s]."""
+    residual = _slip(z, true_steering(terms, z.alpha), rolling_radii(terms, z.beta))
+    if spec.mode is Mode.ALIGNMENT:
+        return ca.vertcat(*(residual[WHEELS.index(name[-2:])] for name in kinematic_coordinates(spec)))
+    assert spec.mode is not None
+    fl, rl, fr, rr = (sense * residual[wheel] for wheel, sense in enumerate(_SENSES[spec.mode]))
+    return ca.vertcat((fl - rl) / np.sqrt(2), (fr - rr) / np.sqrt(2), (fl + rl - fr - rr) / 2)
+
+
+def _slip(z: _Inputs, alpha: Expression, radii: Expression) -> Expression:
+    """Longitudinal rows (4,) of (1) that no twist of the chassis satisfies."""
+    headings, rates = symbolic.wheel_headings(alpha), symbolic.wheel_headings(z.alpha_rate)
+    rolled = []
+    for wheel, (front, side) in enumerate(CORNERS):
+        if front < 0:
+            headings[wheel] += z.twist[0 if side > 0 else 1]
+            rates[wheel] += z.twist_rate[0 if side > 0 else 1]
+        rolled.append(-LENGTHS.a * side * rates[wheel] - radii[wheel] * z.beta_rate[wheel])
+    contacts = symbolic.contact_rows(headings)
+    measured = ca.vertcat(ca.SX.zeros(4), *rolled)
+    return (measured - contacts @ ca.solve(contacts.T @ contacts, contacts.T @ measured))[4:]
+
+
+def _lifted(z: _Inputs) -> tuple[Expression, Expression]:
+    still = ca.SX.zeros(3)
+    return ca.vertcat(still, z.alpha_rate, z.beta_rate), ca.vertcat(still, z.alpha_acceleration, z.beta_acceleration)
+
+
+def _on_the_floor(z: _Inputs, alpha: Expression, radii: Expression) -> tuple[Expression, Expression]:
+    """q̇, q̈ with the twist by odometry (3) on the true radii and angles."""
+    A = symbolic.constraint_matrix(alpha)
+    chassis, steering = A[:, :3], A[:, 3:5] @ z.alpha_rate
+    rolling = ca.vertcat(ca.SX.zeros(4), -radii * z.beta_rate)
+    twist = -ca.solve(chassis.T @ chassis, chassis.T @ (steering + rolling))
+    twist_rate = (
+        ca.jtimes(twist, z.alpha, z.alpha_rate)
+        + ca.jtimes(twist, z.beta, z.beta_rate)
+        + ca.jtimes(twist, z.alpha_rate, z.alpha_acceleration)
+        + ca.jtimes(twist, z.beta_rate, z.beta_acceleration)
+    )
+    return (
+        ca.vertcat(twist, z.alpha_rate, z.beta_rate),
+        ca.vertcat(twist_rate, z.alpha_acceleration, z.beta_acceleration),
+    )
+
+
+@dataclass(frozen=True)
+class UnitTerm:
+    """A term that is linear in one number: what one column of a candidate stands for.
+
+    Attributes:
+        term: with symbols in it.
+        symbol: the number.
+    """
+
+    term: EffectTerm
+    symbol: Expression
+
+
+def linearised_dynamic(spec: RowsOfStep, units: Sequence[UnitTerm]) -> Vectorised:
+    """(z, geometry, ε, p) -> (N, rows, 12 + units): dynamic rows at p = 0, then ∂/∂p, then ∂/∂unit."""
+    z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
+    names = dynamic_coordinates(spec)
+    rows = dynamic_rows(spec.mode, z, p, [unit.term for unit in units])
+    return _linearise(ca.vertcat(*(rows[names.index(name)] for name in spec.coordinates)), z, p, units)
+
+
+def linearised_kinematic(spec: RowsOfStep, units: Sequence[UnitTerm]) -> Vectorised:
+    """The same for the kinematic rows, which do not depend on p."""
+    z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
+    return _linearise(kinematic_rows(spec, z, [unit.term for unit in units]), z, p, units)
+
+
+def _linearise(rows: Expression, z: _Inputs, p: Expression, units: Sequence[UnitTerm]) -> Vectorised:
+    symbols = ca.vertcat(*(unit.symbol for unit in units))
+    nothing, zero = ca.SX.zeros(symbols.shape[0]), ca.SX.zeros(p.shape[0])
+    plain = ca.substitute(rows, symbols, nothing)
+    table = ca.horzcat(
+        ca.substitute(plain, p, zero),
+        ca.jacobian(plain, p),
+        ca.substitute(ca.jacobian(rows, symbols), symbols, nothing),
+    )
+    inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON, p]
+    return Vectorised(ca.Function("rows", inputs, [ca.cse(ca.densify(table))]))
+
+
+@cache
+def exact_dynamic(spec: RowsOfStep, name: EffectName | None, where: str) -> Vectorised:
+    """(z, geometry, ε, p, values) -> dynamic rows (n,) of a step with one effect, or with none."""
+    z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
+    terms = [] if name is None else [symbolic_term(name, where)]
+    names = dynamic_coordinates(spec)
+    rows = dynamic_rows(spec.mode, z, p, terms)
+    kept = ca.vertcat(*(rows[names.index(coordinate)] for coordinate in spec.coordinates))
+    return _function(kept, z, p, terms)
+
+
+@cache
+def exact_kinematic(spec: RowsOfStep, name: EffectName | None, where: str) -> Vectorised:
+    """(z, geometry, ε, p, values) -> kinematic rows (n,) of a step with one effect, or with none."""
+    z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
+    terms = [] if name is None else [symbolic_term(name, where)]
+    return _function(kinematic_rows(spec, z, terms), z, p, terms)
+
+
+def _function(rows: Expression, z: _Inputs, p: Expression, terms: Sequence[EffectTerm]) -> Vectorised:
+    values = ca.vertcat(*(value for term in terms for value in term.values.values()))
+    inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON, p, values]
+    return Vectorised(ca.Function("rows", inputs, [ca.cse(ca.densify(rows))]))

@@ -1,0 +1,169 @@
+"""Effects with a memory of their own, simulated: what a segment would look like had they not been there.
+
+Each turns what was measured into what the plain model is about: torques that act later, wheels that turn behind their
+motors, rear units that do not follow the front ones. Everything is driven by recorded signals alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.estimate.filters import differentiate, zero_phase
+from ident.gap.vehicle.rows import SLICES
+from ident.gap.vehicle.signals import shifted
+from ident.vehicle.effects import DRIVES, EFFECTS, ENCODERS, STEERING, EffectName
+from ident.vehicle.geometry import Geometry
+from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
+
+Array = NDArray[np.float64]
+
+MOTOR_SHARE: Final = 0.5
+"""Share of B_w taken to lie on the motor's side of a gear that gives way."""
+
+LOAD_CUTOFF: Final = 150.0
+"""Of the filter on the torque that twists a gear or coupling [rad/s], which is differentiated twice."""
+
+CONTACT_SHARE: Final = 0.25
+"""Load at which tooth flanks are taken to touch, in units of the joint's Coulomb friction: play is crossed below."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a transform needs beside the signals.
+
+    Attributes:
+        geometry: of the vehicle.
+        parameters: p (11,).
+        sample_time: [s].
+    """
+
+    geometry: Geometry
+    parameters: Array
+    sample_time: float
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.parameters[PARAMETER_NAMES.index(name)])
+
+
+Transform = Callable[[Array, int, float, Setting], Array]
+"""Inputs (N, INPUTS), index of the place, size, setting -> inputs without the effect."""
+
+
+def _later_torque(inputs: Array, place: int, delay: float, setting: Setting) -> Array:
+    changed = inputs.copy()
+    column = SLICES["torques"].start + place
+    changed[:, column] = shifted(inputs[:, column], delay, setting.sample_time)
+    return changed
+
+
+def _earlier_angle(inputs: Array, place: int, delay: float, setting: Setting) -> Array:
+    changed = inputs.copy()
+    for name in ("alpha", "alpha_rate", "alpha_acceleration"):
+        column = SLICES[name].start + place
+        changed[:, column] = shifted(inputs[:, column], -delay, setting.sample_time)
+    return changed
+
+
+def _soft_gear(inputs: Array, place: int, compliance: float, setting: Setting) -> Array:
+    return _behind_motor(inputs, place, compliance * _gear_load(inputs, place, setting), setting)
+
+
+def _gear_with_play(inputs: Array, place: int, gap: float, setting: Setting) -> Array:
+    flank = np.tanh(_gear_load(inputs, place, setting) / (CONTACT_SHARE * setting["d_cw"]))
+    return _behind_motor(inputs, place, gap / 2 * flank, setting)
+
+
+def _soft_coupling(inputs: Array, place: int, compliance: float, setting: Setting) -> Array:
+    return _rear_behind_front(inputs, place, compliance * _coupling_load(inputs, place, setting), setting)
+
+
+def _coupling_with_play(inputs: Array, place: int, gap: float, setting: Setting) -> Array:
+    friction = setting[("d_cl", "d_cr")[place]]
+    flank = np.tanh(_coupling_load(inputs, place, setting) / (CONTACT_SHARE * friction))
+    return _rear_behind_front(inputs, place, gap / 2 * flank, setting)
+
+
+def _gear_load(inputs: Array, wheel: int, setting: Setting) -> Array:
+    """Torque through the gear of a wheel (N,) [Nm at the wheel]."""
+    drive = setting.geometry.gear_ratio * inputs[:, SLICES["torques"].start + wheel]
+    inertia = MOTOR_SHARE * setting["B_w"] * inputs[:, SLICES["beta_acceleration"].start + wheel]
+    return zero_phase(drive - inertia, LOAD_CUTOFF, setting.sample_time)
+
+
+def _coupling_load(inputs: Array, side: int, setting: Setting) -> Array:
+    """Torque that turns both units of a side the same way, against the coupling (N,) [Nm]."""
+    g = setting.geometry
+    outward = (1.0, -1.0)[side]
+    force = sum(_contact_force(inputs, wheel, setting) for wheel in (2 * side, 2 * side + 1))
+    return zero_phase(-outward * g.wheel_offset * np.asarray(force) / 2, LOAD_CUTOFF, setting.sample_time)
+
+
+def _contact_force(inputs: Array, wheel: int, setting: Setting) -> Array:
+    rate, acceleration = (inputs[:, SLICES[name].start + wheel] for name in ("beta_rate", "beta_acceleration"))
+    lost = setting["d_vw"] * rate + setting["d_cw"] * np.tanh(rate / COULOMB_EPSILON) + setting["B_w"] * acceleration
+    drive = setting.geometry.gear_ratio * inputs[:, SLICES["torques"].start + wheel]
+    return np.asarray((drive - lost) / setting.geometry.wheel_radius)
+
+
+def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> Array:
+    changed, rate = inputs.copy(), differentiate(twist, setting.sample_time)
+    for name, change in (("beta", twist), ("beta_rate", rate)):
+        changed[:, SLICES[name].start + wheel] -= change
+    changed[:, SLICES["beta_acceleration"].start + wheel] -= differentiate(rate, setting.sample_time)
+    return changed
+
+
+def _rear_behind_front(inputs: Array, side: int, twist: Array, setting: Setting) -> Array:
+    changed = inputs.copy()
+    changed[:, SLICES["twist"].start + side] += twist
+    changed[:, SLICES["twist_rate"].start + side] += differentiate(twist, setting.sample_time)
+    return changed
+
+
+@dataclass(frozen=True)
+class TransformCause:
+    """An effect with a memory at a place.
+
+    Attributes:
+        name, where: which.
+        place: index of the drive or side.
+        transform: takes the effect out of the inputs.
+        probe: a small size, at which the columns are taken.
+    """
+
+    name: EffectName
+    where: str
+    place: int
+    transform: Transform
+    probe: float
+
+
+_DRIVE, _SIDE = "drive", "side"
+_TRANSFORMS: Final[Mapping[tuple[EffectName, str], tuple[Transform, float]]] = MappingProxyType(
+    {
+        (EffectName.TIME_DELAY, _DRIVE): (_later_torque, 1e-3),
+        (EffectName.TIME_DELAY, _SIDE): (_earlier_angle, 1e-3),
+        (EffectName.ELASTICITY, _DRIVE): (_soft_gear, 1e-4),
+        (EffectName.ELASTICITY, _SIDE): (_soft_coupling, 1e-5),
+        (EffectName.BACKLASH, _DRIVE): (_gear_with_play, 1e-3),
+        (EffectName.BACKLASH, _SIDE): (_coupling_with_play, 1e-3),
+    }
+)
+
+
+def transform_causes(names: tuple[EffectName, ...]) -> list[TransformCause]:
+    """All places of the effects named that have a memory."""
+    causes = []
+    for name in names:
+        for where in EFFECTS[name].places:
+            kind = _DRIVE if where in DRIVES else _SIDE
+            if (name, kind) in _TRANSFORMS:
+                places = next(places for places in (DRIVES, ENCODERS, STEERING) if where in places)
+                causes.append(TransformCause(name, where, places.index(where), *_TRANSFORMS[name, kind]))
+    return causes
