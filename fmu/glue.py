@@ -33,7 +33,7 @@ _ROLES: Final[Mapping[Block, str]] = MappingProxyType(
 def wrapper_sources(table: VariableTable, version: FmiVersion, token: str) -> dict[str, bytes]:
     """C files of the wrapper: file name -> text. They compile together with those of the model."""
     names = (*_WRITTEN, _ENTRY[version])
-    written = {name: (resources.files("fmu.wrapper") / name).read_bytes() for name in names}
+    written = {name: (resources.files("fmu") / "wrapper" / name).read_bytes() for name in names}
     return {**written, "variables.h": _header(table, token).encode(), "variables.c": _rows(table, token).encode()}
 
 

@@ -1,0 +1,80 @@
+"""What an FMU is made from: a vehicle, its identified parameters, its confirmed effects, and where they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from fmu.model.generate import generate_core
+from fmu.table import neutral_effects, variable_table
+from fmu.variables import Inputs, VariableTable
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effect_terms import TERMS
+from ident.vehicle.effects import Effect, EffectName
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+
+
+@dataclass(frozen=True)
+class ModelSource:
+    """What an FMU is made from.
+
+    Attributes:
+        vehicle: geometry and limits.
+        parameters: identified, with standard deviations.
+        effects: confirmed.
+        provenance: what a reader must know to repeat it, by name.
+        documents: files that go along as they are, by file name.
+    """
+
+    vehicle: VehicleDescription
+    parameters: Parameters
+    effects: tuple[Effect, ...]
+    provenance: Mapping[str, str]
+    documents: Mapping[str, bytes]
+
+    @property
+    def in_model(self) -> tuple[Effect, ...]:
+        """The confirmed effects that the model has equations for."""
+        return tuple(effect for effect in self.effects if effect.name in TERMS or effect.name is EffectName.SLIP)
+
+    @property
+    def left_out(self) -> tuple[Effect, ...]:
+        """The confirmed effects that it has none for: delay, backlash, elasticity."""
+        return tuple(effect for effect in self.effects if effect not in self.in_model)
+
+    @property
+    def standard_deviations(self) -> Mapping[str, float]:
+        """Of the FMU's parameters, by name, where they are known."""
+        known = {name: self.parameters.std_of(name) for name in PARAMETER_NAMES}
+        for effect in self.in_model:
+            for name, quantity in effect.parameters.items():
+                known[f"{effect.name}.{effect.where}.{name}"] = quantity.std
+        return {name: std for name, std in known.items() if std > 0}
+
+
+@dataclass(frozen=True)
+class Model:
+    """The model of an FMU.
+
+    Attributes:
+        table: of its variables.
+        files: C sources by name.
+        dependencies: derivative or output -> the states and inputs that it depends on.
+    """
+
+    table: VariableTable
+    files: Mapping[str, str]
+    dependencies: Mapping[str, tuple[str, ...]]
+
+
+def make_model(source: ModelSource, inputs: Inputs) -> Model:
+    """The model with every effect that it has equations for; those that are not confirmed have size zero."""
+    effects = _with_neutral(source.in_model)
+    table = variable_table(source.vehicle, source.parameters, effects, inputs)
+    core = generate_core(table, effects, inputs)
+    return Model(table, core.files, core.dependencies)
+
+
+def _with_neutral(confirmed: Sequence[Effect]) -> list[Effect]:
+    found = {(effect.name, effect.where) for effect in confirmed}
+    return [*confirmed, *(effect for effect in neutral_effects() if (effect.name, effect.where) not in found)]

@@ -1,1 +1,0 @@
-"""The FMI functions in C, on the model of `fmu.model`."""
