@@ -62,10 +62,10 @@ def load_payload(prototype: Prototype, mass: float, inertia: float) -> Prototype
 
 
 def shift_centre(prototype: Prototype, x: float, y: float) -> Prototype:
-    """The vehicle's centre of mass moved to (x, y) [m] from its centre; its yaw inertia about that centre of mass stays.
+    """The vehicle's centre of mass moved to (x, y) [m] from its centre; the yaw inertia about it stays.
 
     Raises:
-        UserError: the yaw inertia is too small for the shift.
+        UserError: the shift is beyond the wheels.
     """
     chassis = prototype.rigid_bodies.chassis
     lever = prototype.truth["m_ch"] / chassis.mass
@@ -73,10 +73,11 @@ def shift_centre(prototype: Prototype, x: float, y: float) -> Prototype:
     roll, pitch, yaw = chassis.inertia
     # The chassis goes further out than the vehicle's centre of mass, so it spreads less about its own.
     own_yaw = yaw + prototype.truth["m_ch"] * (x**2 + y**2) - chassis.mass * (centre[0] ** 2 + centre[1] ** 2)
-    if own_yaw <= abs(roll - pitch):
+    geometry = prototype.geometry
+    if abs(x) >= geometry.wheelbase / 2 or abs(y) >= geometry.track_width / 2 or own_yaw <= abs(roll - pitch):
         raise UserError(
-            f"com_offset@chassis: no body with this yaw inertia has its mass {math.hypot(x, y):.2f} m off its centre.",
-            "Give a smaller offset.",
+            f"com_offset@chassis: with its mass at ({x:.2f}, {y:.2f}) m the vehicle would tip over.",
+            f"Stay within {geometry.wheelbase / 2:.2f} m and {geometry.track_width / 2:.2f} m.",
         )
     return _with_chassis(prototype, RigidBody(chassis.mass, centre, (roll, pitch, own_yaw)))
 

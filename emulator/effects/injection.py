@@ -108,18 +108,18 @@ def _without_motor_inertia(injection: Injection) -> Injection:
 def _refuse_twice(effects: Sequence[Effect]) -> None:
     for index, effect in enumerate(effects):
         for other in effects[:index]:
-            if effect.name is other.name and _overlap(effect.where, other.where):
+            if effect.name is other.name and _overlap(effect, other):
                 raise UserError(
                     f"{other} and {effect} exclude each other: both are {effect.name} of the same part.",
                     "Give one of them, with the size of both.",
                 )
 
 
-def _overlap(one: str, other: str) -> bool:
-    groups = {"wheels": "wheel_", "chassis": ""}
-    return one == other or any(
-        whole in groups and part.startswith(groups[whole]) for whole, part in ((one, other), (other, one))
-    )
+def _overlap(effect: Effect, other: Effect) -> bool:
+    """The same place; or the same wheel, where one coefficient would replace the other."""
+    if effect.name is EffectName.SLIP:
+        return bool(set(_wheels_of(effect.where)) & set(_wheels_of(other.where)))
+    return effect.where == other.where
 
 
 def _wheels_of(where: str) -> tuple[int, ...]:
