@@ -55,12 +55,14 @@ class Directions:
     Attributes:
         basis: (n, D).
         places: of every variant in the basis; empty where the baseline absorbs it.
+        least: (D,) amplitudes below which a direction counts nothing.
         residual: (n,) target minus its projection on the baseline.
         volume: log of the determinant of each variant's columns beside the baseline.
     """
 
     basis: Array
     places: tuple[slice, ...]
+    least: Array
     residual: Array
     volume: Array
 
@@ -71,7 +73,8 @@ class Directions:
 
     def ratios(self, amplitudes: Array) -> Array:
         """Sums of squared amplitudes (..., D) over the directions of every variant, (..., V)."""
-        squares = np.concatenate([np.zeros((*amplitudes.shape[:-1], 1)), np.cumsum(amplitudes**2, axis=-1)], axis=-1)
+        counted = np.where(amplitudes >= self.least, amplitudes, 0.0)
+        squares = np.concatenate([np.zeros((*amplitudes.shape[:-1], 1)), np.cumsum(counted**2, axis=-1)], axis=-1)
         starts = [place.start for place in self.places]
         stops = [place.stop for place in self.places]
         return np.asarray(squares[..., stops] - squares[..., starts])
@@ -86,15 +89,19 @@ def directions(white: White, layout: Sequence[Column], rows: Mask | None = None)
     left = columns - base @ (base.T @ columns)
     full = np.linalg.norm(white.columns, axis=0)
     parts, places, volumes, end = [np.zeros((len(target), 0))], [], [], 0
+    least: list[float] = []
     for column in layout:
         scale = np.where(full[column.place] > 0, full[column.place], 1.0)
         vectors, singular, _ = np.linalg.svd(left[:, column.place] / scale, full_matrices=False)
         count = int(np.sum(singular > VISIBLE))
-        parts.append(vectors[:, :count])
+        length = float(vectors[:, 0] @ left[:, column.place.start]) if count else 0.0
+        bounded = count > 0 and column.least > -math.inf
+        parts.append(vectors[:, :count] * (np.sign(length) if bounded else 1.0))
+        least += [column.least * abs(length) if bounded else -math.inf] * count
         places.append(slice(end, end + count))
         volumes.append(2 * float(np.sum(np.log(np.maximum(singular, VISIBLE)))))
         end += count
-    return Directions(np.hstack(parts), tuple(places), residual, np.array(volumes))
+    return Directions(np.hstack(parts), tuple(places), np.array(least), residual, np.array(volumes))
 
 
 def orthonormal(columns: Array) -> Array:
@@ -110,9 +117,10 @@ class Evidence:
     """Evidence for every variant on top of a baseline.
 
     Attributes:
+        directions: what each variant adds.
         amplitudes: (D,) of the residual along the directions.
-        surrogates: (M, D) the same, signs of stretches flipped.
-        scale: (V,) how much more than white noise the ratio scatters, at least 1.
+        surrogates: (M, D) the same, signs of stretches flipped, the best candidate taken away before.
+        scale: (V,) how much more than white noise the ratio scatters, at least 1; the variant itself taken away before.
         log_evidence: (V,) half the scaled ratio, less the price of its coefficients; -inf where nothing is visible.
         log_predictive: (V,) log Bayes factor of the confirming rows, given the fitted ones; 0 without any.
         significance: probability of so large a maximum over all variants without any effect.
@@ -127,42 +135,55 @@ class Evidence:
     significance: float
 
 
-def gather(
-    white: White, layout: Sequence[Column], signs: Array, residual: Array | None = None, excluded: Mask | None = None
-) -> Evidence:
+def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask) -> Evidence:
     """Evidence for every variant.
 
     Args:
         white: the regression.
         layout: of its columns.
         signs: (M, J) of +1 and -1, one a stretch.
-        residual: (n,) that surrogates are made of; None: what the baseline leaves.
         excluded: (V,) variants that do not compete.
     """
     found = directions(white, layout)
     amplitudes = found.basis.T @ found.residual
-    surrogates = _flipped(found.basis, found.residual if residual is None else residual, white.stretch, signs)
     sizes = found.sizes
-    spread = found.ratios(surrogates).mean(axis=0) / np.maximum(sizes, 1)
-    scale = np.maximum(spread, 1.0)
+    competing = (sizes > 0) & ~excluded
+    ratios = found.ratios(amplitudes)
+    best = int(np.argmax(np.where(competing, ratios, -1.0)))
+    surrogates = signs @ _sums(found.basis * _without(found, amplitudes, best)[:, None], white.stretch)
+    scale = np.array([_scatter(found, amplitudes, variant, white.stretch) for variant in range(len(layout))])
+    spread = np.maximum(found.ratios(surrogates).mean(axis=0) / np.maximum(sizes, 1), 1.0)
     price = 0.5 * sizes * math.log(len(white.target))
-    competing = (sizes > 0) if excluded is None else (sizes > 0) & ~excluded
-    evidence = np.where(competing, 0.5 * found.ratios(amplitudes) / scale - price, -np.inf)
-    by_chance = np.where(competing, 0.5 * found.ratios(surrogates) / scale - price, -np.inf)
+    tested = np.where(competing, 0.5 * ratios / spread - price, -np.inf)
+    by_chance = np.where(competing, 0.5 * found.ratios(surrogates) / spread - price, -np.inf)
     return Evidence(
         directions=found,
         amplitudes=amplitudes,
         surrogates=surrogates,
         scale=scale,
-        log_evidence=evidence,
+        log_evidence=np.where(competing, 0.5 * ratios / scale - price, -np.inf),
         log_predictive=_predictive(white, layout, found, amplitudes, scale),
-        significance=_significance(evidence.max(initial=-np.inf), by_chance.max(axis=1, initial=-np.inf)),
+        significance=_significance(tested.max(initial=-np.inf), by_chance.max(axis=1, initial=-np.inf)),
     )
 
 
-def _flipped(basis: Array, residual: Array, stretch: NDArray[np.int64], signs: Array) -> Array:
+def _sums(values: Array, stretch: NDArray[np.int64]) -> Array:
     starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
-    return np.asarray(signs @ np.add.reduceat(basis * residual[:, None], starts, axis=0))
+    return np.asarray(np.add.reduceat(values, starts, axis=0))
+
+
+def _without(found: Directions, amplitudes: Array, variant: int) -> Array:
+    place = found.places[variant]
+    return np.asarray(found.residual - found.basis[:, place] @ amplitudes[place])
+
+
+def _scatter(found: Directions, amplitudes: Array, variant: int, stretch: NDArray[np.int64]) -> float:
+    """Mean ratio of a variant over all signs of the stretches, over that of white noise, at least 1."""
+    place = found.places[variant]
+    if place.stop == place.start:
+        return 1.0
+    sums = _sums(found.basis[:, place] * _without(found, amplitudes, variant)[:, None], stretch)
+    return float(max(1.0, np.sum(sums**2) / (place.stop - place.start)))
 
 
 def _significance(found: float, by_chance: Array) -> float:
@@ -209,15 +230,17 @@ def best_pair(evidence: Evidence, owners: Sequence[int], rows: int) -> PairEvide
 
 
 def _joint(evidence: Evidence, first: int, second: int, rows: int) -> tuple[float, Array]:
-    places = [evidence.directions.places[index] for index in (first, second)]
-    picked = np.r_[places[0], places[1]]
-    basis = evidence.directions.basis[:, picked]
+    found = evidence.directions
+    picked = np.r_[found.places[first], found.places[second]]
+    basis = found.basis[:, picked]
     values, vectors = np.linalg.eigh(basis.T @ basis)
     kept = values > VISIBLE
     turn = vectors[:, kept] / np.sqrt(values[kept])
     scale = max(evidence.scale[first], evidence.scale[second])
     price = 0.5 * int(kept.sum()) * math.log(rows)
-    joint = 0.5 * float(np.sum((evidence.amplitudes[picked] @ turn) ** 2)) / scale - price
+    turned = evidence.amplitudes[picked] @ turn
+    possible = bool(np.all(turn @ turned >= found.least[picked]))
+    joint = 0.5 * float(np.sum(turned**2)) / scale - price if possible else -np.inf
     return joint, 0.5 * np.sum((evidence.surrogates[:, picked] @ turn) ** 2, axis=1) / scale - price
 
 

@@ -96,6 +96,8 @@ class Candidate:
         variants: at least one; several choices of nonlinear parameters are tried, the best one counts.
         contribution: exact and nonlinear in the parameters, for the refit; None where the columns are all there is.
         drift: it is a changed value of the model, no structure that the model lacks.
+        least: what the coefficient of a single column must reach, 0 for a play or a mass; if the data want it smaller,
+            this is not the cause. None: anything is possible.
     """
 
     effect: str
@@ -104,6 +106,7 @@ class Candidate:
     variants: tuple[Variant, ...]
     contribution: Contribution | None = None
     drift: bool = False
+    least: float | None = None
 
     @property
     def key(self) -> str:

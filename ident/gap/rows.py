@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.gap.problem import Block, Problem
+from ident.gap.problem import Block, Candidate, Problem
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -44,11 +44,18 @@ class Kept:
 
 @dataclass(frozen=True)
 class Column:
-    """Where the columns of one variant of a candidate stand in `Rows.columns`."""
+    """Where the columns of one variant of a candidate stand in `Rows.columns`.
+
+    Attributes:
+        candidate, variant: numbers.
+        place: among all columns.
+        least: value that its one coefficient must reach, -inf where there is none such.
+    """
 
     candidate: int
     variant: int
     place: slice
+    least: float
 
 
 @dataclass(frozen=True)
@@ -159,9 +166,13 @@ def _candidate_columns(problems: Sequence[Problem], kept: Sequence[Kept]) -> tup
             series = [column for candidate in candidates for column in candidate.variants[number].columns]
             width = next((column.shape[1] for column in series if column is not None), 0)
             stacks.append(_stack(kept, series, width))
-            layout.append(Column(index, number, slice(end, end + width)))
+            layout.append(Column(index, number, slice(end, end + width), _least(candidates[0], width)))
             end += width
     return np.hstack(stacks), tuple(layout)
+
+
+def _least(candidate: Candidate, width: int) -> float:
+    return candidate.least if candidate.least is not None and width == 1 else -math.inf
 
 
 def _groups(labels: Sequence[tuple[int, str, str, str]]) -> Indices:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,10 @@ from ident.gap.whitening import Whitener, fit_whitener
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+WEIGHTED_FITS: Final = 4
+CONTENDERS: Final = 12
+"""Candidates whose likelihood is found exactly, the others being far behind."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,38 @@ class Settings:
     surrogates: int = 600
     most: int = 4
     lead: float = 0.5
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Maximum of the likelihood, the colour of the noise fitted too.
+
+    Attributes:
+        log_likelihood: up to a constant of the rows.
+        possible: every coefficient is as large as it must be.
+    """
+
+    log_likelihood: float
+    possible: bool
+
+
+@dataclass(frozen=True)
+class Slot:
+    """What may stand in one place of the explanation, the others given.
+
+    Attributes:
+        evidence: of every variant, whitened alike, with surrogates.
+        variants: contenders, best first.
+        log_evidence: of each, against nothing in this place; every one with its own colour of the noise.
+    """
+
+    evidence: Evidence
+    variants: tuple[int, ...]
+    log_evidence: Array
+
+    def of(self, variant: int) -> float:
+        """Log evidence of a variant, -inf if it is no contender."""
+        return float(self.log_evidence[self.variants.index(variant)]) if variant in self.variants else -float("inf")
 
 
 class Regression:
@@ -69,10 +106,10 @@ class Regression:
         return np.hstack([np.zeros((len(self.rows), 0)), *places])
 
     def whitener(self, variants: Sequence[int]) -> Whitener:
-        """Colour of what the baseline and these variants leave, twice so that the second fit is a weighted one."""
+        """Colour of what the baseline and these variants leave, fitted by turns with them."""
         design = np.hstack([self.rows.baseline, self.columns_of(variants)])
         residual = self.rows.target - design @ _least_squares(design, self.rows.target)
-        for _ in range(2):
+        for _ in range(WEIGHTED_FITS):
             whitener = fit_whitener(self.rows, residual, design.shape[1])
             white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
             residual = self.rows.target - design @ _least_squares(white[:, :-1], white[:, -1])
@@ -92,20 +129,49 @@ class Regression:
         split = 1 + rows.baseline.shape[1] + taken.shape[1]
         return White(white[:, 0], white[:, 1:split], white[:, split:], stretch, confirming)
 
-    def evidence(self, whitener: Whitener, given: Sequence[int], selected: Sequence[int]) -> Evidence:
+    def evidence(self, whitener: Whitener, given: Sequence[int]) -> Evidence:
         """Evidence for every variant beside those given; candidates of those given do not compete."""
-        white = self.white(whitener, given)
-        residual = None
-        if selected != given:
-            whole = np.hstack([white.baseline, white.columns[:, self._places(selected)]])
-            residual = white.target - whole @ _least_squares(whole, white.target)
         taken = {self.owners[variant] for variant in given}
         excluded = np.array([owner in taken for owner in self.owners], dtype=bool)
-        return gather(white, self.rows.layout, self.signs, residual, excluded)
+        return gather(self.white(whitener, given), self.rows.layout, self.signs, excluded)
 
-    def _places(self, variants: Sequence[int]) -> NDArray[np.int64]:
-        places = [np.arange(column.place.start, column.place.stop) for column in self.rows.layout]
-        return np.concatenate([np.zeros(0, dtype=np.int64), *(places[variant] for variant in variants)])
+    def profile(self, variants: Sequence[int]) -> Profile:
+        """Likelihood of the baseline with some variants."""
+        whitener = self.whitener(variants)
+        white = self.white(whitener, variants)
+        coefficients = _least_squares(white.baseline, white.target)
+        residual = white.target - white.baseline @ coefficients
+        least = [self.rows.layout[variant].least for variant in variants for _ in range(self._width(variant))]
+        taken = coefficients[self.rows.baseline.shape[1] :]
+        log_likelihood = -0.5 * float(residual @ residual) - whitener.log_deviation(self.rows)
+        return Profile(log_likelihood, bool(np.all(taken >= np.array(least))))
+
+    def slot(self, given: Sequence[int], whitener: Whitener) -> Slot:
+        """Contenders beside the variants given."""
+        evidence = self.evidence(whitener, given)
+        without = self.profile(given).log_likelihood
+        contenders = self._contenders(evidence)
+        gains = []
+        for variant in contenders:
+            profile = self.profile((*given, variant))
+            price = 0.5 * int(evidence.directions.sizes[variant]) * np.log(len(self.rows))
+            gain = profile.log_likelihood - without if profile.possible else -np.inf
+            gains.append(gain / evidence.scale[variant] - price)
+        order = np.argsort(gains)[::-1]
+        return Slot(evidence, tuple(contenders[index] for index in order), np.array(gains)[order])
+
+    def _contenders(self, evidence: Evidence) -> list[int]:
+        """The best variant of every candidate, by likelihood ratio, the best candidates only."""
+        ratios = np.where(np.isfinite(evidence.log_evidence), evidence.directions.ratios(evidence.amplitudes), -np.inf)
+        best: dict[int, int] = {}
+        for variant in np.argsort(ratios)[::-1].tolist():
+            if np.isfinite(ratios[variant]):
+                best.setdefault(self.owners[variant], variant)
+        return list(best.values())[:CONTENDERS]
+
+    def _width(self, variant: int) -> int:
+        place = self.rows.layout[variant].place
+        return int(place.stop - place.start)
 
     def _prior_rows(self, width: int) -> Array:
         nominal = self.problem.nominal
@@ -123,14 +189,14 @@ class Found:
     Attributes:
         variants: taken, in the order of the search.
         whitener: of what they leave.
-        slots: evidence for every candidate in the place of each one taken, the others given.
-        rest: evidence for one more.
+        slots: what may stand in the place of each one taken, the others given.
+        rest: what may stand beside them.
     """
 
     variants: tuple[int, ...]
     whitener: Whitener
-    slots: tuple[Evidence, ...]
-    rest: Evidence
+    slots: tuple[Slot, ...]
+    rest: Slot
 
 
 def search(regression: Regression) -> Found:
@@ -145,17 +211,17 @@ def search(regression: Regression) -> Found:
             break
         taken = settled
     whitener = regression.whitener(taken)
-    slots = tuple(regression.evidence(whitener, _without(taken, index), taken) for index in range(len(taken)))
-    return Found(taken, whitener, slots, regression.evidence(whitener, taken, taken))
+    slots = tuple(regression.slot(_without(taken, index), whitener) for index in range(len(taken)))
+    return Found(taken, whitener, slots, regression.slot(taken, whitener))
 
 
 def _grown(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     settings = regression.settings
-    evidence = regression.evidence(regression.whitener(taken), taken, taken)
-    if not np.isfinite(evidence.log_evidence).any():
+    slot = regression.slot(taken, regression.whitener(taken))
+    if not slot.variants:
         return taken
-    best = int(np.argmax(evidence.log_evidence))
-    if evidence.significance <= settings.level and evidence.log_predictive[best] >= settings.confirmation:
+    best, evidence = slot.variants[0], slot.evidence
+    if _believed(slot, best, settings):
         return (*taken, best)
     if len(taken) + 2 > settings.most:
         return taken
@@ -163,6 +229,13 @@ def _grown(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     if pair is None or pair.significance > settings.level or pair.log_evidence < evidence.log_evidence[best]:
         return taken
     return (*taken, pair.first, pair.second)
+
+
+def _believed(slot: Slot, variant: int, settings: Settings) -> bool:
+    """Larger than chance over all candidates, and confirmed."""
+    evidence = slot.evidence
+    confirmed = evidence.log_predictive[variant] >= settings.confirmation
+    return bool(confirmed and evidence.significance <= settings.level and slot.of(variant) > 0)
 
 
 def _settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
@@ -176,14 +249,13 @@ def _settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _revised(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
-    settings = regression.settings
     whitener = regression.whitener(taken)
     for index, variant in enumerate(taken):
-        evidence = regression.evidence(whitener, _without(taken, index), taken)
-        best = int(np.argmax(evidence.log_evidence))
-        if evidence.log_evidence[best] > evidence.log_evidence[variant] + settings.lead:
+        slot = regression.slot(_without(taken, index), whitener)
+        best = slot.variants[0]
+        if slot.of(best) > slot.of(variant) + regression.settings.lead:
             return (*taken[:index], best, *taken[index + 1 :])
-        if evidence.significance > settings.level or evidence.log_predictive[variant] < settings.confirmation:
+        if not _believed(slot, variant, regression.settings):
             return _without(taken, index)
     return taken
 

@@ -27,6 +27,8 @@ STRIBECK_SPEEDS: Final = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Tried first, over the 95th percentile of the speed."""
 BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
 """Tried first, over the range of the position."""
+LEAST_SHARE: Final = 0.1
+"""Of the effort that must lie behind a play for it to be one."""
 RIPPLE_STEP: Final = 0.5
 MOST_RIPPLES: Final = 30.0
 """Periods over the range of the position that are tried, and their step."""
@@ -93,9 +95,11 @@ def delayed(series: Array, delay: float, sample_time: float) -> Array:
     return np.asarray(np.fft.irfft(np.fft.rfft(mirrored) * turn, len(mirrored))[: len(series)])
 
 
-def _linear(axis: AxisModel, effect: str, parameters: Sequence[EffectParameter], *columns: Array) -> Candidate:
+def _linear(
+    axis: AxisModel, effect: str, parameters: Sequence[EffectParameter], *columns: Array, least: float | None = None
+) -> Candidate:
     variant = Variant(axis.alone(np.stack(columns, axis=1)))
-    return Candidate(effect, axis.place, tuple(parameters), (variant,))
+    return Candidate(effect, axis.place, tuple(parameters), (variant,), least=least)
 
 
 def _asymmetric_viscous(axis: AxisModel) -> Candidate:
@@ -128,7 +132,7 @@ def _payload(axis: AxisModel) -> Candidate:
 def _quadratic_drag(axis: AxisModel) -> Candidate:
     parameter = EffectParameter("coefficient", axis.unit(" s^2/q^2"), "resistance is coefficient times v abs(v)")
     velocity = axis.motion.velocity
-    return _linear(axis, EffectName.QUADRATIC_DRAG, [parameter], velocity * np.abs(velocity))
+    return _linear(axis, EffectName.QUADRATIC_DRAG, [parameter], velocity * np.abs(velocity), least=0.0)
 
 
 def _gravity(axis: AxisModel) -> Candidate:
@@ -161,14 +165,14 @@ def _stribeck(axis: AxisModel) -> Candidate:
         EffectParameter("velocity", f"{axis.kind.position_unit}/s", "speed at which it has fallen to 1/e"),
     )
     variants = tuple(variant(share * axis.speed) for share in STRIBECK_SPEEDS)
-    return Candidate(EffectName.STRIBECK, axis.place, parameters, variants, contribution)
+    return Candidate(EffectName.STRIBECK, axis.place, parameters, variants, contribution, least=0.0)
 
 
 def _time_delay(axis: AxisModel) -> Candidate:
     def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
         return axis.alone(delayed(axis.effort, -float(values[0]), axis.sample_time) - axis.effort)
 
-    parameters = (EffectParameter("delay", "s", "motion follows the effort reported so much later"),)
+    parameters = (EffectParameter("delay", "s", "of the motion behind the effort, as reported"),)
     slope = np.gradient(axis.effort, axis.sample_time)
     variants = (Variant(axis.alone(slope[:, None])),)
     return Candidate(EffectName.TIME_DELAY, axis.place, parameters, variants, contribution)
@@ -196,7 +200,7 @@ def _backlash(axis: AxisModel) -> Candidate:
         EffectParameter("share", "1", "of the effort that lies behind it"),
     )
     variants = tuple(variant(share * axis.reach) for share in BACKLASH_GAPS)
-    return Candidate(EffectName.BACKLASH, axis.place, parameters, variants)
+    return Candidate(EffectName.BACKLASH, axis.place, parameters, variants, least=LEAST_SHARE)
 
 
 def in_gap(position: Array, gap: float) -> Array:

@@ -20,8 +20,11 @@ Array = NDArray[np.float64]
 LARGEST_CUTOFF: Final = 0.4
 """Of the position filter, over the sampling frequency."""
 ROWS_CUTOFF: Final = 0.4
-"""Cutoff of the filter on all columns over that of the position filter: sign(v) then sees the velocity itself."""
+"""Largest cutoff of the rows over that of the position filter: sign(v) then sees the velocity itself."""
 SPECTRUM_SEGMENTS: Final = 8
+LEAST_ROWS_CUTOFF: Final = 0.04
+EFFORT_SHARE: Final = 0.95
+"""Of the power of the effort that the rows keep. What lies above belongs to drives and structures, not to the axis."""
 STUCK_SPEED: Final = 0.01
 """Over the 95th percentile of the speed: below it for longer than the filter's memory, an axis rests."""
 REPEAT_MISMATCH: Final = 0.03
@@ -85,6 +88,14 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float) -> AxisMot
     ends = max(1, round(2 * memory / dt))
     moving[:ends] = moving[-ends:] = False
     return AxisMotion(position, velocity, differentiate(velocity, dt), axis.effort, moving)
+
+
+def effort_bandwidth(effort: Array, cutoff: float, sample_time: float) -> float:
+    """Cutoff for the rows of an axis [rad/s]: what holds EFFORT_SHARE of the power of its modelled effort (N,)."""
+    frequency, power = signal.periodogram(effort, 1 / sample_time, detrend="constant")
+    share = np.cumsum(power) / max(float(power.sum()), np.finfo(float).tiny)
+    found = 2 * math.pi * float(frequency[np.searchsorted(share, EFFORT_SHARE)])
+    return float(np.clip(found, LEAST_ROWS_CUTOFF * cutoff, ROWS_CUTOFF * cutoff))
 
 
 def with_repeats(record: AxisRecord) -> NDArray[np.int64]:

@@ -13,7 +13,7 @@ from ident.estimate.axis.identify import PARAMETER_UNITS
 from ident.estimate.axis.processing import PARAMETERS
 from ident.estimate.filters import zero_phase
 from ident.gap.axis.candidates import AxisModel, axis_candidates
-from ident.gap.axis.motion import ROWS_CUTOFF, AxisMotion, axis_motion, position_cutoff, with_repeats
+from ident.gap.axis.motion import ROWS_CUTOFF, AxisMotion, axis_motion, effort_bandwidth, position_cutoff, with_repeats
 from ident.gap.problem import Block, Candidate, Channel, Problem, Variant
 from ident.records.axis_record import AxisRecord, AxisSignals
 
@@ -46,10 +46,12 @@ class Reference:
 
     Attributes:
         cutoff: of the position filter [rad/s].
+        bandwidth: of the filter that all columns and the effort pass [rad/s].
         scales: of every axis.
     """
 
     cutoff: float
+    bandwidth: float
     scales: tuple[Scale, ...]
 
 
@@ -66,16 +68,14 @@ def axis_reference(records: Sequence[AxisRecord], cutoff: float | None = None) -
     """
     refuse_other_axes(records)
     chosen = cutoff or min(position_cutoff(record) for record in records)
-    signals = [_signals(record, chosen) for record in records]
-    scales = []
-    for index in range(len(records[0].axes)):
-        motions = [one.motions[index] for one in signals]
-        rows = [one.equations(index) for one in signals]
-        left, right = np.vstack([row[0] for row in rows]), np.concatenate([row[1] for row in rows])
-        speed = max(float(np.percentile(np.abs(motion.velocity), 95)) for motion in motions)
-        reach = float(np.ptp(np.concatenate([motion.position for motion in motions])))
-        scales.append(Scale(np.linalg.lstsq(left, right, rcond=None)[0], speed, reach))
-    return Reference(chosen, tuple(scales))
+    signals = [_signals(record, chosen, ROWS_CUTOFF * chosen) for record in records]
+    scales = tuple(_scale(signals, index) for index in range(len(records[0].axes)))
+    bandwidth = max(
+        effort_bandwidth(_first_estimate(one, index, scale), chosen, one.record.sample_time)
+        for one in signals
+        for index, scale in enumerate(scales)
+    )
+    return Reference(chosen, bandwidth, scales)
 
 
 def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem:
@@ -88,7 +88,7 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
         EstimationError: a record is too short, or an axis does not move.
     """
     refuse_other_axes(records)
-    parts = [_of_record(_signals(record, reference.cutoff), reference) for record in records]
+    parts = [_of_record(_signals(record, reference.cutoff, reference.bandwidth), reference) for record in records]
     blocks = tuple(block for blocks, _ in parts for block in blocks)
     candidates = _joined([candidates for _, candidates in parts])
     parameters, units = zip(*_baseline_names(records[0].axes), strict=True)
@@ -127,7 +127,7 @@ class _Signals:
 
     @property
     def moving(self) -> Mask:
-        return np.logical_and.reduce([motion.moving for motion in self.motions])
+        return np.asarray(np.logical_and.reduce([motion.moving for motion in self.motions]))
 
     def equations(self, index: int) -> tuple[Array, Array]:
         """Own columns of an axis in its moving rows, and its effort there."""
@@ -135,9 +135,23 @@ class _Signals:
         return self.filtered(raw[:, places])[self.moving], self.filtered(self.motions[index].effort)[self.moving]
 
 
-def _signals(record: AxisRecord, cutoff: float) -> _Signals:
-    motions = [axis_motion(record, axis, cutoff) for axis in record.axes]
-    return _Signals(record, motions, ROWS_CUTOFF * cutoff)
+def _signals(record: AxisRecord, cutoff: float, bandwidth: float) -> _Signals:
+    return _Signals(record, [axis_motion(record, axis, cutoff) for axis in record.axes], bandwidth)
+
+
+def _scale(signals: Sequence[_Signals], index: int) -> Scale:
+    motions = [one.motions[index] for one in signals]
+    rows = [one.equations(index) for one in signals]
+    left, right = np.vstack([row[0] for row in rows]), np.concatenate([row[1] for row in rows])
+    speed = max(float(np.percentile(np.abs(motion.velocity), 95)) for motion in motions)
+    reach = float(np.ptp(np.concatenate([motion.position for motion in motions])))
+    return Scale(np.linalg.lstsq(left, right, rcond=None)[0], speed, reach)
+
+
+def _first_estimate(signals: _Signals, index: int, scale: Scale) -> Array:
+    """Effort (N,) of an axis by a first estimate, unfiltered."""
+    places, raw = _baseline(signals.motions, index)
+    return np.asarray(raw[:, places] @ scale.values)
 
 
 def _of_record(signals: _Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]]]:
@@ -149,7 +163,6 @@ def _of_record(signals: _Signals, reference: Reference) -> tuple[list[Block], li
 
 def _model(signals: _Signals, index: int, scale: Scale) -> AxisModel:
     axis, motion = signals.record.axes[index], signals.motions[index]
-    places, raw = _baseline(signals.motions, index)
     return AxisModel(
         place=place_of(axis),
         block=index,
@@ -159,7 +172,7 @@ def _model(signals: _Signals, index: int, scale: Scale) -> AxisModel:
         sample_time=signals.record.sample_time,
         filtered=signals.filtered,
         inertia=float(scale.values[0]),
-        effort=np.asarray(raw[:, places] @ scale.values),
+        effort=_first_estimate(signals, index, scale),
         speed=scale.speed,
         reach=scale.reach,
         others=tuple((o.name, m) for o, m in zip(signals.record.axes, signals.motions, strict=True) if m is not motion),
@@ -246,4 +259,4 @@ def _across(parts: Sequence[Candidate]) -> Candidate:
         return tuple(one for each in series for one in each)
 
     exact = contribution if first.contribution is not None else None
-    return Candidate(first.effect, first.where, first.parameters, variants, exact, first.drift)
+    return Candidate(first.effect, first.where, first.parameters, variants, exact, first.drift, first.least)
