@@ -8,6 +8,9 @@ from functools import partial
 from typing import Final, Protocol
 
 from emulator.firmware.drive import DriveApplication
+from emulator.firmware.drive.faults import OF_TRIP
+from emulator.firmware.drive.faults import Fault as DriveFault
+from emulator.firmware.emergency import ErrorRegister
 from emulator.firmware.network import DeviceNetwork
 from hil.buses.frame_kinds import ERROR_FRAME, PROTOCOL_ERROR
 from hil.faults.agenda import Agenda
@@ -103,10 +106,13 @@ def _babble(fault: Fault, reach: Reach) -> Begin:
 
 def _trip(fault: Fault, reach: Reach) -> Begin:
     drive = reach.devices.nodes[reach.places.drive(fault.place)].application
+    code = int(fault.number("code"))
+    known = {one.code: one for one in OF_TRIP.values()}
+    cause = known.get(code, DriveFault(code, ErrorRegister.GENERIC))
 
     def begin() -> End:
         if isinstance(drive, DriveApplication):
-            drive.fail(int(fault.number("code")))
+            drive.fail(cause)
         return _nothing
 
     return begin
