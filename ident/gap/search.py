@@ -108,11 +108,11 @@ class Regression:
     def whitener(self, variants: Sequence[int]) -> Whitener:
         """Colour of what the baseline and these variants leave, fitted by turns with them."""
         design = np.hstack([self.rows.baseline, self.columns_of(variants)])
-        residual = self.rows.target - design @ _least_squares(design, self.rows.target)
+        residual = self.rows.target - design @ least_squares(design, self.rows.target)
         for _ in range(WEIGHTED_FITS):
             whitener = fit_whitener(self.rows, residual, design.shape[1])
             white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
-            residual = self.rows.target - design @ _least_squares(white[:, :-1], white[:, -1])
+            residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
         return whitener
 
     def white(self, whitener: Whitener, given: Sequence[int]) -> White:
@@ -139,7 +139,7 @@ class Regression:
         """Likelihood of the baseline with some variants."""
         whitener = self.whitener(variants)
         white = self.white(whitener, variants)
-        coefficients = _least_squares(white.baseline, white.target)
+        coefficients = least_squares(white.baseline, white.target)
         residual = white.target - white.baseline @ coefficients
         least = [self.rows.layout[variant].least for variant in variants for _ in range(self._width(variant))]
         taken = coefficients[self.rows.baseline.shape[1] :]
@@ -173,13 +173,22 @@ class Regression:
         place = self.rows.layout[variant].place
         return int(place.stop - place.start)
 
-    def _prior_rows(self, width: int) -> Array:
+    def prior_residual(self, baseline: Array) -> Array:
+        """What is known beforehand of the parameters, minus these, in standard deviations; empty without a model."""
         nominal = self.problem.nominal
-        assert nominal is not None
-        prior = np.zeros((self._prior, width))
-        prior[:, 0] = nominal.values / nominal.std
-        prior[:, 1 : 1 + self._prior] = np.diag(1 / nominal.std)
-        return prior
+        return np.zeros(0) if nominal is None else (nominal.values - baseline) / nominal.std
+
+    def prior_jacobian(self, width: int) -> Array:
+        """Derivative of what `prior_residual` is compared with, by `width` values, the parameters in front."""
+        nominal = self.problem.nominal
+        if nominal is None:
+            return np.zeros((0, width))
+        return np.eye(len(nominal.std), width) / nominal.std[:, None]
+
+    def _prior_rows(self, width: int) -> Array:
+        parameters = self.rows.baseline.shape[1]
+        target = self.prior_residual(np.zeros(parameters))
+        return np.column_stack([target, self.prior_jacobian(width - 1)])
 
 
 @dataclass(frozen=True)
@@ -276,7 +285,8 @@ def _stretches(rows: Rows, duration: float) -> NDArray[np.int64]:
     return number
 
 
-def _least_squares(design: Array, target: Array) -> Array:
+def least_squares(design: Array, target: Array) -> Array:
+    """Coefficients of columns of any scale; of dependent ones, the smallest."""
     scale = np.linalg.norm(design, axis=0)
     scale[scale == 0] = 1.0
     return np.asarray(np.linalg.lstsq(design / scale, target, rcond=1e-7)[0] / scale)

@@ -1,0 +1,230 @@
+"""The joint refit of parameters and effects: exact where a candidate is nonlinear, with deviations that hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.gap.problem import Problem
+from ident.gap.rows import Column, Rows
+from ident.gap.search import Regression, least_squares
+from ident.gap.whitening import Whitener
+
+Array = NDArray[np.float64]
+Series = list[Array | None]
+
+MOST_STEPS: Final = 15
+HALVINGS: Final = 6
+DIFFERENCE: Final = 1e-4
+"""Relative step of numerical derivatives."""
+SETTLED: Final = 1e-6
+"""Relative decrease of the sum of squares at which the refit ends."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One effect in a refit.
+
+    Attributes:
+        key: of its candidate.
+        values, std: of its parameters (k,).
+    """
+
+    key: str
+    values: Array
+    std: Array
+
+
+@dataclass(frozen=True)
+class Refit:
+    """Everything fitted jointly.
+
+    Attributes:
+        baseline, baseline_std: of the model's parameters (p,).
+        parts: of the effects.
+        blocks: model of the target of every block, (N,), all samples.
+    """
+
+    baseline: Array
+    baseline_std: Array
+    parts: tuple[Part, ...]
+    blocks: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class _Unknown:
+    """The numbers of one effect: coefficients of its columns, or its parameters where it has an exact form."""
+
+    key: str
+    place: slice
+    exact: Callable[[Array, Array], Series] | None
+    columns: tuple[Array | None, ...]
+    finish: Callable[[Array], Array]
+
+    def series(self, values: Array, baseline: Array) -> Series:
+        """What it adds to every block, (N,)."""
+        if self.exact is not None:
+            return self.exact(values, baseline)
+        return [None if column is None else column @ values for column in self.columns]
+
+
+def refit(
+    problems: Sequence[Problem], regression: Regression, variants: Sequence[int], whitener: Whitener, rows: Array
+) -> Refit:
+    """Gauss and Newton, damped, from the linear solution.
+
+    Args:
+        problems: to fit and to confirm, as the rows were made of.
+        regression: their rows.
+        variants: effects.
+        whitener: weights of the rows.
+        rows: (n,) which rows are fitted.
+    """
+    model = _Model(problems, regression, variants, whitener, rows)
+    found = model.start
+    cost = model.cost(found)
+    for _ in range(MOST_STEPS if model.nonlinear else 0):
+        step = least_squares(model.jacobian(found), model.residual(found))
+        tried = [found + 0.5**halving * step for halving in range(HALVINGS)]
+        better = next((one for one in tried if model.cost(one) < cost), None)
+        if better is None:
+            break
+        decrease, found, cost = cost - model.cost(better), better, model.cost(better)
+        if decrease < SETTLED * cost:
+            break
+    return model.result(found)
+
+
+class _Model:
+    """Residual of the whitened rows as a function of one vector: the baseline's parameters, then those of effects."""
+
+    def __init__(
+        self,
+        problems: Sequence[Problem],
+        regression: Regression,
+        variants: Sequence[int],
+        whitener: Whitener,
+        chosen: Array,
+    ) -> None:
+        self.regression, self.whitener, self.chosen = regression, whitener, chosen
+        self.rows: Rows = regression.rows
+        self.size = self.rows.baseline.shape[1]
+        linear = self._linear(variants)
+        self.unknowns: list[_Unknown] = []
+        parts, taken = [linear[: self.size]], self.size
+        for variant in variants:
+            column = self.rows.layout[variant]
+            width = column.place.stop - column.place.start
+            unknown, start = _unknown(problems, column, linear[taken : taken + width], sum(len(p) for p in parts))
+            self.unknowns.append(unknown)
+            parts.append(start)
+            taken += width
+        self.start = np.concatenate(parts)
+
+    @property
+    def nonlinear(self) -> bool:
+        return any(unknown.exact is not None for unknown in self.unknowns)
+
+    def residual(self, values: Array) -> Array:
+        """Whitened rows that are fitted, then what is known beforehand."""
+        model = self.rows.baseline @ values[: self.size]
+        for unknown in self.unknowns:
+            model = model + self.rows.stack(unknown.series(values[unknown.place], values[: self.size]))
+        white = self.whitener.apply(self.rows, self.rows.target - model)[self.chosen]
+        return np.append(white, self.regression.prior_residual(values[: self.size]))
+
+    def cost(self, values: Array) -> float:
+        residual = self.residual(values)
+        return float(residual @ residual)
+
+    def jacobian(self, values: Array) -> Array:
+        """Derivative of the model of the same rows, (n + prior, all values)."""
+        columns = [self.rows.baseline]
+        for unknown in self.unknowns:
+            columns.append(self._derivative(unknown, values[unknown.place], values[: self.size]))
+        white = self.whitener.apply(self.rows, np.hstack(columns))[self.chosen]
+        prior = self.regression.prior_jacobian(white.shape[1])
+        return np.vstack([white, prior])
+
+    def result(self, values: Array) -> Refit:
+        """Parameters with standard deviations, and the model of every block."""
+        covariance = self._covariance(values)
+        blocks = [block.baseline @ values[: self.size] for block, _ in self.rows.blocks]
+        parts = []
+        for unknown in self.unknowns:
+            own = values[unknown.place]
+            series = unknown.series(own, values[: self.size])
+            blocks = [model if one is None else model + one for model, one in zip(blocks, series, strict=True)]
+            turn = _gradient(unknown.finish, own)
+            spread = turn @ covariance[unknown.place, unknown.place] @ turn.T
+            parts.append(Part(unknown.key, unknown.finish(own), np.sqrt(np.maximum(np.diag(spread), 0.0))))
+        deviations = np.sqrt(np.diag(covariance)[: self.size])
+        return Refit(values[: self.size], deviations, tuple(parts), tuple(blocks))
+
+    def _linear(self, variants: Sequence[int]) -> Array:
+        design = np.hstack([self.rows.baseline, self.regression.columns_of(variants)])
+        white = self.whitener.apply(self.rows, np.column_stack([design, self.rows.target]))[self.chosen]
+        prior = self.regression.prior_jacobian(design.shape[1])
+        known = self.regression.prior_residual(np.zeros(self.size))
+        return least_squares(np.vstack([white[:, :-1], prior]), np.append(white[:, -1], known))
+
+    def _derivative(self, unknown: _Unknown, values: Array, baseline: Array) -> Array:
+        if unknown.exact is None:
+            return self.rows.stack(unknown.columns, len(values))
+
+        def stacked(moved: Array) -> Array:
+            return self.rows.stack(unknown.series(moved, baseline))
+
+        return _gradient(stacked, values)
+
+    def _covariance(self, values: Array) -> Array:
+        """Sandwich over the stretches of the surrogates, nowhere below what white rows would give."""
+        jacobian, residual = self.jacobian(values), self.residual(values)
+        scale = np.linalg.norm(jacobian, axis=0)
+        scale[scale == 0] = 1.0
+        inverse = np.linalg.pinv(jacobian.T / scale[:, None] @ (jacobian / scale), rcond=1e-12, hermitian=True)
+        stretch = self.regression.stretch[self.chosen]
+        scores = (jacobian / scale)[: len(stretch)] * residual[: len(stretch), None]
+        starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
+        sums = np.add.reduceat(scores, starts, axis=0)
+        freedom = len(starts) / max(len(starts) - 1, 1)
+        robust = inverse @ (freedom * sums.T @ sums) @ inverse
+        lift = np.sqrt(np.maximum(np.diag(inverse) / np.maximum(np.diag(robust), np.finfo(float).tiny), 1.0))
+        return np.asarray(robust * np.outer(lift, lift) / np.outer(scale, scale))
+
+
+def _unknown(problems: Sequence[Problem], column: Column, coefficients: Array, first: int) -> tuple[_Unknown, Array]:
+    candidates = [problem.candidates[column.candidate] for problem in problems]
+    variant = candidates[0].variants[column.variant]
+    finish = variant.start or _same
+    columns = tuple(part for candidate in candidates for part in candidate.variants[column.variant].columns)
+    if candidates[0].contribution is None:
+        place = slice(first, first + len(coefficients))
+        return _Unknown(candidates[0].key, place, None, columns, finish), coefficients
+
+    def exact(values: Array, baseline: Array) -> Series:
+        forms = [candidate.contribution for candidate in candidates]
+        return [one for form in forms if form is not None for one in form(values, baseline)]
+
+    start = np.asarray(finish(coefficients), dtype=float)
+    return _Unknown(candidates[0].key, slice(first, first + len(start)), exact, columns, _same), start
+
+
+def _same(values: Array) -> Array:
+    return values
+
+
+def _gradient(function: Callable[[Array], Array], values: Array) -> Array:
+    """Numerical derivative (n, k)."""
+    columns = []
+    for index, value in enumerate(values):
+        step = max(DIFFERENCE * abs(float(value)), 1e-9)
+        ahead, behind = values.copy(), values.copy()
+        ahead[index] += step
+        behind[index] -= step
+        columns.append((np.asarray(function(ahead)) - np.asarray(function(behind))) / (2 * step))
+    return np.stack(columns, axis=1)
