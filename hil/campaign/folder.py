@@ -188,7 +188,9 @@ def _restore(folder: RunFolder, manifest: Mapping[str, Any], vehicle: VehicleDes
         raise ValueError(f"schema {manifest['schema']!r}, not {SCHEMA!r}")
     if manifest["cycle"] != network.cycle_period:
         raise ValueError(f"a cycle of {manifest['cycle']!r} s, not that of {network.path}")
-    excitations = {Step(step): _excitation_of(entry) for step, entry in manifest["excitations"].items()}
+    excitations: dict[str, Excitation] = {
+        Step(step): _excitation_of(entry) for step, entry in manifest["excitations"].items()
+    }
     plan = assemble_plan(
         vehicle,
         excitations,

@@ -22,7 +22,7 @@ from ident.campaign.controller import Controller
 from ident.campaign.reference import Reference
 from ident.errors import CampaignError
 from ident.estimate.identify import FIT_STEPS, identify
-from ident.records.record import Step
+from ident.records.record import Step, base_step
 from ident.vehicle.parameters import Parameters
 
 ALIGNED: Final = 1.5e-4
@@ -115,19 +115,19 @@ class CampaignRunner:
     def _master(self) -> Master:
         return Master(self._bus, self._clock, self._run.network, self._recorder)
 
-    def _drive_session(self, steps: Sequence[Step]) -> None:
+    def _drive_session(self, steps: Sequence[str]) -> None:
         """Boot, drive some steps, shut down. Whatever takes long is computed before: enabled drives want a SYNC."""
         references = [self._plan.reference(step, self._parameters(step)) for step in steps]
         with steady_memory(), self._master() as master:
             master.boot()
             master.enable()
             for reference in references:
-                if reference.step is not Step.WHEEL_LIFTED:
+                if base_step(reference.step) is not Step.WHEEL_LIFTED:
                     self._align(master, reference.step)
                 self._drive(master, reference)
         self.overruns += master.overruns
 
-    def _align(self, master: Master, step: Step) -> None:
+    def _align(self, master: Master, step: str) -> None:
         target = self._plan.posture(step)
         for _ in range(ALIGNMENTS):
             start = np.array(master.exchange(_STANDSTILL).steering_angles)
@@ -161,10 +161,10 @@ class CampaignRunner:
         self._progress(reference.step, total, total)
         return sample.steering_angles
 
-    def _parameters(self, step: Step) -> Parameters:
+    def _parameters(self, step: str) -> Parameters:
         """Feed-forward by the guesses, and for the validation by what the steps before it have shown."""
         vehicle = self._plan.vehicle
-        if step is not Step.LANE_CHANGE or not self._identifiable():
+        if step != Step.LANE_CHANGE or not self._identifiable():
             return vehicle.prior
         record = read_run(self._run.folder.path)
         result = identify(record, vehicle.geometry, known_inertia=self._run.known_inertia)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
 import numpy as np
@@ -23,7 +23,7 @@ from ident.campaign.reference import (
     excitation_reference,
     lane_change_reference,
 )
-from ident.campaign.steps import EXCITATIONS, ORDER, PERIODS, Posture
+from ident.campaign.steps import EXCITATIONS, ORDER, PERIODS, Posture, StepSpec
 from ident.errors import CampaignError
 from ident.estimate.filters import Processing
 from ident.records.record import Step
@@ -81,32 +81,34 @@ class Plan:
         periods: repeats of an excitation, before the factor of its step.
         cycle: T_s [s].
         manoeuvre: the lane change.
+        specs: the excitation steps that there are.
     """
 
     vehicle: VehicleDescription
-    steps: tuple[Step, ...]
-    excitations: Mapping[Step, Excitation]
+    steps: tuple[str, ...]
+    excitations: Mapping[str, Excitation]
     designs: Mapping[str, LoopDesign]
     limits: Mapping[str, LoopLimits]
     periods: int
     cycle: float
     manoeuvre: LaneChange
+    specs: Mapping[str, StepSpec] = field(default_factory=lambda: EXCITATIONS)
 
-    def reference(self, step: Step, parameters: Parameters) -> Reference:
+    def reference(self, step: str, parameters: Parameters) -> Reference:
         """The reference of a step, feed-forward by `parameters`."""
-        if step is Step.LANE_CHANGE:
+        if step == Step.LANE_CHANGE:
             return lane_change_reference(self.manoeuvre, self.vehicle, parameters, self.cycle)
-        spec, series = EXCITATIONS[step], self.excitations[step].series
+        spec, series = self.specs[step], self.excitations[step].series
         periods = math.ceil(self.periods * spec.repeats)
         return excitation_reference(spec, series, periods, self.vehicle, parameters, self.cycle)
 
-    def alignment(self, start: Array, step: Step, parameters: Parameters) -> Reference:
+    def alignment(self, start: Array, step: str, parameters: Parameters) -> Reference:
         """Reference that takes the steering from `start` (2,) to where `step` begins."""
         return alignment_reference(start, self.posture(step), self.vehicle, parameters, self.cycle)
 
-    def posture(self, step: Step) -> Array:
+    def posture(self, step: str) -> Array:
         """Steering angles (2,) [rad] at which a step begins."""
-        posture = EXCITATIONS[step].posture if step in EXCITATIONS else Posture.AHEAD
+        posture = self.specs[step].posture if step in self.specs else Posture.AHEAD
         return posture.angles(self.vehicle.geometry)
 
     def room(self) -> Room:
@@ -121,11 +123,12 @@ def make_plan(
     vehicle: VehicleDescription,
     generator: np.random.Generator,
     *,
-    steps: Sequence[Step],
+    steps: Sequence[str],
     periods: int,
     cycle: float,
     processing: Processing | None = None,
-    progress: Callable[[Step], None] | None = None,
+    progress: Callable[[str], None] | None = None,
+    specs: Mapping[str, StepSpec] = EXCITATIONS,
 ) -> Plan:
     """Optimise the excitations of the steps, then assemble the plan.
 
@@ -137,26 +140,28 @@ def make_plan(
         cycle: T_s [s].
         processing: of the estimate, whose mask the excitation takes into account.
         progress: called with every excitation that is ready.
+        specs: the excitation steps that there are.
 
     Raises:
         CampaignError: there is no step, or the steps need more floor than the vehicle file allows.
     """
-    excitations: dict[Step, Excitation] = {}
+    excitations: dict[str, Excitation] = {}
     for step in ORDER:
-        if step in steps and step in EXCITATIONS:
-            excitations[step] = _excitation(step, vehicle, processing or Processing(), generator)
+        if step in steps and step in specs:
+            excitations[step] = _excitation(specs[step], vehicle, processing or Processing(), generator)
             if progress is not None:
                 progress(step)
-    return assemble_plan(vehicle, excitations, steps=steps, periods=periods, cycle=cycle)
+    return assemble_plan(vehicle, excitations, steps=steps, periods=periods, cycle=cycle, specs=specs)
 
 
 def assemble_plan(
     vehicle: VehicleDescription,
-    excitations: Mapping[Step, Excitation],
+    excitations: Mapping[str, Excitation],
     *,
-    steps: Sequence[Step],
+    steps: Sequence[str],
     periods: int,
     cycle: float,
+    specs: Mapping[str, StepSpec] = EXCITATIONS,
 ) -> Plan:
     """A plan from excitations that are given; designs the loops and checks the room.
 
@@ -181,32 +186,33 @@ def assemble_plan(
         periods=periods,
         cycle=cycle,
         manoeuvre=LaneChange(),
+        specs=specs,
     )
     _check_room(plan)
     return plan
 
 
 def _excitation(
-    step: Step, vehicle: VehicleDescription, processing: Processing, generator: np.random.Generator
+    spec: StepSpec, vehicle: VehicleDescription, processing: Processing, generator: np.random.Generator
 ) -> Excitation:
-    spec, geometry = EXCITATIONS[step], vehicle.geometry
+    geometry = vehicle.geometry
     problem = Problem(
         spec, axis_of(spec, vehicle), vehicle.limits, geometry.gear_ratio, vehicle.prior["m_ch"], processing
     )
     return optimise(problem, generator)
 
 
-def _design(step: Step, axis: Axis, cycle: float) -> LoopDesign:
+def _design(step: str, axis: Axis, cycle: float) -> LoopDesign:
     steered = EXCITATIONS[step].coordinate in STEERING_LOOPS
     return design_loop(axis, cycle, STEERING_RATE_CYCLES if steered else 1)
 
 
-def _limits(step: Step, axis: Axis) -> LoopLimits:
+def _limits(step: str, axis: Axis) -> LoopLimits:
     family = EXCITATIONS[step].coordinate.split("_")[0]
     return LoopLimits(FOLLOWING_ERRORS[family], INTEGRAL_SHARE * axis.coulomb, DEAD_BANDS[family], HOLDING_BAND)
 
 
-def _by_loop(by_step: Mapping[Step, T]) -> dict[str, T]:
+def _by_loop(by_step: Mapping[str, T]) -> dict[str, T]:
     loops = {EXCITATIONS[step].coordinate: value for step, value in by_step.items()}
     beta = loops.pop("beta")
     return {**loops, **dict.fromkeys(LIFTED_LOOPS, beta)}

@@ -57,7 +57,7 @@ class Reference:
         path: (N, 3) pose that the chassis is to take, from the start of the step [m, m, rad].
     """
 
-    step: Step
+    step: str
     coordinate: str
     sample_time: float
     tracks: Mapping[str, Track]

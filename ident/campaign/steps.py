@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -47,7 +49,7 @@ class StepSpec:
         repeats: periods of this step per period asked of a campaign: steering friction is the noisiest.
     """
 
-    step: Step
+    step: str
     mode: Mode | None
     coordinate: str
     posture: Posture
@@ -71,7 +73,7 @@ _SPECS: Final = (
     StepSpec(Step.ROTATION, Mode.ROTATION, "gamma", Posture.ROTATION, 8.0, 6, 1.2, 1.4, 2.5),
     StepSpec(Step.LATERAL, Mode.LATERAL, "y", Posture.ACROSS, 8.0, 6, 0.8, 1.0, 2.0),
 )
-EXCITATIONS: Final = {spec.step: spec for spec in _SPECS}
+EXCITATIONS: Final[Mapping[str, StepSpec]] = MappingProxyType({spec.step: spec for spec in _SPECS})
 """Excitation steps in the order in which they are driven."""
 
 ORDER: Final = (
