@@ -15,6 +15,7 @@ from ident.gap.search import Regression, least_squares
 from ident.gap.whitening import Whitener
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Series = list[Array | None]
 
 MOST_STEPS: Final = 15
@@ -73,7 +74,7 @@ class _Unknown:
 
 
 def refit(
-    problems: Sequence[Problem], regression: Regression, variants: Sequence[int], whitener: Whitener, rows: Array
+    problems: Sequence[Problem], regression: Regression, variants: Sequence[int], whitener: Whitener, rows: Mask
 ) -> Refit:
     """Gauss and Newton, damped, from the linear solution.
 
@@ -108,7 +109,7 @@ class _Model:
         regression: Regression,
         variants: Sequence[int],
         whitener: Whitener,
-        chosen: Array,
+        chosen: Mask,
     ) -> None:
         self.regression, self.whitener, self.chosen = regression, whitener, chosen
         self.rows: Rows = regression.rows

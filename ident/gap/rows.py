@@ -7,7 +7,7 @@ left of the residual is what repeats. Thinning takes every n-th row: the filter 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -99,10 +99,6 @@ class Rows:
         """Rows of one series a block, (N,) or (N, k); None stands for zeros."""
         return _stack([kept for _, kept in self.blocks], series, width)
 
-    def spread(self, residuals: Callable[[Block], Array]) -> list[tuple[float, int]]:
-        """Variance between the repeats of a series of every block and its degrees of freedom; 0 of them without any."""
-        return [_spread(residuals(block), kept) for block, kept in self.blocks]
-
 
 def kept_rows(block: Block) -> Kept:
     """Moving rows, thinned; repeats beside each other where there are at least two."""
@@ -186,10 +182,3 @@ def _through(runs: Sequence[Indices]) -> Indices:
         numbered.append(part + end)
         end += int(part.max(initial=0)) + 1
     return np.concatenate(numbered)
-
-
-def _spread(series: Array, kept: Kept) -> tuple[float, int]:
-    repeats, rows = kept.samples.shape
-    if repeats < 2 or rows == 0:
-        return 0.0, 0
-    return float(series[kept.samples].var(axis=0, ddof=1).mean()), (repeats - 1) * rows

@@ -100,6 +100,10 @@ class Regression:
         """Candidate of every variant."""
         return [column.candidate for column in self.rows.layout]
 
+    def key(self, variant: int) -> str:
+        """Key of a variant's candidate."""
+        return self.problem.candidates[self.owners[variant]].key
+
     def columns_of(self, variants: Sequence[int]) -> Array:
         """Raw columns (n, ...) of some variants."""
         places = [self.rows.columns[:, self.rows.layout[variant].place] for variant in variants]

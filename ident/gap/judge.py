@@ -1,0 +1,268 @@
+"""From two problems to an answer: search, refit, how much is closed, what is left, and which verdict that makes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from ident.gap.diagnosis import Diagnosis, Gap, NamedEffect, Share, Verdict
+from ident.gap.generic import Generic, predict_generic
+from ident.gap.probability import Calibration, Ranked, calibration, rank
+from ident.gap.problem import Candidate, Problem
+from ident.gap.refit import Part, Refit, refit
+from ident.gap.remainder import Floors, held_out_gap, noise_floors, repeated, shares
+from ident.gap.rows import make_rows
+from ident.gap.search import Found, Regression, Settings, Slot, least_squares, search
+from ident.gap.whitening import Predictor, Whitener
+from ident.vehicle.quantities import Quantity
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When a remainder makes a verdict.
+
+    Attributes:
+        deviations: by which a smooth function must predict the confirming rows for there to be a remainder.
+        size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
+        explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
+    """
+
+    deviations: float = 3.0
+    size: float = 0.25
+    explained: float = 0.5
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect that was found.
+
+    Attributes:
+        candidate: what and where.
+        part: its parameters, all records fitted.
+        ranked: what else may stand in its place.
+        probability: that its name is right.
+        log_evidence, log_predictive: of all records, and what the confirming rows add.
+        closed: share of the removable held-out gap that it closes, the other effects given.
+        biased: how much each parameter of the model shifts when the effect is left out, by name, in standard
+            deviations.
+    """
+
+    candidate: Candidate
+    part: Part
+    ranked: Ranked
+    probability: float
+    log_evidence: float
+    log_predictive: float
+    closed: float
+    biased: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Everything that was found.
+
+    Attributes:
+        verdict: of the search and of what is left.
+        causes: most probable first.
+        doubtful: what came out best beside the causes and was not believed, with its probability, best first.
+        gap: held out.
+        where: shares of the gap.
+        invisible: names of effects that are nowhere visible.
+        before, after: refits of all rows without and with the causes.
+        significance: that the best candidate is there by chance.
+        remainder: what a smooth function still predicts.
+        repeated_before, repeated_after: rms over noise of what repeats, by step and coordinate.
+        problem: that was fitted.
+    """
+
+    verdict: Verdict
+    causes: tuple[Cause, ...]
+    doubtful: Mapping[str, float]
+    gap: Gap
+    where: tuple[Share, ...]
+    invisible: tuple[str, ...]
+    before: Refit
+    after: Refit
+    significance: float
+    remainder: Generic
+    repeated_before: Mapping[str, float]
+    repeated_after: Mapping[str, float]
+    problem: Problem
+
+    def diagnosis(self, next_experiment: str | None = None) -> Diagnosis:
+        """The answer as it is written down."""
+        coverage = calibration().coverage
+        return Diagnosis(
+            verdict=self.verdict,
+            effects=tuple(_named(cause, coverage) for cause in self.causes) if self.verdict is Verdict.EFFECT else (),
+            where=self.where,
+            gap=self.gap,
+            invisible=self.invisible,
+            next_experiment=next_experiment,
+        )
+
+
+def judge(
+    fit: Problem, confirm: Problem, *, seed: int, settings: Settings | None = None, limits: Limits | None = None
+) -> Findings:
+    """Find the causes of a gap.
+
+    Args:
+        fit: records that effects are looked for in.
+        confirm: independent records, or a part of the same ones that took no part (`split_problem`).
+        seed: of the surrogates and of the smooth function.
+        settings, limits: thresholds.
+    """
+    # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"):
+        regression = Regression(fit, make_rows(fit, confirm), settings or Settings(), seed)
+        return _Judgement((fit, confirm), regression, search(regression), limits or Limits(), seed).findings()
+
+
+class _Judgement:
+    """What is computed once the search has ended."""
+
+    def __init__(
+        self, problems: Sequence[Problem], regression: Regression, found: Found, limits: Limits, seed: int
+    ) -> None:
+        self.problems, self.regression, self.found, self.limits = problems, regression, found, limits
+        self.rows = regression.rows
+        self.weights = _weights(regression, found)
+        self.bare = predict_generic(regression, found.whitener, (), seed)
+        self.rest = predict_generic(regression, found.whitener, found.variants, seed)
+        everything = np.ones(len(self.rows), dtype=bool)
+        self.after = refit(problems, regression, found.variants, found.whitener, everything)
+        self.before = refit(problems, regression, (), found.whitener, everything)
+        self.floors = self._floors()
+        self.untouched = self._held_out_models(())
+
+    def findings(self) -> Findings:
+        gap, causes = self._gap(self.found.variants), self._causes()
+        verdict = self._verdict()
+        return Findings(
+            verdict=verdict,
+            causes=causes,
+            doubtful=self._doubtful(),
+            gap=gap,
+            where=shares(self.rows, self.floors, self._judged()),
+            invisible=invisible_names(self.regression),
+            before=self.before,
+            after=self.after,
+            significance=min(slot.evidence.significance for slot in (self.found.rest, *self.found.slots)),
+            remainder=self.rest,
+            repeated_before=repeated(self.rows, self.floors, self._judged()),
+            repeated_after=repeated(self.rows, self.floors, self.after.blocks),
+            problem=self.problems[0],
+        )
+
+    def _doubtful(self) -> Mapping[str, float]:
+        rest = self.found.rest
+        return rank(self.regression, rest, rest.variants[0], calibration()).probabilities if rest.variants else {}
+
+    def _judged(self) -> Sequence[Array]:
+        """The model that is judged: as given, or refitted to all records."""
+        nominal = self.problems[0].nominal
+        if nominal is None:
+            return self.before.blocks
+        return [block.baseline @ nominal.values for block, _ in self.rows.blocks]
+
+    def _held_out_models(self, variants: Sequence[int]) -> Sequence[Array]:
+        """Models of all blocks, fitted without the confirming rows, every coordinate in units of its residual."""
+        if not variants and self.problems[0].nominal is not None:
+            return self._judged()
+        return refit(self.problems, self.regression, variants, self.weights, ~self.rows.confirming).blocks
+
+    def _gap(self, variants: Sequence[int]) -> Gap:
+        return held_out_gap(self.rows, self.floors, self.untouched, self._held_out_models(variants))
+
+    def _floors(self) -> Floors:
+        stacked = self.rows.stack(list(self.after.blocks))
+        return noise_floors(self.rows, self.after.blocks, self.rows.target - stacked - self.rest.prediction)
+
+    def _explained(self) -> float:
+        """Share of what can be predicted of the confirming rows that the effects taken explain."""
+        named = max(self.bare.before - self.rest.before, 0.0)
+        return named / max(named + self.rest.gain, np.finfo(float).tiny)
+
+    def _verdict(self) -> Verdict:
+        left = self._is_left()
+        if not self.found.variants:
+            return Verdict.UNKNOWN if left else Verdict.NONE
+        return Verdict.UNKNOWN if left and self._explained() < self.limits.explained else Verdict.EFFECT
+
+    def _is_left(self) -> bool:
+        sizes = repeated(self.rows, self.floors, self.after.blocks)
+        large = not sizes or max(sizes.values()) > self.limits.size
+        return large and self.rest.deviations > self.limits.deviations and self.rest.gain > 0
+
+    def _causes(self) -> tuple[Cause, ...]:
+        settings = calibration()
+        whole = self._gap(self.found.variants)
+        made = [
+            self._cause(index, variant, slot, whole, settings)
+            for index, (variant, slot) in enumerate(zip(self.found.variants, self.found.slots, strict=True))
+        ]
+        return tuple(sorted(made, key=lambda cause: (-round(cause.probability, 2), -round(cause.closed, 1))))
+
+    def _cause(self, index: int, variant: int, slot: Slot, whole: Gap, settings: Calibration) -> Cause:
+        others = tuple(other for place, other in enumerate(self.found.variants) if place != index)
+        ranked = rank(self.regression, slot, variant, settings)
+        candidate = self.problems[0].candidates[self.regression.owners[variant]]
+        without = self._gap(others)
+        removable = whole.before**2 - whole.floor**2
+        closed = (without.after**2 - whole.after**2) / removable if removable > 0 else 0.0
+        return Cause(
+            candidate=candidate,
+            part=self.after.parts[index],
+            ranked=ranked,
+            probability=min(ranked.names.get(str(candidate.effect), 0.0), settings.ceiling),
+            log_evidence=slot.of(variant),
+            log_predictive=float(slot.evidence.log_predictive[variant]),
+            closed=closed,
+            biased=self._biased(others),
+        )
+
+    def _biased(self, others: Sequence[int]) -> Mapping[str, float]:
+        everything = np.ones(len(self.rows), dtype=bool)
+        without = refit(self.problems, self.regression, others, self.found.whitener, everything)
+        shift = (without.baseline - self.after.baseline) / np.maximum(self.after.baseline_std, np.finfo(float).tiny)
+        return dict(zip(self.problems[0].names, shift.tolist(), strict=True))
+
+
+def invisible_names(regression: Regression) -> tuple[str, ...]:
+    """Names of effects of which no place and no variant leaves anything beside the baseline."""
+    sizes = regression.evidence(regression.whitener(()), ()).directions.sizes
+    candidates = regression.problem.candidates
+    visible = {candidates[owner].effect for owner, size in zip(regression.owners, sizes, strict=True) if size}
+    names = dict.fromkeys(candidate.effect for candidate in candidates)
+    return tuple(str(name) for name in names if name not in visible)
+
+
+def _weights(regression: Regression, found: Found) -> Whitener:
+    """Every group of rows in units of the rms of what the search leaves of it, no colour."""
+    rows = regression.rows
+    design = np.hstack([rows.baseline, regression.columns_of(found.variants)])
+    white = found.whitener.apply(rows, np.column_stack([design, rows.target]))
+    residual = rows.target - design @ least_squares(white[:, :-1], white[:, -1])
+    deviations = [float(np.sqrt(np.mean(residual[rows.group == group] ** 2))) for group in np.unique(rows.group)]
+    tiny = np.finfo(float).tiny
+    return Whitener(tuple(Predictor((np.zeros(0),), np.array([max(one, tiny)])) for one in deviations))
+
+
+def _named(cause: Cause, coverage: float) -> NamedEffect:
+    values = zip(cause.candidate.parameters, cause.part.values, cause.part.std, strict=True)
+    name = str(cause.candidate.effect)
+    return NamedEffect(
+        name=name,
+        where=cause.candidate.where,
+        parameters={p.name: Quantity(float(value), p.unit, "diagnosis", float(std)) for p, value, std in values},
+        probability=round(cause.probability, 2),
+        ambiguity_set=cause.ranked.ambiguity_set(name, coverage),
+        gap_closed_held_out=cause.closed,
+    )
