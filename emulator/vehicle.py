@@ -10,12 +10,11 @@ from typing import Final, Self
 
 from emulator.drive import Drive
 from emulator.effects.assembly import Mechanics
-from emulator.effects.injection import inject
+from emulator.effects.injection import AnyEffect, inject
 from emulator.encoder import Encoder
 from emulator.engine import DEFAULT_SOLVER, Engine, SolverSettings
 from emulator.noise import Disturbances
 from emulator.prototype import Prototype
-from ident.vehicle.effects import Effect
 
 SETTLING_TIME: Final = 0.5
 """Time that the vehicle gets to come to rest on the floor [s]; it does not count as simulated time."""
@@ -81,9 +80,9 @@ class EmulatedVehicle:
         noise_scale: float = 1.0,
         engine_step: float = 1e-3,
         solver: SolverSettings = DEFAULT_SOLVER,
-        effects: Sequence[Effect] = (),
+        effects: Sequence[AnyEffect] = (),
     ) -> None:
-        injection = inject(prototype, effects)
+        injection = inject(prototype, effects, engine_step)
         prototype = injection.built.prototype
         self.engine = Engine(prototype, step_size=engine_step, gui=gui, settings=solver, built=injection.built)
         self._mechanics = Mechanics(injection, self.engine)

@@ -87,24 +87,27 @@ class Mechanics:
 
     def act(self, time: float, rates: Sequence[float], torques: list[float]) -> None:
         """Add to the joint torques (8,) of a step what the drives and the effects do in it."""
-        for wheel, (stage, motor) in enumerate(zip(self._stages, self._motors, strict=True)):
-            torques[_ROLLING + wheel] += stage.wheel_torque if motor is None else self._through(wheel, motor, rates)
+        driven = [
+            stage.wheel_torque if motor is None else self._through(wheel, motor, rates)
+            for wheel, (stage, motor) in enumerate(zip(self._stages, self._motors, strict=True))
+        ]
+        for joint, torque in enumerate(driven, start=_ROLLING):
+            torques[joint] += torque
         if self._laws:
-            self._obey_laws(time, rates, torques)
+            engine = self._engine
+            self._obey_laws(Moment(time, engine, engine.angles(), rates, torques, driven, list(engine.coulomb)))
 
     def after_step(self) -> None:
         """The engine has made its step."""
         if self._sensed is not None:
             self._sensed.advance()
 
-    def _obey_laws(self, time: float, rates: Sequence[float], torques: list[float]) -> None:
-        engine = self._engine
-        moment = Moment(time, engine, engine.angles(), rates, torques, list(engine.coulomb))
+    def _obey_laws(self, moment: Moment) -> None:
         for law in self._laws:
             law(moment)
         if moment.coulomb != self._coulomb:
             self._coulomb = moment.coulomb
-            engine.set_friction(moment.coulomb)
+            self._engine.set_friction(moment.coulomb)
 
     def _through(self, wheel: int, motor: MotorTorque, rates: Sequence[float]) -> float:
         """Torque on a wheel whose drive has flaws [Nm]."""

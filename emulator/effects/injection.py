@@ -21,6 +21,7 @@ from emulator.effects.friction import (
 from emulator.effects.laws import JointAxis, Law, joint_axes, side_index, wheel_index
 from emulator.effects.sensors import EncoderFlaws
 from emulator.effects.transmissions import MOTOR_SHARE
+from emulator.effects.unlibraried import Unlibraried
 from emulator.prototype import Prototype
 from ident.errors import UserError
 from ident.vehicle.effects import Effect, EffectName
@@ -77,19 +78,29 @@ class Injection:
         return replace(self, encoders=(left, right))
 
 
+AnyEffect = Effect | Unlibraried
+"""An effect of the library, or one that it does not have."""
+
 Injector = Callable[[Injection, Effect], Injection]
 
 
-def inject(prototype: Prototype, effects: Sequence[Effect]) -> Injection:
+def inject(prototype: Prototype, effects: Sequence[AnyEffect], step: float) -> Injection:
     """The prototype with all `effects`.
+
+    Args:
+        prototype: without them.
+        effects: in any order.
+        step: of the engine [s].
 
     Raises:
         UserError: two effects exclude each other, or an effect is larger than this vehicle can have.
     """
-    _refuse_twice(effects)
-    injection = Injection(AsBuilt.of(prototype))
+    known = [effect for effect in effects if isinstance(effect, Effect)]
+    strange = tuple(law for effect in effects if isinstance(effect, Unlibraried) for law in effect.laws(step))
+    _refuse_twice(known)
+    injection = Injection(AsBuilt.of(prototype), strange)
     # Changed parameters first: they derive the bodies anew, which others then load, shift and replace.
-    for effect in sorted(effects, key=lambda effect: effect.name is not EffectName.PARAMETER_CHANGE):
+    for effect in sorted(known, key=lambda effect: effect.name is not EffectName.PARAMETER_CHANGE):
         injection = INJECTORS[effect.name](injection, effect)
     return _without_motor_inertia(injection)
 

@@ -21,6 +21,7 @@ class Moment:
         angles: (8,) of the joints [rad].
         rates: (8,) of the joints [rad/s].
         torques: (8,) on the joints in this step [Nm].
+        drive_torques: (4,) what of them comes from the drives [Nm].
         coulomb: (8,) largest torque of dry friction in this step [Nm].
     """
 
@@ -29,6 +30,7 @@ class Moment:
     angles: Sequence[float]
     rates: Sequence[float]
     torques: list[float]
+    drive_torques: Sequence[float]
     coulomb: list[float]
 
 

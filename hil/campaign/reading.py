@@ -8,15 +8,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.campaign.folder import RunFolder, open_run
+from hil.campaign.folder import Run, RunFolder, open_run
 from hil.frames import DecodedLog, decode_log
 from hil.network import Network
 from hil.recorder import INTERLUDE, LogFormat, finished_steps, step_of
 from ident.campaign.plan import Plan
-from ident.campaign.steps import EXCITATIONS
 from ident.errors import RecordError
 from ident.records.files import read_record
-from ident.records.record import Record, Segment, Step, make_segment
+from ident.records.record import Record, Segment, make_segment
 
 
 def read_run(path: Path) -> Record:
@@ -25,8 +24,17 @@ def read_run(path: Path) -> Record:
     Raises:
         DataFileError, RecordError: the folder or a log in it cannot be used.
     """
-    run = open_run(path)
-    logs = finished_steps(RunFolder(path).frames)
+    return read_driven(open_run(path))
+
+
+def read_driven(run: Run) -> Record:
+    """Record of the finished steps of a run, decoded from its frames.
+
+    Raises:
+        RecordError: there is no finished step, or a log cannot be used.
+    """
+    path = run.folder.path
+    logs = finished_steps(run.folder.frames)
     if not logs:
         raise RecordError(f"{path} holds no finished step.", "Drive the campaign, or go on with it (--resume).")
     return _record(logs, run.network, run.plan, str(path))
@@ -117,7 +125,7 @@ def _segment(step: str, path: Path, log: DecodedLog, network: Network, plan: Pla
 
 
 def _periods(step: str, samples: int, plan: Plan | None) -> NDArray[np.int64]:
-    if plan is None or step not in {str(known) for known in EXCITATIONS}:
+    if plan is None or step not in plan.excitations:
         return np.full(samples, -1, dtype=np.int64)
-    planned = plan.reference(Step(step), plan.vehicle.prior).period
+    planned = plan.reference(step, plan.vehicle.prior).period
     return np.asarray(planned[:samples], dtype=np.int64)

@@ -46,7 +46,7 @@ def test_every_effect_has_an_injector() -> None:
 @pytest.mark.parametrize("prototype", ["prototype", "compact"])
 def test_every_effect_can_be_at_each_of_its_places(name: EffectName, where: str, prototype: str) -> None:
     effect = make_effect(name, where, {EFFECTS[name].size.name: SMALL[name]})
-    plain, changed = inject(load_prototype(prototype), ()), inject(load_prototype(prototype), [effect])
+    plain, changed = (inject(load_prototype(prototype), some, 1e-3) for some in ((), [effect]))
     assert repr(changed) != repr(plain)
 
 
@@ -68,7 +68,7 @@ def test_several_effects_act_at_once(make: Make) -> None:
 )
 def test_effects_that_exclude_each_other_are_refused(texts: tuple[str, str]) -> None:
     with pytest.raises(UserError, match="exclude each other"):
-        inject(load_prototype(), [parse_effect(text) for text in texts])
+        inject(load_prototype(), [parse_effect(text) for text in texts], 1e-3)
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_effects_that_exclude_each_other_are_refused(texts: tuple[str, str]) -> 
 )
 def test_what_no_vehicle_can_have_is_refused_with_a_reason(text: str, reason: str) -> None:
     with pytest.raises(UserError, match=reason):
-        inject(load_prototype(), [parse_effect(text)])
+        inject(load_prototype(), [parse_effect(text)], 1e-3)
 
 
 def test_without_effects_nothing_stands_between_drives_and_joints(make: Make) -> None:

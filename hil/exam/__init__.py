@@ -1,0 +1,1 @@
+"""The withheld exam of the gap diagnosis: sealing, diagnosing, scoring."""

@@ -1,0 +1,63 @@
+"""The two short campaigns of an exam case, planned once: one to fit, and another to confirm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from ident.campaign.plan import Plan, make_plan
+from ident.campaign.steps import EXCITATIONS, PERIODS, StepSpec
+from ident.records.record import Step
+from ident.vehicle.description import VehicleDescription
+
+STEPS: Final = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION)
+"""The four steps of the paper."""
+
+
+def _shortened(periods: Mapping[Step, float]) -> Mapping[str, StepSpec]:
+    """The campaign's steps with other periods [s], four of each."""
+    return MappingProxyType(
+        {step: replace(EXCITATIONS[step], period=period, repeats=1.0) for step, period in periods.items()}
+    )
+
+
+FITTING: Final = _shortened({Step.STEERING_LEFT: 3.5, Step.STEERING_RIGHT: 3.5, Step.STRAIGHT: 5.5, Step.ROTATION: 5.5})
+"""80 s with the standstill around the steps."""
+
+CONFIRMING: Final = _shortened(
+    {Step.STEERING_LEFT: 2.5, Step.STEERING_RIGHT: 2.5, Step.STRAIGHT: 4.25, Step.ROTATION: 4.25}
+)
+"""62 s."""
+
+
+@dataclass(frozen=True)
+class ExamPlans:
+    """What every case of an exam drives.
+
+    Attributes:
+        fit: the campaign that the diagnosis fits.
+        confirm: the campaign with another excitation, on which it has to hold.
+    """
+
+    fit: Plan
+    confirm: Plan
+
+
+def plan_exam(vehicle: VehicleDescription, seed: int, cycle: float) -> ExamPlans:
+    """Optimise both excitations.
+
+    Args:
+        vehicle: what is known of it.
+        seed: of the random starts.
+        cycle: T_s [s].
+    """
+    generators = [np.random.default_rng(stream) for stream in np.random.SeedSequence(seed).spawn(2)]
+    fit, confirm = (
+        make_plan(vehicle, generator, steps=STEPS, periods=PERIODS, cycle=cycle, specs=specs)
+        for generator, specs in zip(generators, (FITTING, CONFIRMING), strict=True)
+    )
+    return ExamPlans(fit, confirm)
