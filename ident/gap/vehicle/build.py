@@ -23,6 +23,7 @@ from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EffectName
 from ident.vehicle.geometry import Geometry
+from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES, PARAMETER_UNITS, Parameters
 from ident.vehicle.vectorised import Vectorised
 
@@ -34,6 +35,9 @@ DIAGNOSED: Final = tuple(step for step in ROWS if step is not Step.LANE_CHANGE)
 
 OVERSAMPLED: Final = 3.0
 """Rate at which rows are evaluated, in units of the cutoff of the smoothed signals over π."""
+
+ASKEW: Final = 0.4
+"""Steering angle beyond which a wheel that steers at standstill pushes the chassis aside [rad]."""
 
 PRIOR_WEIGHT: Final = 1e-4
 """Of the vehicle file's guesses against the rows, per unit-norm column: only what no row shows is taken from them."""
@@ -179,7 +183,7 @@ def _sources(signals: Signals, spec: RowsOfStep, processing: Processing) -> Iter
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
     if names:
-        rolling = _near_motion(signals, processing)[::stride]
+        rolling = _rolling(signals, spec, processing)[::stride]
         yield Source(channel=Channel.KINEMATIC, moving=(rolling,) * len(names), **common)  # type: ignore[arg-type]
 
 
@@ -192,13 +196,18 @@ def _moving(signals: Signals, spec: RowsOfStep, coordinate: str, processing: Pro
     return moving_rows(signals.joint_rates[:, joints], processing, signals.segment.sample_time)
 
 
-def _near_motion(signals: Signals, processing: Processing) -> NDArray[np.bool_]:
-    """Rows in or near motion, away from the ends of the filter: where nothing moves, no constraint can be broken."""
+def _rolling(signals: Signals, spec: RowsOfStep, processing: Processing) -> NDArray[np.bool_]:
+    """Rows in or near motion, away from the ends of the filter: where nothing moves, no constraint can be broken.
+
+    Steering at standstill, wheels that stand askew push the chassis aside, and what holds it there creeps.
+    """
     dt = signals.segment.sample_time
     width = 2 * round(processing.guard / dt) + 1
     moving = np.any(np.abs(signals.joint_rates) > processing.moving, axis=1)
     near = ndimage.binary_dilation(moving, np.ones(width, dtype=bool))
     near[: width // 2] = near[-(width // 2) :] = False
+    if spec.mode is Mode.ALIGNMENT:
+        near &= np.all(np.abs(signals.alpha) < ASKEW, axis=1)
     return np.asarray(near)
 
 
