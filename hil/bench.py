@@ -13,6 +13,7 @@ from emulator.firmware.description import read_network_description
 from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.network import DeviceNetwork
 from hil.buses.lockstep import LockstepHub
+from hil.buses.wire import BusLoad
 from hil.clock import SimulatedClock
 from hil.faults import FaultInjector
 from hil.faults.devices import Slippery
@@ -28,6 +29,7 @@ class LockstepBench:
         network: network file, for the nodes and for bit rate and cycle period of the bus.
         ground: under its wheels, to be made slippery; `emulator.ground.Ground` for the emulated vehicle.
         seed: of the randomness of faults.
+        delays: frames wait for arbitration and take their bit times.
 
     Attributes:
         bus: the master's endpoint.
@@ -47,10 +49,11 @@ class LockstepBench:
         *,
         ground: Slippery | None = None,
         seed: int = 0,
+        delays: bool = False,
     ) -> None:
         self.vehicle = vehicle
         described = load_network(network)
-        self._hub = LockstepHub(described.cycle_period, described.bit_rate, described.sync_cob_id)
+        self._hub = LockstepHub(described.cycle_period, described.bit_rate, described.sync_cob_id, delays=delays)
         self.bus: can.BusABC = self._hub.open()
         self.clock: SimulatedClock = self._hub.clock
         description = read_network_description(network)
@@ -68,6 +71,15 @@ class LockstepBench:
     def open_bus(self) -> can.BusABC:
         """A further endpoint of the bus, for a listener or a second master."""
         return self._hub.open()
+
+    def listen(self, hear: Callable[[can.Message], None]) -> None:
+        """Call `hear` with a copy of every frame, as it passes."""
+        self._hub.listen(hear)
+
+    @property
+    def load(self) -> BusLoad:
+        """How busy the bus was."""
+        return self._hub.load
 
     def close(self) -> None:
         """Take the master's endpoint off the bus."""

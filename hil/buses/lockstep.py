@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
+from typing import Protocol
 
 import can
 
@@ -18,6 +20,15 @@ from hil.buses.frame_kinds import ERROR_FRAME, device_frame
 from hil.buses.wire import BusLoad, Wire, arbitration_key
 from hil.buses.wired import Devices, Send, WiredDevices
 from hil.clock import SimulatedClock
+
+
+class _Endpoint(Protocol):
+    def deliver(self, message: can.Message) -> None: ...
+
+
+@dataclass(frozen=True)
+class _Listener:
+    deliver: Callable[[can.Message], None]
 
 
 class LockstepHub:
@@ -40,7 +51,7 @@ class LockstepHub:
     def __init__(self, cycle_period: float, bit_rate: float, sync_cob_id: int = 0x80, *, delays: bool = False) -> None:
         self._cycle_period = cycle_period
         self._sync_cob_id = sync_cob_id
-        self._endpoints: list[LockstepBus] = []
+        self._endpoints: list[_Endpoint] = []
         self._wire = Wire(bit_rate)
         self._delays = delays
         self._devices: Devices | None = None
@@ -65,6 +76,10 @@ class LockstepHub:
         bus = LockstepBus(self)
         self._endpoints.append(bus)
         return bus
+
+    def listen(self, hear: Callable[[can.Message], None]) -> None:
+        """Call `hear` with a copy of every frame, as it passes; it must not touch the bus."""
+        self._endpoints.append(_Listener(hear))
 
     def leave(self, bus: LockstepBus) -> None:
         """Take an endpoint off the bus."""

@@ -41,6 +41,10 @@ class FaultInjector:
         network: names of the places.
         ground: under the wheels, None where there is none.
         seed: of all randomness.
+
+    Attributes:
+        devices: the nodes.
+        log: everything that was injected so far.
     """
 
     def __init__(
@@ -59,6 +63,7 @@ class FaultInjector:
         self._running: dict[int, End] = {}
         self._injected: dict[int, Injected] = {}
         self._count = 0
+        self.log: list[Injected] = []
         self.devices = make(vehicle, self._from_node)
         self._reach = Reach(self.devices, vehicle, Places(network), ground, self._agenda, send)
 
@@ -82,7 +87,8 @@ class FaultInjector:
         begin = self._prepare(fault, np.random.default_rng((self._seed, self._count)))
         number, now = self._count, self.time
         self._count += 1
-        self._injected[number] = Injected(number, fault, now + fault.start, now + fault.end)
+        self._injected[number] = injected = Injected(number, fault, now + fault.start, now + fault.end)
+        self.log.append(injected)
         if fault.start > 0.0:
             self._agenda.at(now + fault.start, lambda: self._begin(number, begin))
         else:

@@ -1,0 +1,34 @@
+"""Hardware-in-the-loop tests that read like sentences: `expect(all_drives("fault")).within(0.1)`.
+
+The pytest plugin itself is `hil.pytest_plugin.plugin`; tests import from here what they expect.
+"""
+
+from hil.pytest_plugin.conditions import (
+    Condition,
+    all_drives,
+    at_rest,
+    drive,
+    emergency,
+    frame,
+    heartbeat_state,
+    moving,
+    travelled,
+)
+from hil.pytest_plugin.expectations import Expect
+from hil.pytest_plugin.health import Symptom
+from hil.pytest_plugin.world import World
+
+__all__ = [
+    "Condition",
+    "Expect",
+    "Symptom",
+    "World",
+    "all_drives",
+    "at_rest",
+    "drive",
+    "emergency",
+    "frame",
+    "heartbeat_state",
+    "moving",
+    "travelled",
+]

@@ -1,0 +1,186 @@
+"""The pytest plugin: fixtures of a bench, recordings and pictures of failures, the health of the bus.
+
+Loaded by pytest in every project, it imports nothing heavy before a test asks for a fixture.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import pytest
+
+if TYPE_CHECKING:
+    import can
+
+    from emulator.vehicle import EmulatedVehicle
+    from hil.clock import SimulatedClock
+    from hil.faults import FaultInjector
+    from hil.pytest_plugin.expectations import Expect
+    from hil.pytest_plugin.health import Symptom
+    from hil.pytest_plugin.recording import Artifacts
+    from hil.pytest_plugin.world import World
+
+_WORLD: Final[pytest.StashKey[World]] = pytest.StashKey()
+_ARTIFACTS: Final[pytest.StashKey[Artifacts]] = pytest.StashKey()
+_ALLOWED: Final[pytest.StashKey[set[Symptom]]] = pytest.StashKey()
+_FAILED: Final[pytest.StashKey[bool]] = pytest.StashKey()
+_MARKER: Final = (
+    "hil(prototype='prototype', network=None, seed=1, delays=False, noise=1.0): what the fixture `bench` is built of"
+)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Where recordings go, and which tests leave them."""
+    group = parser.getgroup("hil", "hardware in the loop")
+    group.addoption("--hil-artifacts", default="hil-artifacts", help="Folder for recordings and timelines.")
+    group.addoption(
+        "--hil-keep", choices=("failed", "all"), default="failed", help="Which tests leave a recording and a timeline."
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Make the marker known."""
+    config.addinivalue_line("markers", _MARKER)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Attach recording and timeline to the report of a test that failed."""
+    report = yield
+    world = item.stash.get(_WORLD, None)
+    if world is None or report.when == "setup":
+        return report
+    if report.when == "call":
+        item.stash[_FAILED] = report.failed
+    keep = item.config.getoption("--hil-keep") == "all" and report.when == "call"
+    if report.failed or keep:
+        _attach(item, report)
+    return report
+
+
+@pytest.fixture
+def vehicle(request: pytest.FixtureRequest) -> Iterator[EmulatedVehicle]:
+    """An emulated vehicle on the floor, at rest; the marker `hil` says which."""
+    from emulator.prototype import load_prototype
+    from emulator.vehicle import EmulatedVehicle
+
+    asked = _asked(request)
+    prototype = load_prototype(str(asked.get("prototype", "prototype")))
+    noise = float(asked.get("noise", 1.0))
+    with EmulatedVehicle(prototype, seed=int(asked.get("seed", 1)), noise_scale=noise) as emulated:
+        yield emulated
+
+
+@pytest.fixture
+def bench(request: pytest.FixtureRequest, vehicle: EmulatedVehicle) -> Iterator[World]:
+    """The vehicle behind a bus in lockstep; at the end the bus has to be well, see the fixture `allow`."""
+    from emulator.ground import Ground
+    from hil.bench import LockstepBench
+    from hil.campaign.folder import network_file_of
+    from hil.network import load_network
+    from hil.pytest_plugin.recording import Artifacts
+    from hil.pytest_plugin.world import World
+
+    asked = _asked(request)
+    seed, delays = int(asked.get("seed", 1)), bool(asked.get("delays", False))
+    network = Path(asked.get("network") or network_file_of(str(asked.get("prototype", "prototype"))))
+    with LockstepBench(vehicle, network, ground=Ground(vehicle.engine), seed=seed, delays=delays) as lockstep:
+        world = World(lockstep, vehicle, load_network(network))
+        request.node.stash[_WORLD] = world
+        folder = Path(request.config.getoption("--hil-artifacts"))
+        request.node.stash[_ARTIFACTS] = Artifacts(folder / _file_name(request.node.nodeid), request.node.nodeid)
+        yield world
+        _describe(request.node, world, seed)
+        _assert_health(request.node, world)
+
+
+@pytest.fixture
+def bus(bench: World) -> can.BusABC:
+    """The endpoint of the test's own master."""
+    return bench.bus
+
+
+@pytest.fixture
+def clock(bench: World) -> SimulatedClock:
+    """Simulated time."""
+    return bench.clock
+
+
+@pytest.fixture
+def faults(bench: World) -> FaultInjector:
+    """What can go wrong: `faults.add("power@drive_fl:from=1s,to=1.5s")`."""
+    return bench.faults
+
+
+@pytest.fixture
+def expect(bench: World) -> Expect:
+    """Begins a sentence: `expect(at_rest()).within(3.0)`."""
+    from hil.pytest_plugin.expectations import Expect
+
+    return Expect(bench)
+
+
+@pytest.fixture
+def allow(request: pytest.FixtureRequest) -> Callable[..., None]:
+    """Symptoms that this test provokes on purpose: `allow("lost heartbeat", "error frames")`."""
+    from hil.pytest_plugin.health import Symptom
+
+    allowed = request.node.stash.setdefault(_ALLOWED, set())
+
+    def allow_symptoms(*symptoms: str) -> None:
+        allowed.update(Symptom(symptom) for symptom in symptoms)
+
+    return allow_symptoms
+
+
+def _asked(request: pytest.FixtureRequest) -> dict[str, Any]:
+    marker = request.node.get_closest_marker("hil")
+    return {} if marker is None else dict(marker.kwargs)
+
+
+def _file_name(node_id: str) -> str:
+    return re.sub(r"[^\w.-]+", "_", node_id.rpartition("/")[2])
+
+
+def _describe(item: pytest.Item, world: World, seed: int) -> None:
+    """What JUnit XML tells of the test."""
+    load = world.bench.load
+    faults = [str(injected.fault) for injected in world.injected]
+    item.user_properties += [
+        ("hil_seed", seed),
+        ("hil_simulated_seconds", round(world.now, 6)),
+        ("hil_frames", len(world.frames)),
+        ("hil_error_frames", load.errors),
+        ("hil_bus_load_mean", round(load.mean, 4)),
+        ("hil_bus_load_peak", round(load.peak, 4)),
+        *(("hil_fault", fault) for fault in faults),
+    ]
+
+
+def _assert_health(item: pytest.Item, world: World) -> None:
+    """The bus was well, or the test allows that it was not; a test that has failed already says enough."""
+    from hil.pytest_plugin.health import examine
+
+    if item.stash.get(_FAILED, False):
+        return
+    allowed = item.stash.get(_ALLOWED, set())
+    findings = examine(world.frames, world.bench.load.peak, world.network, world.now)
+    wrong = [finding for finding in findings if finding.symptom not in allowed]
+    if wrong:
+        listed = "\n".join(f"  {finding.symptom}: {finding.what}" for finding in wrong)
+        symptoms = ", ".join(dict.fromkeys(f'"{finding.symptom}"' for finding in wrong))
+        pytest.fail(f"The bus was not well:\n{listed}\nIf the test provokes that: allow({symptoms}).", pytrace=False)
+
+
+def _attach(item: pytest.Item, report: pytest.TestReport) -> None:
+    artifacts = item.stash[_ARTIFACTS]
+    files = artifacts.write(item.stash[_WORLD])
+    report.sections.append(("hil", "\n".join(f"{name}: {path}" for name, path in files.items())))
+    properties = [(f"hil_{name}", str(path)) for name, path in files.items()]
+    known = dict(report.user_properties)
+    report.user_properties += [entry for entry in properties if entry[0] not in known]

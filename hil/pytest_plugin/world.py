@@ -1,0 +1,175 @@
+"""The bench as a test sees it: a vehicle behind a bus, simulated time, and everything that was seen on the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import can
+
+from emulator.vehicle import EmulatedVehicle, GroundTruth
+from hil.bench import LockstepBench
+from hil.clock import SimulatedClock
+from hil.faults import FaultInjector
+from hil.faults.injector import Injected
+from hil.master.drive_states import DriveState, decode_state
+from hil.network import DRIVES, Network, Role
+from ident.errors import UserError
+
+_STATUSWORD: Final = 0x6041
+_SAMPLE_PERIOD: Final = 0.01
+_IDLE_STEP: Final = 0.001
+_STUCK: Final = 1000
+"""Steps of a test's controller that may pass without time passing."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What only the simulation knows, taken every 10 ms.
+
+    Attributes:
+        time: [s].
+        speed: of the chassis centre over the floor [m/s].
+        states: of the drives fl, rl, fr, rr; None for a pattern that CiA 402 does not know.
+    """
+
+    time: float
+    speed: float
+    states: tuple[DriveState | None, ...]
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something worth a mark in the timeline: when [s], and what."""
+
+    time: float
+    text: str
+
+
+class World:
+    """A vehicle on a bench, the test's master on its bus, and a record of all that happens.
+
+    Args:
+        bench: the bench.
+        vehicle: the emulated vehicle on it.
+        network: the network file of both.
+
+    Attributes:
+        frames: every frame on the bus so far, in the order of the bus.
+        samples: truth, every 10 ms.
+        notes: marks for the timeline.
+    """
+
+    def __init__(self, bench: LockstepBench, vehicle: EmulatedVehicle, network: Network) -> None:
+        self._bench = bench
+        self.vehicle = vehicle
+        self.network = network
+        self.frames: list[can.Message] = []
+        self.samples: list[Sample] = []
+        self.notes: list[Note] = []
+        self._step: Callable[[], object] | None = None
+        self._next_sample = -math.inf
+        bench.listen(self._hear)
+
+    @property
+    def bus(self) -> can.BusABC:
+        """The endpoint for the test's master."""
+        return self._bench.bus
+
+    @property
+    def clock(self) -> SimulatedClock:
+        """Simulated time."""
+        return self._bench.clock
+
+    @property
+    def bench(self) -> LockstepBench:
+        """The bench below: load, devices, further endpoints."""
+        return self._bench
+
+    @property
+    def faults(self) -> FaultInjector:
+        """What can go wrong between the bus and the nodes."""
+        return self._bench.faults
+
+    @property
+    def injected(self) -> list[Injected]:
+        """Faults that were injected so far."""
+        return self._bench.faults.log
+
+    @property
+    def now(self) -> float:
+        """Simulated time [s]."""
+        return self._bench.clock.now()
+
+    def every_cycle(self, step: Callable[[], object]) -> None:
+        """Let `step` be one cycle of what is tested: `run` and expectations call it again and again.
+
+        It has to let simulated time pass, by a SYNC or by waiting for a frame.
+        """
+        self._step = step
+
+    def run(self, duration: float) -> None:
+        """Go on for `duration` [s] of simulated time."""
+        self.run_until(lambda: False, duration)
+
+    def run_until(self, done: Callable[[], bool], timeout: float) -> bool:
+        """Go on until `done()`, at most for `timeout` [s] of simulated time; what `done` says at the end.
+
+        Raises:
+            UserError: the step of `every_cycle` lets no time pass.
+        """
+        end = round(self.now + timeout, 9)
+        idle = 0
+        while not done():
+            before = self.now
+            if before >= end:
+                return False
+            self._go_on(end)
+            idle = idle + 1 if self.now == before else 0
+            if idle > _STUCK:
+                raise UserError(
+                    "The step given to every_cycle lets no simulated time pass.",
+                    "Let it send SYNC, or wait on the bus.",
+                )
+        return True
+
+    def statusword(self, role: Role) -> int:
+        """6041h of a drive, from its object dictionary: whatever is mapped into its PDOs."""
+        node = self._bench.devices.nodes[self.network.node(role).node_id]
+        return node.object_dictionary.value(_STATUSWORD)
+
+    def drive_state(self, role: Role) -> DriveState | None:
+        """State of a drive; None for a pattern that CiA 402 does not know."""
+        return decode_state(self.statusword(role))
+
+    def truth(self) -> GroundTruth:
+        """The true state of motion."""
+        return self.vehicle.ground_truth()
+
+    def speed(self) -> float:
+        """Speed of the chassis centre over the floor [m/s]."""
+        vx, vy, _ = self.truth().twist
+        return math.hypot(vx, vy)
+
+    def note(self, text: str) -> None:
+        """Mark this instant in the timeline."""
+        self.notes.append(Note(self.now, text))
+
+    def _go_on(self, end: float) -> None:
+        if self._step is not None:
+            self._step()
+        else:
+            self.clock.wait_until(min(round(self.now + _IDLE_STEP, 9), end))
+        if self.now >= self._next_sample:
+            self._sample()
+
+    def _hear(self, message: can.Message) -> None:
+        self.frames.append(message)
+        if message.timestamp >= self._next_sample:
+            self._sample()
+
+    def _sample(self) -> None:
+        self._next_sample = self.now + _SAMPLE_PERIOD
+        self.samples.append(Sample(self.now, self.speed(), tuple(self.drive_state(role) for role in DRIVES)))
