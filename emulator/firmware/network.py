@@ -29,7 +29,7 @@ _IN_FLIGHT = 64
 
 @dataclass(frozen=True)
 class _SyncGroup:
-    """The nodes that listen to one SYNC, and whether they all take it without a number in it."""
+    """The nodes that listen to one SYNC, and whether one without data needs no look by any of them."""
 
     nodes: tuple[Node, ...]
     plain: bool
@@ -117,7 +117,7 @@ class DeviceNetwork:
     def _find_listeners(self) -> None:
         listeners = [node for node in self.nodes.values() if node.network.connected]
         self._groups = {
-            can_id: _SyncGroup(nodes, not any(node.sync.counted for node in nodes))
+            can_id: _SyncGroup(nodes, all(node.sync.plain for node in nodes))
             for can_id in {node.network.sync_id for node in listeners}
             for nodes in [tuple(node for node in listeners if node.network.sync_id == can_id)]
         }

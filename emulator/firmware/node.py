@@ -114,12 +114,12 @@ class Node:
 
     def accepts_sync(self, data: bytes) -> bool:
         """Whether a SYNC is one that this node is configured for; one of another length is an error."""
-        if self.sync.accepts(data):
+        fits = self.sync.accepts(data)
+        if fits:
             self.emergency.end_communication(ErrorCode.SYNC_LENGTH)
-            return True
-        if self.nmt.state in _TALKING:
+        elif self.nmt.state in _TALKING:
             self.emergency.report_communication(ErrorCode.SYNC_LENGTH, len(data))
-        return False
+        return fits
 
     def latch(self) -> None:
         """SYNC: apply the waiting RPDOs, then take the process values of this instant."""

@@ -75,7 +75,7 @@ class FolderMemory:
             document = json.loads(path.read_text(encoding="utf-8"))
             saved_by = document["device"]
             values = {_key(name): _value(text) for name, text in document["values"].items()}
-        except (OSError, ValueError, KeyError, AttributeError) as error:
+        except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
             raise DataFileError(f"{path}: not stored parameters of a node ({error}).", "Delete the file.") from error
         if saved_by != device:
             raise DataFileError(

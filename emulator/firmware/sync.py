@@ -20,7 +20,7 @@ class SyncService:
     Args:
         dictionary: holds 1005h, 1006h and 1019h.
         timers: simulated time.
-        listen: told which CAN identifier is the SYNC, and when numbers in it begin or end.
+        listen: told which CAN identifier is the SYNC, and when `plain` changes.
         produce: transmits a SYNC (CAN identifier, data), and lets this node act on it.
 
     Attributes:
@@ -43,21 +43,23 @@ class SyncService:
         self._cob_id = 0
         self._period = 0
         self._overflow = 0
+        self._misfit = False
         self.counter = 0
         dictionary.on_write(0x1005, 0, self._write_cob_id)
         dictionary.on_write(0x1006, 0, self._write_period)
         dictionary.on_write(0x1019, 0, self._write_overflow)
 
     @property
-    def counted(self) -> bool:
-        """SYNCs carry a number."""
-        return self._overflow > 0
+    def plain(self) -> bool:
+        """SYNCs carry no number, and the last one did not either: nothing about them needs a look."""
+        return not self._overflow and not self._misfit
 
     def reset(self) -> None:
         """Take everything from the dictionary."""
         read = self._dictionary.value
         self._cob_id, self._period, self._overflow = read(0x1005), read(0x1006), read(0x1019)
         self.counter = 0
+        self._misfit = False
         self._listen(self._cob_id & IDENTIFIER)
 
     def run(self, running: bool) -> None:
@@ -67,10 +69,13 @@ class SyncService:
 
     def accepts(self, data: bytes) -> bool:
         """Whether a SYNC has the length that it should have; takes its number."""
-        if len(data) != (1 if self._overflow else 0):
-            return False
-        self.counter = data[0] if data else 0
-        return True
+        misfit = len(data) != (1 if self._overflow else 0)
+        if misfit is not self._misfit:
+            self._misfit = misfit
+            self._listen(self._cob_id & IDENTIFIER)
+        if not misfit:
+            self.counter = data[0] if data else 0
+        return not misfit
 
     def _restart(self) -> None:
         if self._timer is not None:

@@ -8,6 +8,7 @@ import pytest
 from emulator.firmware.description import read_network_description
 from emulator.firmware.flywheels import Flywheels
 from emulator.firmware.network import DeviceNetwork
+from emulator.firmware.storage import Memory
 
 NETWORK_FILE = Path(__file__).parents[3] / "hil" / "data" / "network.toml"
 
@@ -15,11 +16,14 @@ NETWORK_FILE = Path(__file__).parents[3] / "hil" / "data" / "network.toml"
 class Wire:
     """The devices with nothing but frames and time between them and the test."""
 
-    def __init__(self) -> None:
+    def __init__(self, memory: Memory | None = None) -> None:
         self.vehicle = Flywheels()
         self.sent: list[tuple[int, bytes]] = []
         self.devices = DeviceNetwork(
-            self.vehicle, read_network_description(NETWORK_FILE), lambda can_id, data: self.sent.append((can_id, data))
+            self.vehicle,
+            read_network_description(NETWORK_FILE),
+            lambda can_id, data: self.sent.append((can_id, data)),
+            memory,
         )
 
     def frames(self) -> list[tuple[int, bytes]]:
@@ -31,6 +35,12 @@ class Wire:
         """Put a frame on the bus; what the devices answered."""
         self.frames()
         self.devices.receive(can_id, data)
+        return self.frames()
+
+    def remote(self, can_id: int) -> list[tuple[int, bytes]]:
+        """Put a remote frame on the bus; what the devices answered."""
+        self.frames()
+        self.devices.receive_remote(can_id)
         return self.frames()
 
     def wait(self, duration: float) -> list[tuple[int, bytes]]:
