@@ -25,7 +25,7 @@ DRIVE_UNWIND_TIME: Final = 0.05
 CREEP_STIFFNESS: Final = 1e7
 """Contact force per slip velocity [N s/m]: under 100 N a wheel slips by 10 micrometres a second."""
 
-STICK_TIME: Final = 0.1
+STICK_TIME: Final = 0.065
 """How long motion below stiction goes on before it is held [s]; chosen in docs/adr/0008."""
 
 MODE_TOLERANCE: Final = 0.02
@@ -47,6 +47,11 @@ _DYNAMIC: Final = {
     "d_vw": "Viscous friction of one wheel drive, at the wheel",
     "d_cw": "Coulomb friction of one wheel drive, at the wheel",
     "B_w": "Inertia of one wheel drive, at the wheel",
+}
+
+_STICTION: Final = {
+    "stick": "Creep of {} that its friction remembers, over epsilon times stick_time",
+    "lag": "Lagged load on the friction of {}",
 }
 
 _GEOMETRY: Final = {
@@ -115,11 +120,15 @@ def _states(inputs: Inputs) -> list[Variable]:
 def _hidden_states(inputs: Inputs) -> list[Variable]:
     local = Causality.LOCAL
     stick = [
-        *(
-            _state(f"stick_alpha_{side}", f"Stiction of the steering, {text}", "1", 1.0, local)
-            for side, text in _SIDES.items()
-        ),
-        *(_state(f"stick_beta_{wheel}", f"Stiction of wheel {wheel}", "1", 1.0, local) for wheel in WHEELS),
+        row
+        for name, text in _STICTION.items()
+        for row in (
+            *(
+                _state(f"{name}_alpha_{side}", text.format(f"the {word} steering"), "1", 1.0, local)
+                for side, word in _SIDES.items()
+            ),
+            *(_state(f"{name}_beta_{wheel}", text.format(f"wheel {wheel}"), "1", 1.0, local) for wheel in WHEELS),
+        )
     ]
     integrals = [
         _state(f"integral_{wheel}", f"Integral part of the torque of drive {wheel}", "Nm", 0.1, local)

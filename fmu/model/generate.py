@@ -22,7 +22,7 @@ from ident.vehicle.symbolic import Expression
 COUPLED: Final = 9
 """The first states, the rates, are those that the equations couple; the solver eliminates the others."""
 
-TOLERANCE: Final = 1e-5
+TOLERANCE: Final = 1e-4
 """Of the solver, where nobody sets one."""
 
 FIRST_STEP: Final = 1e-3

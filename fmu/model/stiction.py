@@ -20,6 +20,9 @@ from ident.vehicle.symbolic import Expression
 _HELD_BELOW: Final = 3.0
 """Rate over ε below which it counts as creep: tanh 3 = 0.995."""
 
+_STEADY: Final = 0.3
+"""How much the load may run ahead of its lagged value."""
+
 _FADING: Final = 5.0
 """How many times faster σ fades in motion than it grows in creep. Above 5 a joint close to its limit may not stand."""
 
@@ -30,11 +33,19 @@ def held_rates(x: Symbols, p: Symbols, rates: Expression) -> Expression:
 
 
 def memory_rate(x: Symbols, p: Symbols, rates: Expression) -> Expression:
-    """σ̇ (6,) [1/s]: steering left and right, then the wheels; from q̇ (9,)."""
+    """σ̇ and η̇ (12,) [1/s]: steering left and right, then the wheels; from q̇ (9,)."""
     relative = rates[3:] / p["epsilon"]
+    load = relative + _memory(x)
+    lag = load - _lagged(x)
     creeping = 1 / (1 + (relative / _HELD_BELOW) ** 4)
-    return (creeping * relative - _FADING * (1 - creeping) * _memory(x)) / p["stick_time"]
+    steady = 1 / (1 + (lag / _STEADY) ** 4)
+    growth = creeping * steady * relative - _FADING * (1 - creeping) * _memory(x)
+    return ca.vertcat(growth, lag) / p["stick_time"]
 
 
 def _memory(x: Symbols) -> Expression:
     return ca.vertcat(x.sides("stick_alpha_{}"), x.wheels("stick_beta_{}"))
+
+
+def _lagged(x: Symbols) -> Expression:
+    return ca.vertcat(x.sides("lag_alpha_{}"), x.wheels("lag_beta_{}"))
