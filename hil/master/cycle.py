@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import can
@@ -107,6 +108,34 @@ class Cycle:
             self._link.transmit(message)
         self._pace()
         self._link.transmit(self._sync)
+
+    @contextlib.contextmanager
+    def watching(self) -> Iterator[None]:
+        """Inside, `statuswords` follow whatever TPDOs are dispatched, for as long as `sync_only` is used."""
+        watchers = [
+            (can_id, self._watcher(drive, slot, field))
+            for drive, (slot, field) in enumerate(self._status)
+            for can_id, of_slot in self._layout.slots.items()
+            if of_slot == slot
+        ]
+        for can_id, watch in watchers:
+            self._link.subscribe(can_id, watch)
+        try:
+            yield
+        finally:
+            for can_id, watch in watchers:
+                self._link.unsubscribe(can_id, watch)
+
+    def _watcher(self, drive: int, slot: int, field: int) -> Callable[[int, bytearray, float], None]:
+        layout = self._layout.structs[slot]
+
+        def watch(_can_id: int, data: bytearray, _timestamp: float) -> None:
+            if len(data) == layout.size:
+                words = list(self.statuswords)
+                words[drive] = layout.unpack(data)[field]
+                self.statuswords = tuple(words)
+
+        return watch
 
     def _pace(self) -> None:
         if self._origin is None:

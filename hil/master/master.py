@@ -15,6 +15,7 @@ from hil.master.cycle import Cycle, Sample
 from hil.master.drive_states import (
     ENABLED_MASK,
     ENABLED_PATTERN,
+    POWERED,
     QUICK_STOP,
     TO_OPERATION_ENABLED,
     TO_SWITCH_ON_DISABLED,
@@ -32,8 +33,8 @@ _NMT_START = 0x01
 _NMT_PRE_OPERATIONAL = 0x80
 _RAMP_TIME = 0.1
 """Time in which an orderly end takes the torques to zero [s]."""
-_STOP_TIME = 0.2
-"""Time that an emergency stop gives the drives for their quick stop [s]."""
+_STOP_TIME = 2.0
+"""Longest time that an emergency stop waits for the drives to come to rest [s]."""
 _STANDSTILL = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -160,17 +161,21 @@ class Master:
         self._started = False
 
     def emergency_stop(self) -> None:
-        """Quick stop for every drive, whoever still answers and whether or not it can be recorded; then all nodes
-        pre-operational.
+        """Quick stop for every drive, whoever still answers and whether or not it can be recorded; when all that
+        answer are without power, or after two seconds, all nodes pre-operational.
         """
         for command in self._cycle.commands:
             command.set_torque(0.0)
             command.set_controlword(QUICK_STOP)
-        with self._link.record_may_fail():
+        with self._link.record_may_fail(), self._cycle.watching():
             for _ in range(round(_STOP_TIME / self._network.cycle_period)):
                 # A frame that the interface refuses now may pass a cycle later.
                 with contextlib.suppress(BusError):
                     self._cycle.sync_only()
+                with contextlib.suppress(BusError):
+                    self._supervision.tick(self._cycle.time)
+                if not POWERED.intersection(self.drive_states):
+                    break
             with contextlib.suppress(BusError):
                 self._command_nmt(_NMT_PRE_OPERATIONAL)
         self._started = self._enabled = False

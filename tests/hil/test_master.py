@@ -12,6 +12,7 @@ import can
 import pytest
 
 from emulator.firmware.flywheels import Flywheels
+from emulator.power_stage import Trip
 from hil.bench import LockstepBench
 from hil.master import Master
 from hil.master.drive_states import TO_OPERATION_ENABLED, DriveState, decode_state
@@ -218,7 +219,7 @@ def test_the_others_are_stopped_before_a_faulty_drive_is_asked_for_its_error(ben
     """A drive that has lost its supply answers no SDO; its neighbours must not push on for the time-out."""
     master = enabled(bench, network)
     drive(master, 5, torque=0.5)
-    bench.devices.nodes[2].application.fail(0x3220)
+    flywheels.drives[1].trip(Trip.OVER_VOLTAGE)
     object_access, still_enabled = master.object_access(network.drives[1]), []
     read = object_access.read
 
@@ -320,26 +321,25 @@ def test_a_refused_configuration_names_node_object_and_abort(bench, network) -> 
 def test_a_fault_while_driving_is_reported_with_its_code(bench, network, flywheels) -> None:
     master = enabled(bench, network)
     master.exchange((0.5,) * 4)
-    bench.devices.nodes[2].application.fail(0x2310)
+    flywheels.drives[1].trip(Trip.OVER_CURRENT)
     with pytest.raises(DriveStateError) as caught:
         drive(master, 3, torque=0.5)
     assert "node 2 (drive_rl)" in caught.value.what
     assert "2310h" in caught.value.what
 
 
-def test_a_fault_that_was_there_before_is_reset_on_the_way_to_operation_enabled(bench, network) -> None:
+def test_a_fault_that_was_there_before_is_reset_on_the_way_to_operation_enabled(bench, network, flywheels) -> None:
     master = Master(bench.bus, bench.clock, network)
     master.boot()
-    bench.devices.nodes[1].application.fail(0x2310)
+    flywheels.drives[0].trip(Trip.OVER_CURRENT)
     master.enable()
     assert master.drive_states == (DriveState.OPERATION_ENABLED,) * 4
 
 
-def test_a_drive_that_cannot_be_enabled_is_named(bench, network) -> None:
+def test_a_drive_that_cannot_be_enabled_is_named(bench, network, flywheels) -> None:
     master = Master(bench.bus, bench.clock, network)
     master.boot()
-    fail = bench.devices.nodes[4].application.fail
-    bench.devices.nodes[4].application.sample = lambda: fail(0x3220)
+    bench.devices.nodes[4].application.sample = lambda: flywheels.drives[3].trip(Trip.OVER_VOLTAGE)
     start = bench.clock.now()
     with pytest.raises(DriveStateError, match=r"node 4 \(drive_rr\) does not reach operation enabled"):
         master.enable()
@@ -376,7 +376,7 @@ def test_drives_trip_when_the_master_dies(bench, network, flywheels) -> None:
     master = enabled(bench, network)
     for _ in range(100):
         master.exchange((0.5,) * 4)
-    bench.clock.wait_until(bench.clock.now() + 0.3)
+    bench.clock.wait_until(bench.clock.now() + 1.5)
     assert not any(drive.enabled for drive in flywheels.drives)
 
 
