@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Final
-from xml.etree import ElementTree as xml
+from xml.etree.ElementTree import Element, SubElement
 
 from fmu.compiling import FLAGS
 from fmu.description import document
@@ -28,12 +28,12 @@ def terminals(inputs: Inputs) -> bytes:
     Args:
         inputs: what drives the wheels.
     """
-    root = xml.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
-    picture = xml.SubElement(root, "GraphicalRepresentation")
+    root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    picture = SubElement(root, "GraphicalRepresentation")
     corners = {"x1": "0", "y1": "0", "x2": str(_ICON_SIZE), "y2": str(_ICON_SIZE)}
-    xml.SubElement(picture, "CoordinateSystem", corners, suggestedScalingFactorTo_mm="0.2")
-    xml.SubElement(picture, "Icon", corners)
-    group = xml.SubElement(root, "Terminals")
+    SubElement(picture, "CoordinateSystem", corners, suggestedScalingFactorTo_mm="0.2")
+    SubElement(picture, "Icon", corners)
+    group = SubElement(root, "Terminals")
     for wheel in WHEELS:
         command = f"{_COMMANDS[inputs]}_{wheel}"
         members = {"command": command, "angle": f"beta_{wheel}", "rate": f"beta_{wheel}_dot"}
@@ -47,11 +47,11 @@ def terminals(inputs: Inputs) -> bytes:
     return document(root)
 
 
-def _plug(group: xml.Element, name: str, description: str, members: dict[str, str]) -> None:
-    terminal = xml.SubElement(group, "Terminal", name=name, matchingRule="plug", description=description)
+def _plug(group: Element, name: str, description: str, members: dict[str, str]) -> None:
+    terminal = SubElement(group, "Terminal", name=name, matchingRule="plug", description=description)
     for member, variable in members.items():
         attributes = {"variableName": variable, "memberName": member, "variableKind": "signal"}
-        xml.SubElement(terminal, "TerminalMemberVariable", attributes)
+        SubElement(terminal, "TerminalMemberVariable", attributes)
 
 
 def build_description(sources: Sequence[str]) -> bytes:
@@ -60,13 +60,13 @@ def build_description(sources: Sequence[str]) -> bytes:
     Args:
         sources: names of the files to compile.
     """
-    root = xml.Element("fmiBuildDescription", fmiVersion="3.0")
-    configuration = xml.SubElement(
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = SubElement(
         root, "BuildConfiguration", modelIdentifier=MODEL_IDENTIFIER, description="Any C99 compiler"
     )
     options = " ".join(flag for flag in FLAGS if flag.startswith(("-O", "-f")))
-    files = xml.SubElement(configuration, "SourceFileSet", language="C99", compilerOptions=options)
+    files = SubElement(configuration, "SourceFileSet", language="C99", compilerOptions=options)
     for name in sources:
-        xml.SubElement(files, "SourceFile", name=name)
-    xml.SubElement(configuration, "Library", name="m", description="Mathematical functions of C")
+        SubElement(files, "SourceFile", name=name)
+    SubElement(configuration, "Library", name="m", description="Mathematical functions of C")
     return document(root)

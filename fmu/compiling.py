@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -14,6 +16,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+
+from platformdirs import user_cache_path
 
 from fmu.platforms import Platform, host_platform
 from ident.errors import UserError
@@ -31,6 +35,8 @@ FLAGS: Final = (
     "-shared",
 )
 """Of every platform; nothing that depends on the place of the sources, so that builds repeat byte for byte."""
+
+_INCLUDE: Final = re.compile(rb'^#include "([^"]+)"', re.MULTILINE)
 
 _UNIVERSAL_ALIGNMENT: Final = 14
 """Binary logarithm of the page of arm64 macOS, where the slices of a universal binary start."""
@@ -88,53 +94,83 @@ def compile_libraries(
     platforms: Sequence[Platform],
     compiler: Compiler,
     progress: Callable[[Platform], None],
+    cache: Path | None = None,
 ) -> dict[str, bytes]:
     """Shared libraries of C sources, by the names of the platforms.
 
-    The cross compiler keeps its objects and the C libraries of its targets in the user's cache folder. The first
-    build for Windows compiles such a library, which takes a minute.
+    The cross compiler keeps objects and the C libraries of its targets. It knows an object by the place and content of
+    its source, so each source lies in a folder named by its content: the equations are compiled once for all vehicles.
+    The first build for a platform compiles its C library, which takes a minute.
 
     Args:
         sources: file name -> text, `.c` files and the headers that they include.
         platforms: what to build for.
         compiler: from `find_compiler`.
         progress: called with each platform that is done.
+        cache: folder for sources; None for the user's cache folder.
 
     Raises:
         UserError: the compiler cannot build for a platform, or reports an error; its last lines are told.
     """
     check_platforms(compiler, platforms)
-    with tempfile.TemporaryDirectory(prefix="quasiomni-") as folder:
-        for name, text in sources.items():
-            (Path(folder) / name).write_bytes(text)
-        units = sorted(name for name in sources if name.endswith(".c"))
+    place = cache or user_cache_path("quasiomni") / "fmu"
+    units = [_keep(place, name, sources) for name in sorted(sources) if name.endswith(".c")]
 
-        def build(platform: Platform) -> bytes:
-            library = _compile(Path(folder), units, platform, compiler)
-            progress(platform)
-            return library
+    def build(platform: Platform) -> bytes:
+        library = _compile(place, units, platform, compiler)
+        progress(platform)
+        return library
 
-        with ThreadPoolExecutor(max_workers=max(1, os.cpu_count() or 1)) as pool:
-            built = list(pool.map(build, platforms))
+    with ThreadPoolExecutor(max_workers=max(1, os.cpu_count() or 1)) as pool:
+        built = list(pool.map(build, platforms))
     return {platform.name: library for platform, library in zip(platforms, built, strict=True)}
 
 
-def _compile(folder: Path, units: Sequence[str], platform: Platform, compiler: Compiler) -> bytes:
-    # A macOS library carries its own name, so the name must not depend on where it is built.
-    output = Path(platform.name) / f"model{platform.suffix}"
-    (folder / output.parent).mkdir()
+def _keep(place: Path, unit: str, sources: Mapping[str, bytes]) -> str:
+    """Put a C file and what it includes into the folder of their content; the file's place below `place`."""
+    names = sorted(_included(unit, sources))
+    digest = hashlib.sha256(b"".join(name.encode() + b"\0" + sources[name] for name in names)).hexdigest()[:20]
+    folder = place / digest
+    if not folder.is_dir():
+        place.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(dir=place))
+        for name in names:
+            (made / name).write_bytes(sources[name])
+        try:
+            made.rename(folder)
+        except OSError:
+            # Another build has put the same content there in the meantime.
+            shutil.rmtree(made)
+    return f"{digest}/{unit}"
+
+
+def _included(unit: str, sources: Mapping[str, bytes]) -> set[str]:
+    """A C file and all sources that it includes, directly or not."""
+    found, new = {unit}, {unit}
+    while new:
+        named = {match.decode() for name in new for match in _INCLUDE.findall(sources[name])}
+        new = {name for name in named if name in sources} - found
+        found |= new
+    return found
+
+
+def _compile(place: Path, units: Sequence[str], platform: Platform, compiler: Compiler) -> bytes:
     windows = platform.suffix == ".dll"
     target = ("-target", platform.target, "-s") if compiler.cross else ("-s",)
     flags = (*FLAGS, *platform.flags, *target, *(() if windows else ("-fPIC",)), "-I", str(HEADERS))
-    call = (*compiler.command, *flags, "-o", str(output), *units, *(() if windows else ("-lm",)))
-    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        tail = " / ".join(done.stderr.strip().splitlines()[-3:])
-        raise UserError(
-            f"{compiler.name} cannot build for {platform.name}: {tail}",
-            "Mend the compiler, or leave that platform out (--platforms).",
-        )
-    return (folder / output).read_bytes()
+    with tempfile.TemporaryDirectory(prefix="quasiomni-") as folder:
+        # A macOS library carries its own name, which must not depend on where it is built.
+        name = () if not platform.name.endswith("darwin") else ("-install_name", f"@rpath/model{platform.suffix}")
+        output = Path(folder) / f"model{platform.suffix}"
+        call = (*compiler.command, *flags, *name, "-o", str(output), *units, *(() if windows else ("-lm",)))
+        done = subprocess.run(call, cwd=place, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            tail = " / ".join(done.stderr.strip().splitlines()[-3:])
+            raise UserError(
+                f"{compiler.name} cannot build for {platform.name}: {tail}",
+                "Mend the compiler, or leave that platform out (--platforms).",
+            )
+        return output.read_bytes()
 
 
 def universal_binary(slices: Mapping[str, bytes]) -> bytes:

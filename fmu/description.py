@@ -6,7 +6,7 @@ import enum
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
-from xml.etree import ElementTree as xml
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmu.interface import LOG_CATEGORIES, MODEL_IDENTIFIER, Interface, initial_of, number
 from fmu.units import DisplayUnit
@@ -35,10 +35,11 @@ def model_description(interface: Interface, version: FmiVersion, token: str, sou
     return document(_WRITERS[version](interface, token, sources))
 
 
-def document(root: xml.Element) -> bytes:
+def document(root: Element) -> bytes:
     """An XML file, indented."""
-    xml.indent(root, "  ")
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + xml.tostring(root, encoding="utf-8") + b"\n"
+    indent(root, "  ")
+    text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"
 
 
 def _common(interface: Interface) -> dict[str, str]:
@@ -53,47 +54,46 @@ def _common(interface: Interface) -> dict[str, str]:
     }
 
 
-def _write_fmi2(interface: Interface, token: str, sources: Sequence[str]) -> xml.Element:
+def _write_fmi2(interface: Interface, token: str, sources: Sequence[str]) -> Element:
     indicators = str(len(interface.table.block(Block.INDICATOR)))
-    root = xml.Element(
-        "fmiModelDescription", fmiVersion="2.0", guid=token, **_common(interface), numberOfEventIndicators=indicators
-    )
+    root = Element("fmiModelDescription", _common(interface), fmiVersion="2.0", guid=token)
+    root.set("numberOfEventIndicators", indicators)
     for kind, flags in _KINDS_FMI2.items():
-        element = xml.SubElement(root, kind, modelIdentifier=MODEL_IDENTIFIER, **flags)
-        files = xml.SubElement(element, "SourceFiles")
+        element = SubElement(root, kind, {"modelIdentifier": MODEL_IDENTIFIER, **flags})
+        files = SubElement(element, "SourceFiles")
         for name in sources:
-            xml.SubElement(files, "File", name=name)
+            SubElement(files, "File", name=name)
     _units(root, interface)
     _categories(root)
     _experiment(root, interface)
-    variables = xml.SubElement(root, "ModelVariables")
+    variables = SubElement(root, "ModelVariables")
     for row in interface.table.variables:
         _variable_fmi2(variables, row, interface)
-    structure = xml.SubElement(root, "ModelStructure")
+    structure = SubElement(root, "ModelStructure")
     groups = {
         "Outputs": interface.outputs,
         "Derivatives": interface.table.block(Block.DERIVATIVE),
         "InitialUnknowns": interface.initial_unknowns,
     }
     for name, rows in groups.items():
-        group = xml.SubElement(structure, name)
+        group = SubElement(structure, name)
         for row in rows:
             known = None if name == "InitialUnknowns" else interface.dependencies_of(row)
-            xml.SubElement(group, "Unknown", {"index": str(row.value_reference + 1), **_dependencies(known, first=1)})
+            SubElement(group, "Unknown", {"index": str(row.value_reference + 1), **_dependencies(known, first=1)})
     return root
 
 
-def _write_fmi3(interface: Interface, token: str, _sources: Sequence[str]) -> xml.Element:
-    root = xml.Element("fmiModelDescription", fmiVersion="3.0", instantiationToken=token, **_common(interface))
+def _write_fmi3(interface: Interface, token: str, _sources: Sequence[str]) -> Element:
+    root = Element("fmiModelDescription", _common(interface), fmiVersion="3.0", instantiationToken=token)
     for kind, flags in _KINDS_FMI3.items():
-        xml.SubElement(root, kind, modelIdentifier=MODEL_IDENTIFIER, **flags)
+        SubElement(root, kind, {"modelIdentifier": MODEL_IDENTIFIER, **flags})
     _units(root, interface)
     _categories(root)
     _experiment(root, interface)
-    variables = xml.SubElement(root, "ModelVariables")
+    variables = SubElement(root, "ModelVariables")
     for row in interface.table.variables:
         _variable_fmi3(variables, row, interface)
-    structure = xml.SubElement(root, "ModelStructure")
+    structure = SubElement(root, "ModelStructure")
     groups = {
         "Output": interface.outputs,
         "ContinuousStateDerivative": interface.table.block(Block.DERIVATIVE),
@@ -104,7 +104,7 @@ def _write_fmi3(interface: Interface, token: str, _sources: Sequence[str]) -> xm
         for row in rows:
             known = None if name == "InitialUnknown" else interface.dependencies_of(row)
             attributes = {"valueReference": str(row.value_reference), **_dependencies(known, first=0)}
-            xml.SubElement(structure, name, attributes)
+            SubElement(structure, name, attributes)
     return root
 
 
@@ -115,7 +115,7 @@ def _dependencies(known: Sequence[Variable] | None, *, first: int) -> dict[str, 
     return {"dependencies": " ".join(str(row.value_reference + first) for row in known)}
 
 
-_WRITERS: Final[Mapping[FmiVersion, Callable[[Interface, str, Sequence[str]], xml.Element]]] = MappingProxyType(
+_WRITERS: Final[Mapping[FmiVersion, Callable[[Interface, str, Sequence[str]], Element]]] = MappingProxyType(
     {FmiVersion.FMI2: _write_fmi2, FmiVersion.FMI3: _write_fmi3}
 )
 
@@ -158,28 +158,28 @@ _KINDS_FMI3: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
 )
 
 
-def _units(root: xml.Element, interface: Interface) -> None:
-    definitions = xml.SubElement(root, "UnitDefinitions")
+def _units(root: Element, interface: Interface) -> None:
+    definitions = SubElement(root, "UnitDefinitions")
     for unit in interface.units:
-        element = xml.SubElement(definitions, "Unit", name=unit.name)
-        xml.SubElement(element, "BaseUnit", {base: str(power) for base, power in unit.exponents.items()})
+        element = SubElement(definitions, "Unit", name=unit.name)
+        SubElement(element, "BaseUnit", {base: str(power) for base, power in unit.exponents.items()})
         for display in unit.display:
             _display_unit(element, display)
 
 
-def _display_unit(element: xml.Element, display: DisplayUnit) -> None:
-    xml.SubElement(element, "DisplayUnit", name=display.name, factor=number(display.factor))
+def _display_unit(element: Element, display: DisplayUnit) -> None:
+    SubElement(element, "DisplayUnit", name=display.name, factor=number(display.factor))
 
 
-def _categories(root: xml.Element) -> None:
-    categories = xml.SubElement(root, "LogCategories")
+def _categories(root: Element) -> None:
+    categories = SubElement(root, "LogCategories")
     for name, text in LOG_CATEGORIES.items():
-        xml.SubElement(categories, "Category", name=name, description=text)
+        SubElement(categories, "Category", name=name, description=text)
 
 
-def _experiment(root: xml.Element, interface: Interface) -> None:
+def _experiment(root: Element, interface: Interface) -> None:
     values = interface.experiment
-    xml.SubElement(
+    SubElement(
         root,
         "DefaultExperiment",
         startTime=number(values.start_time),
@@ -219,24 +219,24 @@ def _real(row: Variable) -> dict[str, str]:
     return values
 
 
-def _variable_fmi2(parent: xml.Element, row: Variable, interface: Interface) -> None:
-    element = xml.SubElement(parent, "ScalarVariable", _head(row))
+def _variable_fmi2(parent: Element, row: Variable, interface: Interface) -> None:
+    element = SubElement(parent, "ScalarVariable", _head(row))
     if row.block is Block.MODE:
-        xml.SubElement(element, "Integer", _bounds(row, lambda value: str(int(value))))
+        SubElement(element, "Integer", _bounds(row, lambda value: str(int(value))))
         return
     values = _real(row)
     if row.state:
         values["derivative"] = str(interface.table[row.state].value_reference + 1)
-    xml.SubElement(element, "Real", values)
+    SubElement(element, "Real", values)
 
 
-def _variable_fmi3(parent: xml.Element, row: Variable, interface: Interface) -> None:
+def _variable_fmi3(parent: Element, row: Variable, interface: Interface) -> None:
     if row.block is Block.MODE:
-        xml.SubElement(parent, "Int32", _head(row) | _bounds(row, lambda value: str(int(value))))
+        SubElement(parent, "Int32", _head(row) | _bounds(row, lambda value: str(int(value))))
         return
     values = _head(row) | _real(row)
     if row.state:
         values["derivative"] = str(interface.table[row.state].value_reference)
     if row.causality is Causality.OUTPUT:
         values["intermediateUpdate"] = "true"
-    xml.SubElement(parent, "Float64", values)
+    SubElement(parent, "Float64", values)

@@ -18,7 +18,9 @@ from quasiomni.application import app, console
 @app.command("fmu")
 def build(
     run: Annotated[Path, typer.Argument(help="Run folder, identified.")],
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="File to write. Default: platform.fmu in RUN.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File to write. Default: platform.fmu in RUN.")
+    ] = None,
     fmi: Annotated[FmiVersion, typer.Option(help="Version of FMI: 2 for 2.0, 3 for 3.0.")] = FmiVersion.FMI2,
     platforms: Annotated[
         str, typer.Option(help="`all`, `host`, or names parted by commas, e.g. `x86_64-linux,x86_64-windows`.")
