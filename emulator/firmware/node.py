@@ -99,6 +99,8 @@ class Node:
         """The supply fails: nothing is sent any more, the power stage is off."""
         self.network.disconnect()
         self.nmt.enter(NmtState.INITIALISATION)
+        self._consumer.reset()
+        self._guarding.reset()
         self.application.reset()
 
     def bus_off(self) -> None:
