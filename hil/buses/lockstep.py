@@ -67,7 +67,7 @@ class LockstepHub:
     def attach(self, make: Callable[[Send], Devices]) -> None:
         """Connect the devices that `make` builds around the function by which they send frames."""
         if self._delays:
-            self._devices = self._wired = WiredDevices(make, self._wire, self._deliver_from_devices)
+            self._devices = self._wired = WiredDevices(make, self._wire, self._deliver_from_devices, self.clock.now())
         else:
             self._devices = make(self._send_from_devices)
 

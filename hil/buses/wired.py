@@ -42,17 +42,27 @@ class WiredDevices:
         make: builds the devices around the function by which they send.
         wire: what is between.
         send: takes a frame of the devices at its end: identifier, data and the instant [s].
+        start: the instant at which they are made, and may send already [s].
     """
 
-    def __init__(self, make: Callable[[Send], Devices], wire: Wire, send: Callable[[int, bytes, float], None]) -> None:
+    def __init__(
+        self,
+        make: Callable[[Send], Devices],
+        wire: Wire,
+        send: Callable[[int, bytes, float], None],
+        start: float = 0.0,
+    ) -> None:
         self._wire = wire
         self._send = send
+        self._start = start
+        self._made = False
         self._devices = make(self._from_device)
+        self._made = True
 
     @property
     def time(self) -> float:
         """The instant that the devices have reached [s]."""
-        return self._devices.time
+        return self._devices.time if self._made else self._start
 
     def receive(self, can_id: int, data: bytes) -> None:
         """Put a data frame on the wire that the devices hear at its end."""

@@ -9,6 +9,9 @@ from hil.pytest_plugin.world import World
 class Expectation:
     """A condition that waits for its time span.
 
+    Frames count from the instant on in which it begins, those of this very instant included: what a fault does at
+    once is not missed.
+
     Args:
         world: the bench.
         condition: what is expected.
@@ -17,8 +20,8 @@ class Expectation:
     def __init__(self, world: World, condition: Condition) -> None:
         self._world = world
         self._condition = condition
-        self._since = self._seen = len(world.frames)
         self._begin = world.now
+        self._since = self._seen = world.frames_until(self._begin)
 
     def within(self, duration: float) -> float:
         """The condition comes true within `duration` [s] of simulated time; gives how long it took [s].

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -147,6 +148,10 @@ class World:
     def truth(self) -> GroundTruth:
         """The true state of motion."""
         return self.vehicle.ground_truth()
+
+    def frames_until(self, instant: float) -> int:
+        """Number of frames whose last bit had passed by `instant` [s]."""
+        return bisect_right(self.frames, instant, key=lambda frame: frame.timestamp)
 
     def speed(self) -> float:
         """Speed of the chassis centre over the floor [m/s]."""
