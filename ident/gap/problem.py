@@ -50,6 +50,7 @@ class Block:
         period: (N,) number of the repeat, -1 outside of any.
         regions: masks (N,) by name (`low_speed`, `forward`, ...) in which the gap is counted; they may overlap.
         features: (N, f) states that an unknown cause might depend on (speeds, angles, accelerations); any scale.
+        tolerance: rms up to which a gap means nothing, however well it repeats, in the unit of the target.
     """
 
     record: str
@@ -65,6 +66,7 @@ class Block:
     period: NDArray[np.int64]
     regions: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     features: Array | None = None
+    tolerance: float = 0.0
 
     @property
     def label(self) -> str:

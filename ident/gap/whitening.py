@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 ORDER: Final = 6
 """Of the autoregression: two seconds of memory at the rate of the vehicle's rows are no more, residuals die sooner."""
+TOLERATED_MEMORY: Final = 0.5
+"""Correlation time of what is tolerated [s]: it is model error, and as slow as the motion."""
 TAPER: Final = 1e-4
 """White share added to the variance, so that a band without any power is not blown up."""
 
@@ -71,11 +73,26 @@ def fit_whitener(rows: Rows, residual: Array, freedom_lost: float = 0.0) -> Whit
     """Whitener of a residual (n,); `freedom_lost` parameters were fitted to it."""
     age = row_ages(rows)
     inflation = len(rows) / max(len(rows) - freedom_lost, 1.0)
+    tolerated = _tolerated(rows)
     groups = range(int(rows.group.max(initial=-1)) + 1)
-    return Whitener(tuple(_predictor(residual, age, rows.group == group, inflation) for group in groups))
+    return Whitener(
+        tuple(_predictor(residual, age, rows.group == group, inflation, tolerated[group]) for group in groups)
+    )
 
 
-def _predictor(residual: Array, age: NDArray[np.int64], chosen: NDArray[np.bool_], inflation: float) -> Predictor:
+def _tolerated(rows: Rows) -> Array:
+    """Autocovariance (G, ORDER + 1) of what is tolerated in every group: a slow process of the tolerance's variance."""
+    found = np.zeros((int(rows.group.max(initial=-1)) + 1, ORDER + 1))
+    for (block, kept), place in zip(rows.blocks, rows.block_slices, strict=True):
+        if place.stop > place.start:
+            memory = np.arange(ORDER + 1) / (kept.rate * TOLERATED_MEMORY)
+            found[rows.group[place.start]] = block.tolerance**2 * np.exp(-memory)
+    return found
+
+
+def _predictor(
+    residual: Array, age: NDArray[np.int64], chosen: NDArray[np.bool_], inflation: float, tolerated: Array
+) -> Predictor:
     place = np.flatnonzero(chosen)
     depth = min(ORDER, len(place) // 20)
     covariance = np.empty(depth + 1)
@@ -83,6 +100,7 @@ def _predictor(residual: Array, age: NDArray[np.int64], chosen: NDArray[np.bool_
         later = place[age[place] >= lag]
         covariance[lag] = residual[later] @ residual[later - lag]
     covariance *= inflation / max(len(place), 1)
+    covariance += tolerated[: depth + 1]
     covariance[0] = max(covariance[0] * (1 + TAPER), np.finfo(float).tiny)
     return _levinson(covariance)
 

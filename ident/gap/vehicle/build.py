@@ -39,6 +39,9 @@ OVERSAMPLED: Final = 3.0
 ASKEW: Final = 0.4
 """Steering angle beyond which a wheel that steers at standstill pushes the chassis aside [rad]."""
 
+CREEP: Final = 1e-3
+"""Part of the rolling speed by which a wheel may creep, as any tyre does at some percent of its adhesion [-]."""
+
 PRIOR_WEIGHT: Final = 1e-4
 """Of the vehicle file's guesses against the rows, per unit-norm column: only what no row shows is taken from them."""
 
@@ -261,7 +264,14 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
             period=source.period[:: source.factor],
             regions=regions_of(position, rate, acceleration, load),
             features=features_of(position, rate, acceleration, load),
+            tolerance=_creep(source, context.geometry) if source.channel is Channel.KINEMATIC else 0.0,
         )
+
+
+def _creep(source: Source, geometry: Geometry) -> float:
+    """Speed of the contacts (rms) that creep may take from rolling [m/s]."""
+    speed = geometry.wheel_radius * source.inputs[:, rows.SLICES["beta_rate"]]
+    return CREEP * float(np.sqrt(np.mean(speed[source.moving[0]] ** 2)))
 
 
 def _unit(channel: Channel, coordinate: str) -> str:
