@@ -147,15 +147,15 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
     found = directions(white, layout)
     amplitudes = found.basis.T @ found.residual
     sizes = found.sizes
-    competing = (sizes > 0) & ~excluded
     ratios = found.ratios(amplitudes)
+    competing = (ratios > 0) & ~excluded
     best = int(np.argmax(np.where(competing, ratios, -1.0)))
     surrogates = signs @ _sums(found.basis * _without(found, amplitudes, best)[:, None], white.stretch)
     scale = np.array([_scatter(found, amplitudes, variant, white.stretch) for variant in range(len(layout))])
     spread = np.maximum(found.ratios(surrogates).mean(axis=0) / np.maximum(sizes, 1), 1.0)
     price = 0.5 * sizes * math.log(len(white.target))
     tested = np.where(competing, 0.5 * ratios / spread - price, -np.inf)
-    by_chance = np.where(competing, 0.5 * found.ratios(surrogates) / spread - price, -np.inf)
+    by_chance = np.where((sizes > 0) & ~excluded, 0.5 * found.ratios(surrogates) / spread - price, -np.inf)
     return Evidence(
         directions=found,
         amplitudes=amplitudes,

@@ -222,7 +222,7 @@ class _Judgement:
             part=self.after.parts[index],
             ranked=ranked,
             probability=min(ranked.names.get(str(candidate.effect), 0.0), settings.ceiling),
-            log_evidence=slot.of(variant),
+            log_evidence=float(slot.evidence.log_evidence[variant]),
             log_predictive=float(slot.evidence.log_predictive[variant]),
             closed=closed,
             biased=self._biased(others),

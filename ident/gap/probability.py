@@ -88,5 +88,4 @@ def rank(regression: Regression, slot: Slot, variant: int, settings: Calibration
 def _alike(regression: Regression, slot: Slot, variant: int) -> tuple[str, ...]:
     cosine = cosines(slot.evidence, variant)
     same: Sequence[int] = np.flatnonzero((cosine > ALIKE) & np.isfinite(slot.evidence.log_evidence)).tolist()
-    possible = [other for other in same if np.isfinite(slot.of(other))]
-    return tuple(dict.fromkeys([regression.key(variant), *(regression.key(other) for other in possible)]))
+    return tuple(dict.fromkeys([regression.key(variant), *(regression.key(other) for other in same)]))

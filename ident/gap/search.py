@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.gap.evidence import Evidence, White, best_pair, gather
+from ident.gap.evidence import Directions, Evidence, White, best_pair, directions, gather
 from ident.gap.problem import Problem
 from ident.gap.rows import Rows
 from ident.gap.whitening import Whitener, fit_whitener
@@ -23,9 +23,8 @@ from ident.gap.whitening import Whitener, fit_whitener
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-WEIGHTED_FITS: Final = 4
 CONTENDERS: Final = 12
-"""Candidates whose likelihood is found exactly, the others being far behind."""
+"""Candidates that are taken off before the colour of the noise is found."""
 
 
 @dataclass(frozen=True)
@@ -50,35 +49,21 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Profile:
-    """Maximum of the likelihood, the colour of the noise fitted too.
-
-    Attributes:
-        log_likelihood: up to a constant of the rows.
-        possible: every coefficient is as large as it must be.
-    """
-
-    log_likelihood: float
-    possible: bool
-
-
-@dataclass(frozen=True)
 class Slot:
     """What may stand in one place of the explanation, the others given.
 
     Attributes:
-        evidence: of every variant, whitened alike, with surrogates.
-        variants: contenders, best first.
-        log_evidence: of each, against nothing in this place; every one with its own colour of the noise.
+        evidence: of every variant.
+        variants: the best one of every candidate, best first.
     """
 
     evidence: Evidence
     variants: tuple[int, ...]
-    log_evidence: Array
 
-    def of(self, variant: int) -> float:
-        """Log evidence of a variant, -inf if it is no contender."""
-        return float(self.log_evidence[self.variants.index(variant)]) if variant in self.variants else -float("inf")
+    @property
+    def log_evidence(self) -> Array:
+        """Of the variants, against nothing in this place."""
+        return self.evidence.log_evidence[list(self.variants)]
 
 
 class Regression:
@@ -110,14 +95,33 @@ class Regression:
         return np.hstack([np.zeros((len(self.rows), 0)), *places])
 
     def whitener(self, variants: Sequence[int]) -> Whitener:
+        """Colour of the noise: of what these variants and, on top, the best of the others cannot explain.
+
+        Were the colour that of the whole residual, an effect of long memory would be taken for noise of long memory
+        and whitened away. What the best candidates can explain is therefore taken off first, believed or not.
+        """
+        plain = self._colour(variants)
+        best = self._best(directions(self.white(plain, variants), self.rows.layout), variants)
+        return self._colour((*variants, *best[:CONTENDERS]))
+
+    def _colour(self, variants: Sequence[int]) -> Whitener:
         """Colour of what the baseline and these variants leave, fitted by turns with them."""
         design = np.hstack([self.rows.baseline, self.columns_of(variants)])
         residual = self.rows.target - design @ least_squares(design, self.rows.target)
-        for _ in range(WEIGHTED_FITS):
-            whitener = fit_whitener(self.rows, residual, design.shape[1])
-            white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
-            residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
-        return whitener
+        whitener = fit_whitener(self.rows, residual, design.shape[1])
+        white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
+        residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
+        return fit_whitener(self.rows, residual, design.shape[1])
+
+    def _best(self, found: Directions, given: Sequence[int]) -> list[int]:
+        """The best variant of every candidate that is not given, by likelihood ratio."""
+        ratios = found.ratios(found.basis.T @ found.residual)
+        taken = {self.owners[variant] for variant in given}
+        best: dict[int, int] = {}
+        for variant in np.argsort(ratios)[::-1].tolist():
+            if self.owners[variant] not in taken and ratios[variant] > 0:
+                best.setdefault(self.owners[variant], variant)
+        return list(best.values())
 
     def white(self, whitener: Whitener, given: Sequence[int]) -> White:
         """Whitened rows, variants that are given beside the baseline."""
@@ -139,43 +143,14 @@ class Regression:
         excluded = np.array([owner in taken for owner in self.owners], dtype=bool)
         return gather(self.white(whitener, given), self.rows.layout, self.signs, excluded)
 
-    def profile(self, variants: Sequence[int]) -> Profile:
-        """Likelihood of the baseline with some variants."""
-        whitener = self.whitener(variants)
-        white = self.white(whitener, variants)
-        coefficients = least_squares(white.baseline, white.target)
-        residual = white.target - white.baseline @ coefficients
-        least = [self.rows.layout[variant].least for variant in variants for _ in range(self._width(variant))]
-        taken = coefficients[self.rows.baseline.shape[1] :]
-        log_likelihood = -0.5 * float(residual @ residual) - whitener.log_deviation(self.rows)
-        return Profile(log_likelihood, bool(np.all(taken >= np.array(least))))
-
     def slot(self, given: Sequence[int], whitener: Whitener) -> Slot:
-        """Contenders beside the variants given."""
+        """What may stand beside the variants given."""
         evidence = self.evidence(whitener, given)
-        without = self.profile(given).log_likelihood
-        contenders = self._contenders(evidence)
-        gains = []
-        for variant in contenders:
-            profile = self.profile((*given, variant))
-            price = 0.5 * int(evidence.directions.sizes[variant]) * np.log(len(self.rows))
-            gain = profile.log_likelihood - without if profile.possible else -np.inf
-            gains.append(gain / evidence.scale[variant] - price)
-        order = np.argsort(gains)[::-1]
-        return Slot(evidence, tuple(contenders[index] for index in order), np.array(gains)[order])
-
-    def _contenders(self, evidence: Evidence) -> list[int]:
-        """The best variant of every candidate, by likelihood ratio, the best candidates only."""
-        ratios = np.where(np.isfinite(evidence.log_evidence), evidence.directions.ratios(evidence.amplitudes), -np.inf)
         best: dict[int, int] = {}
-        for variant in np.argsort(ratios)[::-1].tolist():
-            if np.isfinite(ratios[variant]):
+        for variant in np.argsort(evidence.log_evidence)[::-1].tolist():
+            if np.isfinite(evidence.log_evidence[variant]):
                 best.setdefault(self.owners[variant], variant)
-        return list(best.values())[:CONTENDERS]
-
-    def _width(self, variant: int) -> int:
-        place = self.rows.layout[variant].place
-        return int(place.stop - place.start)
+        return Slot(evidence, tuple(best.values()))
 
     def prior_residual(self, baseline: Array) -> Array:
         """What is known beforehand of the parameters, minus these, in standard deviations; empty without a model."""
@@ -248,7 +223,7 @@ def _believed(slot: Slot, variant: int, settings: Settings) -> bool:
     """Larger than chance over all candidates, and confirmed."""
     evidence = slot.evidence
     confirmed = evidence.log_predictive[variant] >= settings.confirmation
-    return bool(confirmed and evidence.significance <= settings.level and slot.of(variant) > 0)
+    return bool(confirmed and evidence.significance <= settings.level and evidence.log_evidence[variant] > 0)
 
 
 def _settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
@@ -266,7 +241,8 @@ def _revised(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     for index, variant in enumerate(taken):
         slot = regression.slot(_without(taken, index), whitener)
         best = slot.variants[0]
-        if slot.of(best) > slot.of(variant) + regression.settings.lead:
+        log_evidence = slot.evidence.log_evidence
+        if log_evidence[best] > log_evidence[variant] + regression.settings.lead:
             return (*taken[:index], best, *taken[index + 1 :])
         if not _believed(slot, variant, regression.settings):
             return _without(taken, index)

@@ -22,8 +22,10 @@ LARGEST_CUTOFF: Final = 0.4
 ROWS_CUTOFF: Final = 0.4
 """Largest cutoff of the rows over that of the position filter: sign(v) then sees the velocity itself."""
 SPECTRUM_SEGMENTS: Final = 8
+BAND: Final = 1.3
+"""Ratio of the ends of the bands over which spectra are averaged."""
 LEAST_ROWS_CUTOFF: Final = 0.04
-EFFORT_SHARE: Final = 0.95
+EFFORT_SHARE: Final = 0.99
 """Of the power of the effort that the rows keep. What lies above belongs to drives and structures, not to the axis."""
 STUCK_SPEED: Final = 0.01
 """Over the 95th percentile of the speed: below it for longer than the filter's memory, an axis rests."""
@@ -115,9 +117,9 @@ def _quietest(position: Array, rate: float) -> float:
     acceleration = np.diff(position, 2) * rate**2
     length = max(16, len(acceleration) // SPECTRUM_SEGMENTS)
     frequency, power = signal.welch(acceleration, rate, nperseg=min(length, len(acceleration)), detrend="constant")
-    bands = np.geomspace(frequency[1], rate / 2, 40)
-    level = [np.mean(power[(frequency >= low) & (frequency <= 1.3 * low)]) for low in bands[:-4]]
-    return float(bands[int(np.nanargmin(level))])
+    bands = frequency[1 : 1 + max(1, int(len(frequency) / BAND))]
+    level = [np.mean(power[(frequency >= low) & (frequency <= BAND * low)]) for low in bands]
+    return float(bands[int(np.argmin(level))])
 
 
 def _repeat_length(positions: Array) -> int | None:
