@@ -38,21 +38,22 @@ from emulator.firmware.drive.options import (
 )
 from emulator.firmware.drive.parameters import Parameters
 from emulator.firmware.drive.states import Command, State, StateMachine
+from emulator.firmware.drive.status import compose
 from emulator.firmware.drive.stopping import Stop
+from emulator.firmware.drive.supervision import EncoderWatch
 from emulator.firmware.hardware import DriveHardware
 from emulator.firmware.nmt import NmtState
 from emulator.firmware.node import Node
 from emulator.firmware.timers import Timer
 from emulator.power_stage import Trip
 
-_VOLTAGE_ENABLED = 1 << 4
-_REMOTE = 1 << 9
-_INTERNAL_LIMIT = 1 << 11
 _HALT = 1 << 8
 _COMMAND_BITS = 0x8F
 _ENABLE_OPERATION = 0x0F
 
-_POWERED = (State.SWITCHED_ON, State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
+_WARNING_LOAD = 0.9
+"""I2t load from which on bit 7 warns [-]; the protection responds at 1.05."""
+
 _OPERATING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
 _DEFERRED: Mapping[int, tuple[int, Mapping[int, StopKind]]] = {
@@ -74,7 +75,7 @@ class DriveApplication:
         self._node = node
         self._hardware = hardware
         self._parameters = Parameters(node.object_dictionary, hardware.counts_per_revolution)
-        self.axis = Axis(hardware, self._parameters)
+        self.axis = Axis(hardware, self._parameters, node.timers)
         self._points = self.axis.points
         self._machine = StateMachine(self._carry_out, self._ready)
         self._position = CyclicPosition(self.axis)
@@ -87,6 +88,7 @@ class DriveApplication:
             Mode.CYCLIC_VELOCITY: CyclicVelocity(self.axis),
             Mode.CYCLIC_TORQUE: CyclicTorque(self.axis),
         }
+        self._encoder = EncoderWatch(hardware.counts_per_revolution)
         self._stop = Stop(self.axis)
         self._reaction = StopKind.DISABLE
         self._after_stop: int | None = None
@@ -107,6 +109,8 @@ class DriveApplication:
         self.statusword = 0
         self._motion: Motion | None = None
         self._halted = False
+        self._warns = False
+        self._supervised_at = 0.0
         self._timer: Timer | None = None
         hardware.watch(self._tripped)
         bind(self, node.object_dictionary)
@@ -155,7 +159,10 @@ class DriveApplication:
                 self._update_status()
 
     def sample(self) -> None:
-        """Process values are read from the hardware when they are sent; time stands still meanwhile."""
+        """Look after the drive; process values are read when they are sent, time stands still meanwhile."""
+        motion = self._motion
+        if motion is not None and not motion.ticks:
+            self._supervise()
 
     def connection_lost(self) -> None:
         """Do what 6007h says."""
@@ -281,7 +288,9 @@ class DriveApplication:
             self._timer.cancel()
             self._timer = None
         self._motion = motion
-        if motion is not None:
+        if motion is None:
+            self._encoder.reset()
+        else:
             motion.start()
             if motion.ticks:
                 self._timer = self._node.timers.after(TICK, self._tick)
@@ -291,6 +300,9 @@ class DriveApplication:
         if motion is None:
             return
         self._timer = self._node.timers.after(TICK, self._tick)
+        self._supervise()
+        if motion is not self._motion:
+            return
         motion.tick()
         if motion is self._stop and self._stop.done and self._after_stop is not None:
             self._machine.take(self._after_stop)
@@ -298,15 +310,27 @@ class DriveApplication:
             self.fail(FOLLOWING_ERROR)
         self._update_status()
 
+    def _supervise(self) -> None:
+        axis = self.axis
+        if axis.read_at == self._supervised_at:
+            # Nobody has asked for the position since the last time.
+            axis.position()
+        self._supervised_at = axis.read_at
+        speed = self._parameters.max_motor_speed * axis.increments
+        if not self._encoder.accepts(axis.count, axis.read_at, speed, axis.torque_demand):
+            self.fail(OF_TRIP[Trip.ENCODER])
+        elif (self._hardware.thermal_load > _WARNING_LOAD) is not self._warns:
+            self._warns = not self._warns
+            self._update_status()
+
     def _update_status(self) -> None:
-        state = self._machine.state
-        last = self.statusword
-        self.statusword = (
-            state.value
-            | (_VOLTAGE_ENABLED if state in _POWERED else 0)
-            | (_REMOTE if self._node.nmt.state is NmtState.OPERATIONAL else 0)
-            | (_INTERNAL_LIMIT if self.axis.limited else 0)
-            | (self._motion.status() if self._motion is not None else 0)
+        last, motion = self.statusword, self._motion
+        self.statusword = compose(
+            self._machine.state,
+            remote=self._node.nmt.state is NmtState.OPERATIONAL,
+            warns=self._warns,
+            limited=self.axis.limited,
+            of_mode=motion.status() if motion is not None else 0,
         )
         if self.statusword != last:
             self._node.notify_event()

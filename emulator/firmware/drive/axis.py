@@ -8,6 +8,7 @@ from typing import Final
 
 from emulator.firmware.drive.parameters import Parameters
 from emulator.firmware.hardware import DriveHardware
+from emulator.firmware.timers import Timers
 
 TICK: Final = 0.001
 """Period of the drive's own loops [s]; the current loop below is the hardware's."""
@@ -53,6 +54,7 @@ class Axis:
     Args:
         hardware: power stage, motor and encoder.
         parameters: gains and limits.
+        timers: simulated time.
 
     Attributes:
         points: set-points of the master.
@@ -60,9 +62,12 @@ class Axis:
         velocity_demand: [rad/s].
         position_demand: [increments], counted without end.
         limited: torque, speed or position is not what was asked for.
+        count, read_at: last reading of the encoder [increments], and its instant [s].
     """
 
-    def __init__(self, hardware: DriveHardware, parameters: Parameters) -> None:
+    def __init__(self, hardware: DriveHardware, parameters: Parameters, timers: Timers) -> None:
+        self._timers = timers
+        self.count, self.read_at = 0, -1.0
         self.hardware = hardware
         self.parameters = parameters
         self.points = Setpoints()
@@ -91,7 +96,8 @@ class Axis:
 
     def position(self) -> int:
         """6064h [increments]."""
-        return wrap(self.hardware.position() - self.home)
+        self.count, self.read_at = self.hardware.position(), self._timers.now
+        return wrap(self.count - self.home)
 
     def velocity(self) -> float:
         """Of the shaft [rad/s]."""
