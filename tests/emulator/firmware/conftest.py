@@ -95,6 +95,11 @@ class Wire:
         assert self.read(node_id, 0x6041) & 0x6F == 0x27
 
 
+@pytest.fixture(scope="session")
+def wire_type() -> type[Wire]:
+    return Wire
+
+
 @pytest.fixture
 def wire() -> Wire:
     return Wire()
