@@ -97,7 +97,7 @@ class Axis:
     def position(self) -> int:
         """6064h [increments]."""
         self.count, self.read_at = self.hardware.position(), self._timers.now
-        return wrap(self.count - self.home)
+        return (self.count - self.home + _HALF) % _SPAN - _HALF
 
     def velocity(self) -> float:
         """Of the shaft [rad/s]."""

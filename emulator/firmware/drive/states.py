@@ -98,6 +98,9 @@ REACTIONS: dict[tuple[State, Command], tuple[int, ...]] = {
 """What a command does in a state; a pair that is not here does nothing."""
 
 
+_NOTHING: tuple[int, ...] = ()
+
+
 def _decode(low_byte: int) -> Command:
     for command, mask, value in _PATTERNS:
         if low_byte & mask == value:
@@ -105,7 +108,10 @@ def _decode(low_byte: int) -> Command:
     return Command.NONE
 
 
-_COMMANDS = tuple(_decode(low_byte) for low_byte in range(256))
+_ROWS = {
+    state: tuple(REACTIONS.get((state, _decode(low_byte)), _NOTHING) for low_byte in range(256)) for state in State
+}
+"""State -> what each low byte of the controlword leads to: the table above, looked up once a cycle."""
 
 
 class StateMachine:
@@ -123,6 +129,16 @@ class StateMachine:
         self._reset_level = False
         self.state = State.NOT_READY_TO_SWITCH_ON
 
+    @property
+    def state(self) -> State:
+        """State of the power drive system."""
+        return self._state
+
+    @state.setter
+    def state(self, state: State) -> None:
+        self._state = state
+        self._row = _ROWS[state]
+
     def start(self) -> None:
         """Transitions 0 and 1: power-on or reset, and the end of initialisation."""
         self.state = State.NOT_READY_TO_SWITCH_ON
@@ -132,17 +148,22 @@ class StateMachine:
     def control(self, controlword: int) -> None:
         """Act on a controlword; a fault reset is the rising edge of bit 7."""
         level = bool(controlword & FAULT_RESET_BIT)
-        command = _COMMANDS[controlword & 0xFF]
-        if level and not self._reset_level:
-            command = Command.FAULT_RESET
-        self._reset_level = level
-        self.command(command)
+        if level is not self._reset_level:
+            self._reset_level = level
+            if level:
+                self.command(Command.FAULT_RESET)
+                return
+        for number in self._row[controlword & 0xFF]:
+            self._request(number)
 
     def command(self, command: Command) -> None:
         """Carry out a command as the table says."""
-        for number in REACTIONS.get((self.state, command), ()):
-            if self._ready(number):
-                self.take(number)
+        for number in REACTIONS.get((self.state, command), _NOTHING):
+            self._request(number)
+
+    def _request(self, number: int) -> None:
+        if self._ready(number):
+            self.take(number)
 
     def take(self, number: int) -> None:
         """Take transition `number` if it leaves the present state."""
