@@ -9,11 +9,13 @@ from pathlib import Path
 
 import can
 
+from emulator.ground import Ground
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
 from hil.bench import LockstepBench
 from hil.buses import open_served_bus
 from hil.clock import Clock
+from hil.faults import Fault, parse_fault, parse_script
 from hil.network import Network
 from hil.serving import VehicleServer
 from ident.vehicle.effects import Effect
@@ -71,6 +73,29 @@ def server_bus(name: str, network: Network) -> Iterator[can.BusABC]:
         bus.shutdown()
 
 
-def server(emulated: EmulatedVehicle, bus: can.BusABC, clock: Clock, network: Path, lockstep: bool) -> VehicleServer:
-    """A server of an emulated vehicle on a bus."""
-    return VehicleServer(emulated, bus, clock, network, lockstep)
+def server(
+    emulated: EmulatedVehicle,
+    bus: can.BusABC,
+    clock: Clock,
+    network: Path,
+    lockstep: bool,
+    *,
+    seed: int = 0,
+    delays: bool = False,
+) -> VehicleServer:
+    """A server of an emulated vehicle on a bus; `seed` is that of its faults, see `VehicleServer`."""
+    ground = Ground(emulated.engine)
+    return VehicleServer(emulated, bus, clock, network, lockstep, ground, seed, delays)
+
+
+def read_faults(texts: Sequence[str]) -> list[Fault]:
+    """Faults as they are given on the command line: each one line, or the path of a script.
+
+    Raises:
+        FaultError: one cannot be read.
+    """
+    faults: list[Fault] = []
+    for text in texts:
+        path = Path(text)
+        faults += parse_script(path.read_text(encoding="utf-8")) if path.is_file() else [parse_fault(text)]
+    return faults

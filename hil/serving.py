@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,9 @@ from emulator.firmware.description import read_network_description
 from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.network import DeviceNetwork
 from hil.buses.frame_kinds import device_frame
+from hil.buses.unix import UnixHub
+from hil.buses.wire import Wire
+from hil.buses.wired import Devices, WiredDevices
 from hil.clock import Clock
 from hil.faults import FaultInjector
 from hil.faults.devices import Slippery
@@ -21,6 +25,9 @@ from hil.realtime import steady_memory
 
 _IDLE = 0.001
 """Longest time without looking at the clock [s]: one step of the physics engine."""
+
+_BEFORE_SYNC = 1e-6
+"""How far from the next SYNC the wire is left alone [s]."""
 
 _MASTER_PAUSE = 0.2
 """Time without a SYNC [s] after which a lockstep server lets time pass by the clock again."""
@@ -58,6 +65,7 @@ class VehicleServer:
         lockstep: SYNC moves time.
         ground: under its wheels, to be made slippery.
         seed: of the randomness of faults.
+        delays: frames wait for arbitration and take their bit times, in simulated time.
 
     Attributes:
         faults: what can go wrong between the bus and the nodes.
@@ -73,6 +81,7 @@ class VehicleServer:
         lockstep: bool = False,
         ground: Slippery | None = None,
         seed: int = 0,
+        delays: bool = False,
     ) -> None:
         described = load_network(network)
         self._bus = bus
@@ -85,8 +94,20 @@ class VehicleServer:
         def nodes(tapped: TappedVehicle, send: Callable[[int, bytes], None]) -> DeviceNetwork:
             return DeviceNetwork(tapped, description, send)
 
-        self.faults = FaultInjector(nodes, TappedVehicle(vehicle), self._send, described, ground, seed)
-        self._devices = self.faults
+        def make(send: Callable[[int, bytes], None]) -> FaultInjector:
+            self.faults = FaultInjector(nodes, TappedVehicle(vehicle), send, described, ground, seed)
+            return self.faults
+
+        self._wired: WiredDevices | None = None
+        self._devices: Devices
+        if delays:
+            wire = Wire(described.bit_rate)
+            self._devices = self._wired = WiredDevices(make, wire, self._send_at, vehicle.time)
+        else:
+            self._devices = make(self._send)
+        # A hub hands the frames of one SYNC over together.
+        self._together = bus.burst if isinstance(bus, UnixHub) else contextlib.nullcontext
+        self._grid = self._devices.time
         self._behind = clock.now() - self._devices.time
         self._stepping = False
         self._last_sync = 0.0
@@ -96,7 +117,7 @@ class VehicleServer:
         """Serve until `stop()`, which is asked at least every millisecond of idleness."""
         with steady_memory():
             while not stop():
-                message = self._bus.recv(_IDLE)
+                message = self._bus.recv(self._patience())
                 if message is None:
                     self._follow_clock()
                 elif message.is_remote_frame and not message.is_extended_id:
@@ -106,11 +127,27 @@ class VehicleServer:
                     self._take(message.arbitration_id, bytes(message.data))
         return self.report
 
+    def _patience(self) -> float:
+        """How long there is nothing to do but to wait for a frame [s]."""
+        if self._wired is None or self._stepping:
+            return _IDLE
+        return min(max(self._wired.next_event() + self._behind - self._clock.now(), 0.0), _IDLE)
+
     def _take(self, can_id: int, data: bytes) -> None:
         self.report.frames += 1
-        is_sync = can_id == self._sync_cob_id
-        self.report.syncs += is_sync
-        if is_sync and self._lockstep:
+        if can_id != self._sync_cob_id:
+            self._follow_clock()
+            self._devices.receive(can_id, data)
+        else:
+            self.report.syncs += 1
+            with self._together():
+                self._take_sync(can_id, data)
+        if self._wired is not None and self._stepping:
+            # Nothing else moves time before the next SYNC, and the master waits for what is on the wire.
+            self._wired.settle(self._grid + self._period - _BEFORE_SYNC)
+
+    def _take_sync(self, can_id: int, data: bytes) -> None:
+        if self._lockstep:
             self._step()
         else:
             self._follow_clock()
@@ -118,7 +155,10 @@ class VehicleServer:
 
     def _step(self) -> None:
         if self._stepping:
-            self._devices.advance(round(self._devices.time + self._period, 9))
+            self._grid = round(self._grid + self._period, 9)
+            self._devices.advance(max(self._grid, self._devices.time))
+        else:
+            self._grid = self._devices.time
         self._stepping = True
         self._last_sync = self._clock.now()
 
@@ -140,4 +180,7 @@ class VehicleServer:
         self._devices.advance(round(instant, 9))
 
     def _send(self, can_id: int, data: bytes) -> None:
+        self._bus.send(device_frame(can_id, data))
+
+    def _send_at(self, can_id: int, data: bytes, _instant: float) -> None:
         self._bus.send(device_frame(can_id, data))

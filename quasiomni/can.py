@@ -7,31 +7,80 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich import box
+from rich.table import Table
 
+from hil import control
 from hil.socketcan import build_library, environment
-from hil.socketcan.library import default_cache
 from ident.errors import BusError
-from quasiomni.application import app
+from quasiomni.application import app, console
 
 can_app = typer.Typer(help="The CAN bus: unmodified SocketCAN programs on it, faults, load.", no_args_is_help=True)
 app.add_typer(can_app, name="can")
 
+DEFAULT_BUS = "unix:/tmp/can0"
 BusOption = Annotated[str, typer.Option(help="The emulator's bus, as `quasiomni emulate --bus` was given it.")]
 
 
 @can_app.command("exec", context_settings={"ignore_unknown_options": True})
 def execute(
     command: Annotated[list[str], typer.Argument(help="Program and arguments, e.g. `candump can0`; after `--`.")],
-    bus: BusOption = "unix:/tmp/can0",
+    bus: BusOption = DEFAULT_BUS,
     interface: Annotated[str, typer.Option(help="Name under which the program finds the bus.")] = "can0",
 ) -> None:
     """Run an unmodified SocketCAN program on a `unix:` bus: `quasiomni can exec -- candump can0`."""
-    library = build_library(default_cache(os.environ))
+    library = build_library()
     found = environment(os.environ, library, {interface: hub_path(bus)})
     try:
         os.execvpe(command[0], command, found)
     except OSError as error:
         raise BusError(f"{command[0]} cannot be run: {error.strerror}.", "Install it, or give its path.") from error
+
+
+ControlOption = Annotated[
+    Path | None, typer.Option("--control", help="Where the emulator takes commands. Default: beside a `unix:` bus.")
+]
+
+
+@can_app.command()
+def fault(
+    text: Annotated[list[str], typer.Argument(help="Faults such as `drop@0x181:rate=10%,to=2s`, counted from now.")],
+    bus: BusOption = DEFAULT_BUS,
+    at: ControlOption = None,
+) -> None:
+    """Inject faults into a running emulator. `quasiomni can kinds` lists what there is."""
+    for one in text:
+        console.print(control.command(at or control.control_path(bus), f"add {one}"), highlight=False)
+
+
+@can_app.command()
+def faults(bus: BusOption = DEFAULT_BUS, at: ControlOption = None) -> None:
+    """List the faults of a running emulator that last or are still to come."""
+    console.print(control.command(at or control.control_path(bus), "list"), highlight=False, markup=False)
+
+
+@can_app.command()
+def heal(
+    numbers: Annotated[list[int] | None, typer.Argument(help="Numbers of faults to end. Default: all.")] = None,
+    bus: BusOption = DEFAULT_BUS,
+    at: ControlOption = None,
+) -> None:
+    """End faults of a running emulator."""
+    for order in [f"remove {number}" for number in numbers or ()] or ["clear"]:
+        console.print(control.command(at or control.control_path(bus), order), highlight=False)
+
+
+@can_app.command()
+def kinds() -> None:
+    """List the faults that can be injected, where, and the numbers that each takes."""
+    from hil.faults.fault import SPECIFICATIONS
+
+    table = Table("fault", "where", "what", "numbers (default)", box=box.SIMPLE_HEAD)
+    for kind, one in SPECIFICATIONS.items():
+        numbers = "; ".join(f"{name} ({number.default:g}): {number.what}" for name, number in one.parameters.items())
+        table.add_row(kind, one.target, one.what, numbers)
+    console.print(table)
+    console.print("All take from and to [s], counted from the injection. Units: s, ms, us, %, /s.", highlight=False)
 
 
 def hub_path(bus: str) -> Path:

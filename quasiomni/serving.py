@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections.abc import Callable, Iterator
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from hil.campaign.folder import network_file_of
 from hil.clock import WallClock
+from hil.control import ControlServer, Injection, control_path
 from hil.network import load_network
 from quasiomni.application import app, console
 from quasiomni.options import EffectOption, GuiOption, NetworkOption, SeedOption, load_emulation, parse_effects
@@ -31,6 +34,18 @@ def emulate(
     seed: SeedOption = 1,
     stand: Annotated[Stand, typer.Option(help="On the floor, or on the jack-stand, wheels free.")] = Stand.FLOOR,
     lockstep: Annotated[bool, typer.Option("--lockstep", help="Time moves with the master's SYNC.")] = False,
+    bit_times: Annotated[
+        bool, typer.Option("--bit-times", help="Frames wait for arbitration and take their bit times.")
+    ] = False,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Fault such as `drop@0x181:rate=10%,from=2s`, or a file of them. See `can kinds`. Repeatable."
+        ),
+    ] = None,
+    control: Annotated[
+        Path | None, typer.Option(help="Socket for `can fault`. Default: beside a `unix:` bus, PATH.control.")
+    ] = None,
     duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
     effect: EffectOption = None,
     gui: GuiOption = False,
@@ -38,6 +53,7 @@ def emulate(
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
     emulation = load_emulation()
     network_file = network or network_file_of(prototype)
+    faults = emulation.read_faults(fault or [])
     end = None if duration is None else time.monotonic() + duration
     with (
         emulation.vehicle(prototype, seed, gui, parse_effects(effect)) as vehicle,
@@ -46,8 +62,23 @@ def emulate(
         if stand is Stand.JACK:
             vehicle.lift()
         console.print(f"{prototype} is up on {bus}, {'in lockstep' if lockstep else 'in real time'}. Ctrl-C ends it.")
-        server = emulation.server(vehicle, opened, WallClock(), network_file, lockstep)
-        with contextlib.suppress(KeyboardInterrupt):
-            server.serve(lambda: end is not None and time.monotonic() > end)
+        server = emulation.server(vehicle, opened, WallClock(), network_file, lockstep, seed=seed, delays=bit_times)
+        for one in faults:
+            server.faults.add(one)
+        with _commands(control, bus, server.faults) as poll, contextlib.suppress(KeyboardInterrupt):
+            server.serve(lambda: poll() or (end is not None and time.monotonic() > end))
         served = server.report
     console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
+
+
+@contextlib.contextmanager
+def _commands(path: Path | None, bus: str, faults: Injection) -> Iterator[Callable[[], None]]:
+    """Where commands are taken while the emulator serves; gives what has to be called now and then."""
+    if path is None and not bus.startswith("unix:"):
+        yield lambda: None
+        return
+    server = ControlServer(path or control_path(bus), faults)
+    try:
+        yield server.poll
+    finally:
+        server.close()

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from vehicle_controller import VehicleController
 
-from hil.pytest_plugin import World
+from hil.testing import World
 
 
 @pytest.fixture

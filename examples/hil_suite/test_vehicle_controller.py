@@ -12,7 +12,7 @@ from vehicle_controller import Mode, VehicleController
 
 from emulator.vehicle import EmulatedVehicle
 from hil.faults import FaultInjector
-from hil.pytest_plugin import Expect, World, all_drives, at_rest, drive, emergency, heartbeat_state, moving
+from hil.testing import Expect, World, all_drives, at_rest, drive, emergency, heartbeat_state, moving
 
 pytestmark = pytest.mark.hil(seed=3)
 

@@ -108,6 +108,10 @@ class FaultInjector:
         for number in tuple(self._injected):
             self.remove(number)
 
+    def describe(self) -> list[str]:
+        """One line for each fault that lasts or is still to come."""
+        return [f"{one.number}: {one.fault}, from {one.begin:.3f} s to {one.end:.3f} s" for one in self.pending]
+
     def receive(self, can_id: int, data: bytes) -> None:
         """Take a data frame of the master."""
         if self._rules:

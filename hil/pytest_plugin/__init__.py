@@ -1,34 +1,4 @@
-"""Hardware-in-the-loop tests that read like sentences: `expect(all_drives("fault")).within(0.1)`.
+"""Hardware in the loop under pytest: fixtures of a bench, expectations in simulated time, pictures of failures.
 
-The pytest plugin itself is `hil.pytest_plugin.plugin`; tests import from here what they expect.
+Nothing is imported here: pytest loads the plugin in every project, and only a test that asks for a bench pays for it.
 """
-
-from hil.pytest_plugin.conditions import (
-    Condition,
-    all_drives,
-    at_rest,
-    drive,
-    emergency,
-    frame,
-    heartbeat_state,
-    moving,
-    travelled,
-)
-from hil.pytest_plugin.expectations import Expect
-from hil.pytest_plugin.health import Symptom
-from hil.pytest_plugin.world import World
-
-__all__ = [
-    "Condition",
-    "Expect",
-    "Symptom",
-    "World",
-    "all_drives",
-    "at_rest",
-    "drive",
-    "emergency",
-    "frame",
-    "heartbeat_state",
-    "moving",
-    "travelled",
-]

@@ -13,6 +13,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
+from platformdirs import user_cache_path
+
 from ident.errors import BusError
 
 SOURCE: Final = Path(__file__).with_name("preload.c")
@@ -31,17 +33,11 @@ def compilers() -> list[list[str]]:
     return found
 
 
-def default_cache(environ: Mapping[str, str]) -> Path:
-    """Folder for what is built once: $XDG_CACHE_HOME/quasiomni, or ~/.cache/quasiomni."""
-    base = environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "quasiomni"
-
-
-def build_library(cache: Path, compiler: list[str] | None = None) -> Path:
+def build_library(cache: Path | None = None, compiler: list[str] | None = None) -> Path:
     """The library, built if this source was not built before.
 
     Args:
-        cache: folder that keeps it; made if missing.
+        cache: folder that keeps it, made if missing; the user's cache folder unless given.
         compiler: command of a C compiler, the first one of `compilers` unless given.
 
     Raises:
@@ -50,7 +46,7 @@ def build_library(cache: Path, compiler: list[str] | None = None) -> Path:
     if sys.platform != "linux":
         raise BusError("SocketCAN programs exist on Linux only.", "Use python-can's own interfaces instead.")
     digest = hashlib.sha256(SOURCE.read_bytes()).hexdigest()[:16]
-    target = cache / f"socketcan-{digest}.so"
+    target = (cache or user_cache_path("quasiomni")) / f"socketcan-{digest}.so"
     if not target.is_file():
         _compile(compiler or _any_compiler(), target)
     return target
