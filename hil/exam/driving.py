@@ -32,7 +32,7 @@ class NobodyThere:
         raise AssertionError("an exam has no lifted step")
 
 
-def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[AnyEffect]) -> Record:
+def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[AnyEffect], noise_scale: float = 1.0) -> Record:
     """Record of a plan driven by a vehicle with effects.
 
     The alignments between the steps are left out: how many there were depends on the effect.
@@ -42,6 +42,7 @@ def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[AnyEffect]) -
         prototype: of the emulator, by name.
         seed: of all noise.
         effects: that the vehicle has.
+        noise_scale: factor on every random source of the emulator.
 
     Raises:
         UserError: the vehicle cannot have the effects, or cannot drive with them.
@@ -53,7 +54,9 @@ def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[AnyEffect]) -
         recorder = Recorder(folder.frames)
         try:
             with (
-                EmulatedVehicle(load_prototype(prototype), seed=seed, effects=effects) as vehicle,
+                EmulatedVehicle(
+                    load_prototype(prototype), seed=seed, effects=effects, noise_scale=noise_scale
+                ) as vehicle,
                 LockstepBench(vehicle, network.path) as bench,
             ):
                 CampaignRunner(run, bench.bus, bench.clock, recorder, NobodyThere(), lambda *_: None).drive()

@@ -1,13 +1,17 @@
 """The size of an effect in noise units: what it does to the generalized torques, over what differs between periods.
 
-Two runs with one seed differ by the effect alone. What the eleven columns of the model can absorb of the difference
-is no gap; the rest, rms over moving samples, is taken in the coordinate where it is largest against its noise, and
-divided by the period-to-period rms of that coordinate. Effects that move no torque but break the rolling
-constraints have the same measure there.
+Two runs differ by the effect alone. What the eleven columns of the model can absorb of the difference is no gap; the
+rest, rms over moving samples, is taken in the coordinate where it is largest against its noise, and divided by the
+period-to-period rms of that coordinate. Effects that move no torque but break the rolling constraints have the same
+measure there.
+
+The two runs are driven without noise, so that they differ by nothing else: with it, an alignment more or less shifts
+all noise that follows. The noise is that of a third run.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,65 +26,77 @@ from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]
 
+_PROCESSING = Processing()
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Period-to-period rms of a vehicle without effects.
+
+    Attributes:
+        torques: of each generalized torque, by step and coordinate [Nm or N].
+        slips: of what odometry leaves of the eight constraints, by step (8,) [m/s].
+    """
+
+    torques: Mapping[tuple[str, str], float]
+    slips: Mapping[str, Array]
+
 
 @dataclass(frozen=True)
 class SizeInNoise:
-    """Size of an effect in noise units, largest coordinate.
+    """Size of an effect in noise units [-].
 
     Attributes:
-        torque: of the generalized torques, after what the model absorbs [-].
-        torque_coordinate: `step/coordinate` where that is.
-        drift: of the generalized torques, nothing absorbed: of a changed parameter [-].
-        kinematic: of the rolling constraints [-].
-        kinematic_coordinate: `step` where that is.
+        torque: of the generalized torques, after what the model absorbs.
+        drift: of the generalized torques, nothing absorbed: what a model with given values does not explain.
+        kinematic: of the rolling constraints.
     """
 
     torque: float
-    torque_coordinate: str
     drift: float
     kinematic: float
-    kinematic_coordinate: str
 
 
-def size_in_noise(plain: Record, changed: Record, values: Array, geometry: Geometry) -> SizeInNoise:
-    """Compare two runs with one seed and one plan.
+def noise_of(record: Record, values: Array, geometry: Geometry) -> Noise:
+    """Noise of a run with repeats, parameters (11,) being those of the model."""
+    floors = [noise_floor(rows, values) for rows in usable_equations(list(record.segments), geometry, _PROCESSING)]
+    return Noise(
+        {(floor.step, floor.coordinate): floor.noise for floor in floors},
+        {segment.step: _slip_noise(segment, geometry) for segment in record.segments},
+    )
+
+
+def size_in_noise(noise: Noise, plain: Record, changed: Record, values: Array, geometry: Geometry) -> SizeInNoise:
+    """Compare two runs of one plan, both without noise.
 
     Args:
+        noise: of the vehicle.
         plain: without the effect.
         changed: with it.
         values: parameters of the model (11,).
         geometry: of the vehicle.
     """
-    processing = Processing()
-    rows = list(
+    pairs = list(
         zip(
-            usable_equations(list(plain.segments), geometry, processing),
-            usable_equations(list(changed.segments), geometry, processing),
+            usable_equations(list(plain.segments), geometry, _PROCESSING),
+            usable_equations(list(changed.segments), geometry, _PROCESSING),
             strict=True,
         )
     )
-    noise = [noise_floor(one, values).noise for one, _ in rows]
-    masks = [one.moving & other.moving & (one.period >= 0) for one, other in rows]
-    difference = [
-        _residual(other, values)[m] - _residual(one, values)[m] for (one, other), m in zip(rows, masks, strict=True)
-    ]
-    weighted = [d / n for d, n in zip(difference, noise, strict=True)]
-    columns = np.concatenate([one.regressor[m] / n for (one, _), m, n in zip(rows, masks, noise, strict=True)])
-    stacked = np.concatenate(weighted)
-    scale = np.linalg.norm(columns, axis=0)
-    scale[scale == 0] = 1.0
-    absorbed = (columns / scale) @ np.linalg.lstsq(columns / scale, stacked, rcond=None)[0]
-    ends = np.cumsum([len(d) for d in weighted])[:-1]
-    left = [_rms(part) for part in np.split(stacked - absorbed, ends)]
-    names = [f"{one.step}/{one.coordinate}" for one, _ in rows]
-    kinematic = _kinematic(plain, changed, geometry, processing)
-    worst = max(kinematic, key=lambda step: kinematic[step])
+    gaps, columns = [], []
+    for one, other in pairs:
+        kept, unit = one.moving & other.moving, noise.torques[one.step, one.coordinate]
+        gaps.append((_residual(other, values) - _residual(one, values))[kept] / unit)
+        columns.append(one.regressor[kept] / unit)
+    left = np.concatenate(gaps) - _absorbed(np.concatenate(columns), np.concatenate(gaps))
+    ends = np.cumsum([len(gap) for gap in gaps])[:-1]
     return SizeInNoise(
-        torque=max(left),
-        torque_coordinate=names[int(np.argmax(left))],
-        drift=max(_rms(part) for part in weighted),
-        kinematic=kinematic[worst],
-        kinematic_coordinate=worst,
+        torque=max(_rms(part) for part in np.split(left, ends)),
+        drift=max(_rms(gap) for gap in gaps),
+        kinematic=max(
+            _slip_size(one, other, noise.slips[one.step], geometry)
+            for one, other in zip(plain.segments, changed.segments, strict=True)
+        ),
     )
 
 
@@ -88,32 +104,35 @@ def _residual(equations: Equations, values: Array) -> Array:
     return equations.torque - equations.regressor @ values
 
 
+def _absorbed(columns: Array, gap: Array) -> Array:
+    """Projection of a gap (N,) onto columns (N, 11)."""
+    norms = np.linalg.norm(columns, axis=0)
+    scaled = columns / np.where(norms > 0, norms, 1.0)
+    return np.asarray(scaled @ np.linalg.lstsq(scaled, gap, rcond=None)[0])
+
+
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
-def _kinematic(plain: Record, changed: Record, geometry: Geometry, processing: Processing) -> dict[str, float]:
-    """By step: rms of the difference in what odometry leaves of the eight constraints, over its noise."""
-    sizes = {}
-    for one, other in zip(plain.segments, changed.segments, strict=True):
-        first, moving = _slips(one, geometry, processing)
-        second, also_moving = _slips(other, geometry, processing)
-        mask = moving & also_moving & (one.period >= 0)
-        noise = _period_noise(first, one.period, mask)
-        if mask.any():
-            sizes[one.step] = max(_rms((second - first)[mask, row]) / noise[row] for row in range(8) if noise[row] > 0)
-    return sizes
+def _slips(segment: Segment, geometry: Geometry) -> tuple[Array, NDArray[np.bool_]]:
+    """What odometry leaves of the eight constraints (N, 8) [m/s], and where any wheel moves (N,)."""
+    motion = motion_of(segment, geometry, _PROCESSING)
+    slips = np.einsum("nij,nj->ni", kinematics.constraint_matrix(motion.alpha, geometry), motion.rates)
+    fastest = np.abs(motion.rates[:, 5:]).max(axis=1, keepdims=True)
+    moving = moving_rows(fastest, _PROCESSING, segment.sample_time)
+    return zero_phase(slips, _PROCESSING.cutoff, segment.sample_time), moving
 
 
-def _slips(segment: Segment, geometry: Geometry, processing: Processing) -> tuple[Array, NDArray[np.bool_]]:
-    motion = motion_of(segment, geometry, processing)
-    constraints = kinematics.constraint_matrix(motion.alpha, geometry)
-    slips = np.einsum("nij,nj->ni", constraints, motion.rates)
-    moving = moving_rows(np.abs(motion.rates[:, 5:]).max(axis=1, keepdims=True), processing, segment.sample_time)
-    return zero_phase(slips, processing.cutoff, segment.sample_time), moving
+def _slip_size(plain: Segment, changed: Segment, noise: Array, geometry: Geometry) -> float:
+    first, moving = _slips(plain, geometry)
+    second, also_moving = _slips(changed, geometry)
+    difference = (second - first)[moving & also_moving]
+    return max(_rms(difference[:, row]) / noise[row] for row in range(8) if noise[row] > 0)
 
 
-def _period_noise(slips: Array, period: NDArray[np.int64], mask: NDArray[np.bool_]) -> Array:
-    numbers = [number for number in np.unique(period) if number >= 0]
-    folded = np.stack([np.where(mask[period == number, None], slips[period == number], np.nan) for number in numbers])
-    return np.asarray(np.sqrt(np.nanmean(np.nanvar(folded, axis=0, ddof=1), axis=0)))
+def _slip_noise(segment: Segment, geometry: Geometry) -> Array:
+    slips, moving = _slips(segment, geometry)
+    folded = np.stack([slips[segment.period == number] for number in segment.periods])
+    moved = np.stack([moving[segment.period == number] for number in segment.periods]).all(axis=0)
+    return np.asarray(np.sqrt(folded[:, moved].var(axis=0, ddof=1).mean(axis=0)))
