@@ -25,7 +25,7 @@ DRIVE_UNWIND_TIME: Final = 0.05
 CREEP_STIFFNESS: Final = 1e7
 """Contact force per slip velocity [N s/m]: under 100 N a wheel slips by 10 micrometres a second."""
 
-STICK_TIME: Final = 0.065
+STICK_TIME: Final = 0.06
 """How long motion below stiction goes on before it is held [s]; chosen in docs/adr/0008."""
 
 MODE_TOLERANCE: Final = 0.02

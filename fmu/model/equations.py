@@ -9,7 +9,7 @@ import casadi as ca
 
 from fmu.model.drives import DRIVES
 from fmu.model.motion import acceleration, motion_of, motor_wrench
-from fmu.model.stiction import memory_rate
+from fmu.model.stiction import memory_rates
 from fmu.model.symbols import Symbols, bound
 from fmu.table import effect_parameter
 from fmu.variables import Block, Inputs, VariableTable
@@ -49,7 +49,7 @@ def equations(table: VariableTable, effects: Sequence[Effect], inputs: Inputs) -
     shaft = effect_terms.shaft_torques(terms, torques, beta)
     xd = ca.vertcat(
         acceleration(motion, p, shaft),
-        memory_rate(x, p, rates),
+        memory_rates(x, p, rates),
         integral_rates,
         rates[3:],
         _pose_rate(motion.state.heading, rates),
