@@ -41,7 +41,7 @@ def conformance(
     """Replay the trace of a conformance test against an emulated drive."""
     load_emulation()
     from hil.conformance.emulated import replay_trace
-    from hil.conformance.report import write_table
+    from hil.conformance.report import write_page
 
     verdicts = replay_trace(trace)
     replayed = [verdict for verdict in verdicts if verdict.outcome is not None]
@@ -51,7 +51,7 @@ def conformance(
         if not verdict.passed:
             console.print(f"{verdict.case.number} {verdict.case.name}: {verdict}", highlight=False, markup=False)
     if out is not None:
-        out.write_text(write_table(verdicts), encoding="utf-8")
+        out.write_text(write_page(verdicts), encoding="utf-8")
         console.print(str(out), highlight=False)
     if passed < len(replayed):
         raise typer.Exit(1)

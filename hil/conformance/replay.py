@@ -42,6 +42,8 @@ _RANDOM_WRITES = frozenset(("9.1",))
 _STANDARD_ERRORS = frozenset((0x8210, 0x8220, 0x8130, 0x8240, 0x8250))
 """EMCY codes of CiA 301 that a device of any profile sends; others are the device's own."""
 
+_MISSING = (OBJECT_MISSING, SUBINDEX_MISSING)
+
 _SEGMENT_REQUEST, _SEGMENT_MASK = 0x60, 0xEF
 
 _UNANSWERED = (0x80, 0xA1)
@@ -121,6 +123,8 @@ class Replay:
         """Replay what precedes a case in the trace, and the case."""
         for frame in case.preparation:
             self._play(frame, case.abort_codes)
+        while self._bus.recv(0) is not None:
+            pass
         self._received.clear()
         self._owed.clear()
         self._random_writes = case.number in _RANDOM_WRITES
@@ -132,7 +136,7 @@ class Replay:
                 outcome.answers += 1
             if self._owed[frame.can_id]:
                 last[frame.can_id] = Deviation(position, frame, None)
-            if not fine and self._is_absent(got):
+            if not fine and self._is_absent(frame.data, got):
                 outcome.absent += 1
             elif not fine:
                 outcome.deviations.append(Deviation(position, frame, got))
@@ -201,12 +205,14 @@ class Replay:
         elif self._request[0] >> 5 == UPLOADED:
             self._uploaded = got[0] >> 5 == UPLOADED and bool(got[0] & 2)
 
-    def _is_absent(self, got: bytes | None) -> bool:
+    def _is_absent(self, expected: bytes, got: bytes | None) -> bool:
         """Refused because the node has no such object, or goes on with a transfer that was refused so."""
         if got is None or got[0] != ABORT or not self._initiated:
             return False
+        if expected[0] == ABORT and abort_code(expected) in _MISSING:
+            return False
         index, subindex = struct.unpack_from("<HB", self._initiated, 1)
-        missing = abort_code(got) in (OBJECT_MISSING, SUBINDEX_MISSING) or self._request != self._initiated
+        missing = abort_code(got) in _MISSING or self._request != self._initiated
         return missing and (index, subindex) not in self._objects
 
     def _expect_emergency(self, frame: TracedFrame) -> tuple[bool, bytes | None]:

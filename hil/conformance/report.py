@@ -9,6 +9,19 @@ from hil.conformance.cases import NOT_APPLICABLE, OWN_TESTS
 from hil.conformance.replay import Outcome, Replay
 from hil.conformance.trace import Case
 
+_HEAD = """# CiA's conformance test
+
+The trace of a run of CiA's conformance tool that CANopenDemo publishes (Apache-2.0, a CiA 401 device), replayed frame
+by frame against an emulated drive (node 4). Of {cases} cases {replayed} are replayed, and {passed} of them pass; {own}
+are shown by tests of ours, because the tool skipped or failed them for its device, or the trace does not hold what
+counts; {idle} do not apply. Compared is what the protocol fixes: kind and toggle of every answer, abort codes (that of
+the trace, or another that the tool accepts), values of the objects of CiA 301, NMT states, error codes, SYNCs. PDO
+mapping entries of the CiA 401 device are replaced by those of a drive of the same length and direction.
+
+Written by `quasiomni conformance TRACE --out docs/conformance.md`.
+
+"""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -38,7 +51,7 @@ class Verdict:
         if not self.outcome.passed:
             return f"**deviates**: {self.outcome.deviations[0]}"
         absent = f", {self.outcome.absent} of them about objects of another profile" if self.outcome.absent else ""
-        return f"passed, {self.outcome.answers} answers{absent}"
+        return f"passed, answers compared: {self.outcome.answers}{absent}"
 
 
 def run_cases(cases: Iterable[Case], replay: Replay) -> list[Verdict]:
@@ -47,14 +60,23 @@ def run_cases(cases: Iterable[Case], replay: Replay) -> list[Verdict]:
     return [Verdict(case, None if case.number in elsewhere or not case.frames else replay.run(case)) for case in cases]
 
 
-def write_table(verdicts: Sequence[Verdict]) -> str:
-    """A Markdown table of all cases."""
+def write_page(verdicts: Sequence[Verdict]) -> str:
+    """A Markdown page with all cases."""
+    replayed = [verdict for verdict in verdicts if verdict.outcome is not None]
+    passed = sum(verdict.passed for verdict in replayed)
+    own = sum(verdict.case.number in OWN_TESTS for verdict in verdicts)
+    idle = sum(verdict.case.number in NOT_APPLICABLE for verdict in verdicts)
+    head = _HEAD.format(cases=len(verdicts), replayed=len(replayed), passed=passed, own=own, idle=idle)
     rows = [
         f"| {verdict.case.number} | {verdict.case.name} | {_cell(verdict.case.purpose)} | {verdict.case.verdict} "
         f"| {_cell(str(verdict))} |"
         for verdict in verdicts
     ]
-    return "\n".join(("| case | name | purpose | device of the trace | drive |", "|---|---|---|---|---|", *rows)) + "\n"
+    return (
+        head
+        + "\n".join(("| case | name | purpose | device of the trace | drive |", "|---|---|---|---|---|", *rows))
+        + "\n"
+    )
 
 
 def _cell(text: str) -> str:

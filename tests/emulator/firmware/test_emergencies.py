@@ -35,6 +35,13 @@ def test_the_history_has_the_newest_error_first_and_holds_eight(wire) -> None:
     assert [wire.read(1, 0x1003, k) & 0xFFFF for k in range(1, 9)] == codes[:8]
 
 
+def test_the_history_has_what_the_message_said(wire) -> None:
+    wire.nmt(0x01, 1)
+    for data in (SHORT, RIGHT + b"\x00"):
+        ((code, _, information),) = messages(wire.send(0x201, data))
+        assert wire.read(1, 0x1003, 1) == code | information << 16
+
+
 def test_an_entry_that_is_not_there_has_no_data(wire) -> None:
     assert wire.abort_code_of_read(1, 0x1003, 1) == 0x08000024
 
