@@ -169,11 +169,12 @@ def _manifest(run: Run) -> dict[str, Any]:
         "periods": plan.periods,
         "cycle": plan.cycle,
         "steps": list(plan.steps),
-        "excitations": {step: _excitation_entry(excitation) for step, excitation in plan.excitations.items()},
+        "excitations": {step: excitation_entry(excitation) for step, excitation in plan.excitations.items()},
     }
 
 
-def _excitation_entry(excitation: Excitation) -> dict[str, Any]:
+def excitation_entry(excitation: Excitation) -> dict[str, Any]:
+    """An excitation as plain values."""
     return {
         "period": excitation.series.period,
         "cosine": excitation.series.cosine.tolist(),
@@ -189,7 +190,7 @@ def _restore(folder: RunFolder, manifest: Mapping[str, Any], vehicle: VehicleDes
     if manifest["cycle"] != network.cycle_period:
         raise ValueError(f"a cycle of {manifest['cycle']!r} s, not that of {network.path}")
     excitations: dict[str, Excitation] = {
-        Step(step): _excitation_of(entry) for step, entry in manifest["excitations"].items()
+        Step(step): excitation_of(entry) for step, entry in manifest["excitations"].items()
     }
     plan = assemble_plan(
         vehicle,
@@ -210,6 +211,7 @@ def _restore(folder: RunFolder, manifest: Mapping[str, Any], vehicle: VehicleDes
     )
 
 
-def _excitation_of(entry: Mapping[str, Any]) -> Excitation:
+def excitation_of(entry: Mapping[str, Any]) -> Excitation:
+    """The excitation of `excitation_entry`."""
     series = FourierSeries(np.array(entry["cosine"]), np.array(entry["sine"]), float(entry["period"]))
     return Excitation(series, float(entry["condition"]), str(entry["binding"]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -9,7 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from ident.campaign.plan import Plan, make_plan
+from hil.campaign.folder import excitation_entry, excitation_of
+from ident.campaign.plan import Plan, assemble_plan, make_plan
 from ident.campaign.steps import EXCITATIONS, PERIODS, StepSpec
 from ident.records.record import Step
 from ident.vehicle.description import VehicleDescription
@@ -45,6 +47,34 @@ class ExamPlans:
 
     fit: Plan
     confirm: Plan
+
+
+def plans_text(plans: ExamPlans) -> str:
+    """Both plans as JSON; all that the seed decides."""
+    both = {"fit": plans.fit, "confirm": plans.confirm}
+    return json.dumps(
+        {
+            name: {step: excitation_entry(excitation) for step, excitation in plan.excitations.items()}
+            for name, plan in both.items()
+        }
+    )
+
+
+def plans_from_text(text: str, vehicle: VehicleDescription, cycle: float) -> ExamPlans:
+    """The plans of `plans_text` for a vehicle and a cycle T_s [s]."""
+    document = json.loads(text)
+    fit, confirm = (
+        assemble_plan(
+            vehicle,
+            {Step(step): excitation_of(entry) for step, entry in document[name].items()},
+            steps=STEPS,
+            periods=PERIODS,
+            cycle=cycle,
+            specs=specs,
+        )
+        for name, specs in (("fit", FITTING), ("confirm", CONFIRMING))
+    )
+    return ExamPlans(fit, confirm)
 
 
 def plan_exam(vehicle: VehicleDescription, seed: int, cycle: float) -> ExamPlans:

@@ -1,0 +1,189 @@
+"""Cases of an exam: which effect, where, how large, with which noise; drawn at random, balanced, in shuffled order."""
+
+from __future__ import annotations
+
+import enum
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from hil.exam.sizes import EffectSize, SizeTable
+from ident.errors import UserError
+
+SIZES: Final = (0.2, 0.5, 1.0)
+"""Of the effects of an exam, in noise units."""
+
+UNKNOWN_SIZES: Final = (0.5, 1.0, 2.0)
+"""Of the effects that have no candidate, in noise units."""
+
+SEEDS_PER_CASE: Final = 2
+
+
+class Kind(enum.StrEnum):
+    """What a case asks."""
+
+    EFFECT = "effect"
+    PAIR = "pair"
+    NONE = "none"
+    UNKNOWN = "unknown"
+    INVISIBLE = "invisible"
+
+
+@dataclass(frozen=True)
+class Injected:
+    """An effect of a case.
+
+    Attributes:
+        name, where: which.
+        parameter: that says how large it is.
+        size: of that parameter [SI].
+    """
+
+    name: str
+    where: str
+    parameter: str
+    size: float
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case with its answer.
+
+    Attributes:
+        identifier: random; all that the diagnosing side sees of it.
+        kind: what it asks.
+        effects: that the vehicle has.
+        noise_units: size of each of them, zero without one.
+        seed: of the noise while fitting; the next one while confirming.
+    """
+
+    identifier: str
+    kind: Kind
+    effects: tuple[Injected, ...]
+    noise_units: float
+    seed: int
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "identifier": self.identifier,
+            "kind": str(self.kind),
+            "effects": [vars(effect) for effect in self.effects],
+            "noise_units": self.noise_units,
+            "seed": self.seed,
+        }
+
+
+def case_from_json(entry: dict[str, Any]) -> Case:
+    """The case of `Case.as_json`."""
+    effects = tuple(Injected(**effect) for effect in entry["effects"])
+    return Case(entry["identifier"], Kind(entry["kind"]), effects, entry["noise_units"], entry["seed"])
+
+
+@dataclass(frozen=True)
+class Composition:
+    """How many cases of each kind."""
+
+    effects: int = 240
+    pairs: int = 24
+    none: int = 60
+    unknown: int = 40
+    invisible: int = 24
+
+    @property
+    def total(self) -> int:
+        """Of all kinds."""
+        return self.effects + self.pairs + self.none + self.unknown + self.invisible
+
+
+def draw_cases(table: SizeTable, composition: Composition, seed: int, generator: np.random.Generator) -> list[Case]:
+    """Cases in shuffled order.
+
+    Args:
+        table: what size each effect has in noise units.
+        composition: how many of which kind.
+        seed: first of the seeds of the noise; two a case.
+        generator: of everything that is drawn.
+
+    Raises:
+        UserError: the table has no effect of a kind that is asked for.
+    """
+    questions = [
+        *_singles(table.visible, composition.effects, SIZES, Kind.EFFECT, generator),
+        *_pairs(table.visible, composition.pairs, generator),
+        *((Kind.NONE, (), 0.0) for _ in range(composition.none)),
+        *_singles(table.unknown, composition.unknown, UNKNOWN_SIZES, Kind.UNKNOWN, generator),
+        *_hidden(table.invisible, composition.invisible, generator),
+    ]
+    order = generator.permutation(len(questions))
+    identifiers = _identifiers(len(questions), generator)
+    cases = []
+    for number, (position, identifier) in enumerate(zip(order.tolist(), identifiers, strict=True)):
+        kind, effects, noise_units = questions[position]
+        cases.append(Case(identifier, kind, effects, noise_units, seed + SEEDS_PER_CASE * number))
+    return cases
+
+
+_Question = tuple[Kind, tuple[Injected, ...], float]
+
+
+def _identifiers(count: int, generator: np.random.Generator) -> list[str]:
+    found: dict[str, None] = {}
+    while len(found) < count:
+        found[generator.bytes(6).hex()] = None
+    return list(found)
+
+
+def _by_name(rows: Sequence[EffectSize], generator: np.random.Generator) -> list[Iterator[EffectSize]]:
+    """For each name, its places over and over, in random order."""
+    names = list(dict.fromkeys(row.name for row in rows))
+    if not names:
+        raise UserError("The size table has no effect of a kind that the exam asks for.", "Ask for none of them.")
+    rounds: list[Iterator[EffectSize]] = []
+    for name in names:
+        places = [row for row in rows if row.name == name]
+        rounds.append(itertools.cycle([places[index] for index in generator.permutation(len(places))]))
+    return rounds
+
+
+def _singles(
+    rows: Sequence[EffectSize], count: int, sizes: Sequence[float], kind: Kind, generator: np.random.Generator
+) -> Iterator[_Question]:
+    """Names in turn; each name runs through the sizes, and through its places."""
+    if not count:
+        return
+    rounds = _by_name(rows, generator)
+    for number in range(count):
+        turn, name = divmod(number, len(rounds))
+        size = sizes[(turn + name) % len(sizes)]
+        yield kind, (_injected(next(rounds[name]), size, generator),), size
+
+
+def _pairs(rows: Sequence[EffectSize], count: int, generator: np.random.Generator) -> Iterator[_Question]:
+    """Two effects of different names, both as large as the largest size."""
+    if not count:
+        return
+    rounds = _by_name(rows, generator)
+    for _ in range(count):
+        first, second = generator.choice(len(rounds), size=2, replace=False)
+        chosen = (_injected(next(rounds[index]), SIZES[-1], generator) for index in (first, second))
+        yield Kind.PAIR, tuple(chosen), SIZES[-1]
+
+
+def _hidden(rows: Sequence[EffectSize], count: int, generator: np.random.Generator) -> Iterator[_Question]:
+    """Effects that these campaigns do not show, as large as they are in practice."""
+    if not count:
+        return
+    rounds = _by_name(rows, generator)
+    for number in range(count):
+        row = next(rounds[number % len(rounds)])
+        sign = generator.choice([-1.0, 1.0]) if row.signed else 1.0
+        yield Kind.INVISIBLE, (Injected(row.name, row.where, row.parameter, sign * row.largest),), 0.0
+
+
+def _injected(row: EffectSize, noise_units: float, generator: np.random.Generator) -> Injected:
+    sign = generator.choice([-1.0, 1.0]) if row.signed else 1.0
+    return Injected(row.name, row.where, row.parameter, float(sign * row.physical(noise_units)))

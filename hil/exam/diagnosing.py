@@ -1,0 +1,128 @@
+"""The diagnosing side: records and model in, answers out. It never imports the emulator."""
+
+from __future__ import annotations
+
+import importlib.abc
+import importlib.machinery
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+from hil.exam.folder import RECORDS, ExamFolder, read_exam, write_atomically
+from hil.exam.record_bytes import record_from_bytes
+from hil.exam.workers import run_all
+from ident.errors import UserError
+from ident.gap.vehicle.diagnose import diagnose_vehicle
+from ident.vehicle.description import load_vehicle
+from ident.vehicle.effects import EffectName
+from ident.vehicle.parameters import read_parameters
+
+FORBIDDEN: Final = ("emulator", "pybullet")
+"""Packages that would know the answers."""
+
+Progress = Callable[[int, int], None]
+
+
+class _Refusal(importlib.abc.MetaPathFinder):
+    """Refuses to find what is forbidden."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        """Nothing, for every other module."""
+        if fullname.partition(".")[0] in FORBIDDEN:
+            raise ImportError(f"the diagnosing side of an exam must not import {fullname}")
+        return None
+
+
+def forbid_emulator() -> None:
+    """From now on this process cannot import the emulator.
+
+    Raises:
+        UserError: it has done so already.
+    """
+    known = sorted(name for name in FORBIDDEN if name in sys.modules)
+    if known:
+        raise UserError(f"This process has imported {known[0]}.", "Diagnose in a process of its own.")
+    if not any(isinstance(finder, _Refusal) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _Refusal())
+
+
+def diagnose_exam(
+    folder: ExamFolder,
+    *,
+    jobs: int,
+    scheduler: str | None,
+    progress: Progress,
+    removed: Mapping[str, str] | None = None,
+) -> None:
+    """Diagnose all cases that have no answer yet.
+
+    Args:
+        folder: of the exam.
+        jobs: processes on this machine.
+        scheduler: of a Dask cluster, None for this machine.
+        progress: called with cases done and in all.
+        removed: candidate that is taken out of the library, by case; all of them are left in without.
+
+    Raises:
+        UserError: there is no exam, or records are missing.
+    """
+    forbid_emulator()
+    exam = read_exam(folder)
+    asked = [identifier for identifier in exam.identifiers if removed is None or identifier in removed]
+    left = [identifier for identifier in asked if not folder.diagnosis(identifier, removed is not None).is_file()]
+    vehicle, model = (path.read_text(encoding="utf-8") for path in (folder.vehicle, folder.model))
+    tasks = (
+        (identifier, *_contents(folder, identifier), vehicle, model, (removed or {}).get(identifier))
+        for identifier in left
+    )
+    progress(len(asked) - len(left), len(asked))
+    for done, (identifier, content) in enumerate(
+        run_all(diagnose_case, tasks, jobs=jobs, scheduler=scheduler), len(asked) - len(left) + 1
+    ):
+        write_atomically(folder.diagnosis(identifier, removed is not None), content)
+        progress(done, len(asked))
+
+
+def diagnose_case(
+    identifier: str, fit: bytes, confirm: bytes, vehicle: str, model: str, removed: str | None
+) -> tuple[str, bytes]:
+    """Diagnosis of one case as JSON, with the processor time that it took [s]; runs in a worker.
+
+    Args:
+        identifier: of the case.
+        fit, confirm: its records, as Parquet.
+        vehicle, model: texts of the files.
+        removed: candidate that the library is to lack.
+    """
+    forbid_emulator()
+    with tempfile.TemporaryDirectory() as scratch:
+        files = [Path(scratch) / name for name in ("vehicle.toml", "model.toml")]
+        for file, text in zip(files, (vehicle, model), strict=True):
+            file.write_text(text, encoding="utf-8")
+        described, parameters = load_vehicle(files[0]), read_parameters(files[1])
+    started = time.process_time()
+    answer = diagnose_vehicle(
+        [record_from_bytes(fit, "fit")],
+        [record_from_bytes(confirm, "confirm")],
+        described,
+        parameters,
+        effects=[name for name in EffectName if name != removed],
+    )
+    content: dict[str, Any] = answer.diagnosis.as_json()
+    return identifier, json.dumps({**content, "seconds": time.process_time() - started}).encode()
+
+
+def _contents(folder: ExamFolder, identifier: str) -> list[bytes]:
+    try:
+        return [folder.record(identifier, which).read_bytes() for which in RECORDS]
+    except OSError as error:
+        raise UserError(
+            f"{error.filename} is missing.", "Finish sealing: quasiomni exam seal goes on where it stopped."
+        ) from error

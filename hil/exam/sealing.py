@@ -1,0 +1,161 @@
+"""The sealing side: draws the cases, runs the emulator over CAN, writes records and a sealed answer."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from emulator.effects.injection import AnyEffect
+from emulator.effects.unlibraried import UNLIBRARIED, Unlibraried, UnlibrariedName
+from hil.campaign.folder import network_file_of
+from hil.exam.cases import Case, Composition, Injected, draw_cases
+from hil.exam.driving import drive
+from hil.exam.folder import (
+    RECORDS,
+    Exam,
+    ExamFolder,
+    answer_hash,
+    open_answer,
+    read_exam,
+    sealed,
+    write_atomically,
+    write_exam,
+)
+from hil.exam.plans import ExamPlans, plan_exam, plans_from_text, plans_text
+from hil.exam.record_bytes import record_bytes
+from hil.exam.sizes import SizeTable
+from hil.exam.workers import run_all
+from hil.network import load_network
+from hil.truth import truth_of
+from ident.errors import UserError
+from ident.vehicle.description import find_data_file, load_vehicle
+from ident.vehicle.effects import EffectName, make_effect
+from ident.vehicle.parameters import PARAMETER_UNITS, Parameters
+
+Progress = Callable[[int, int], None]
+"""Called with cases done and cases in all."""
+
+_EPOCH = (0, 0)
+
+
+@dataclass(frozen=True)
+class SealingOrder:
+    """An exam as it is asked for.
+
+    Attributes:
+        out: folder.
+        prototype: of the emulator, by name.
+        composition: how many cases of each kind.
+        seed: first of the noise, two a case; it seeds the excitations and everything drawn as well.
+        jobs: processes on this machine.
+        scheduler: of a Dask cluster, None for this machine.
+    """
+
+    out: Path
+    prototype: str
+    composition: Composition
+    seed: int
+    jobs: int
+    scheduler: str | None
+
+
+def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
+    """Seal an exam, or go on with one that was stopped.
+
+    Raises:
+        UserError: the folder holds another exam, or a case cannot be driven.
+    """
+    folder = ExamFolder(order.out)
+    if not folder.manifest.is_file():
+        _draw(folder, order, table)
+    exam = read_exam(folder)
+    cases = open_answer(folder, exam.answer_hash)
+    _refuse_other(cases, exam, order)
+    left = [case for case in cases if not _finished(folder, case.identifier)]
+    tasks = [(exam.plans, exam.prototype, exam.cycle, case) for case in left]
+    done = len(cases) - len(left)
+    progress(done, len(cases))
+    for identifier, contents in run_all(drive_case, tasks, jobs=order.jobs, scheduler=order.scheduler):
+        for which, content in zip(RECORDS, contents, strict=True):
+            path = folder.record(identifier, which)
+            write_atomically(path, content)
+            os.utime(path, _EPOCH)
+        done += 1
+        progress(done, len(cases))
+    return exam
+
+
+def drive_case(plans: str, prototype: str, cycle: float, case: Case) -> tuple[str, tuple[bytes, bytes]]:
+    """Both records of a case; runs in a worker.
+
+    Raises:
+        UserError: the vehicle cannot be driven with these effects.
+    """
+    both = _plans(plans, prototype, cycle)
+    effects = [effect_of(injected) for injected in case.effects]
+    try:
+        fit = drive(both.fit, prototype, case.seed, effects)
+        confirm = drive(both.confirm, prototype, case.seed + 1, effects)
+    except UserError as error:
+        what = ", ".join(f"{effect.name}@{effect.where}={effect.size:g}" for effect in case.effects)
+        raise UserError(f"Case {case.identifier} ({what}) was not driven: {error.what}", error.remedy) from error
+    return case.identifier, (record_bytes(fit), record_bytes(confirm))
+
+
+def effect_of(injected: Injected) -> AnyEffect:
+    """What the emulator injects."""
+    if injected.name in UnlibrariedName.__members__.values():
+        return Unlibraried(UnlibrariedName(injected.name), injected.where, injected.size)
+    return make_effect(EffectName(injected.name), injected.where, {injected.parameter: injected.size})
+
+
+def unlibraried_unit(name: str) -> str:
+    """Unit of the size of an effect without a candidate."""
+    return UNLIBRARIED[UnlibrariedName(name)].unit
+
+
+@lru_cache(maxsize=2)
+def _plans(text: str, prototype: str, cycle: float) -> ExamPlans:
+    return plans_from_text(text, load_vehicle(prototype), cycle)
+
+
+def _draw(folder: ExamFolder, order: SealingOrder, table: SizeTable) -> None:
+    """Everything but the records."""
+    cycle = load_network(network_file_of(order.prototype)).cycle_period
+    cases = draw_cases(table, order.composition, order.seed, np.random.default_rng(order.seed))
+    plans = plan_exam(load_vehicle(order.prototype), order.seed, cycle)
+    answer = sealed(cases, secrets.token_bytes(16))
+    write_atomically(folder.answer, answer)
+    shutil.copyfile(find_data_file("ident.vehicle", order.prototype), folder.vehicle)
+    write_atomically(folder.model, _model_text(truth_of(order.prototype)).encode())
+    identifiers = tuple(case.identifier for case in cases)
+    write_exam(folder, Exam(order.prototype, cycle, plans_text(plans), identifiers, answer_hash(answer)))
+
+
+def _model_text(truth: Parameters) -> str:
+    """The vehicle without effects, as a model file."""
+    lines = ['schema = "quasiomni.parameters/1"']
+    for name, unit in PARAMETER_UNITS.items():
+        lines += ["", f"[parameters.{name}]", f"value = {truth[name]:.9g}", f'unit = "{unit}"']
+        lines += ["std = 0.0", 'source = "the vehicle without effects"']
+    return "\n".join(lines) + "\n"
+
+
+def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
+    first = min(case.seed for case in cases)
+    if (exam.prototype, len(cases), first) != (order.prototype, order.composition.total, order.seed):
+        raise UserError(
+            f"{order.out} holds another exam: {len(cases)} cases of {exam.prototype} from seed {first}.",
+            "Go on with it as it was begun, or name another folder (--out).",
+        )
+
+
+def _finished(folder: ExamFolder, identifier: str) -> bool:
+    return all(folder.record(identifier, which).is_file() for which in RECORDS)

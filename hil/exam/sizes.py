@@ -1,0 +1,95 @@
+"""The table of sizes: how large an effect has to be, in its own unit, to have a size in noise units."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from ident.errors import DataFileError
+
+SIZES_FILE: Final = Path(__file__).parent / "data" / "sizes.json"
+"""Sizes of the prototype; `quasiomni exam calibrate` writes it anew."""
+
+
+@dataclass(frozen=True)
+class EffectSize:
+    """An effect at a place.
+
+    Attributes:
+        name, where, parameter: whose size.
+        unit: of the parameter.
+        channel: in which it shows most: `torque`, `drift` (a changed value of the model) or `kinematic`.
+        points: (size, noise units) as measured, ascending.
+        largest: size in practice; an effect below the noise even there is invisible.
+        signed: may be negative.
+        known: the library has a candidate for it.
+    """
+
+    name: str
+    where: str
+    parameter: str
+    unit: str
+    channel: str
+    points: tuple[tuple[float, float], ...]
+    largest: float
+    signed: bool
+    known: bool
+
+    def physical(self, noise_units: float) -> float:
+        """Size that amounts to so many noise units: straight lines through the points, both axes logarithmic."""
+        points = [(math.log(units), math.log(size)) for size, units in self.points]
+        target = math.log(noise_units)
+        if len(points) == 1:
+            (x, y), slope = points[0], 1.0
+            return math.exp(y + slope * (target - x))
+        upper = next((index for index in range(1, len(points)) if target <= points[index][0]), len(points) - 1)
+        (x0, y0), (x1, y1) = points[upper - 1], points[upper]
+        return math.exp(y0 + (y1 - y0) / (x1 - x0) * (target - x0))
+
+
+@dataclass(frozen=True)
+class SizeTable:
+    """All effects of an exam.
+
+    Attributes:
+        visible: of the library, with a size in noise units.
+        invisible: of the library, below the noise in these campaigns.
+        unknown: without a candidate.
+    """
+
+    visible: tuple[EffectSize, ...]
+    invisible: tuple[EffectSize, ...]
+    unknown: tuple[EffectSize, ...]
+
+
+def table_text(rows: Sequence[EffectSize]) -> str:
+    """The table as JSON."""
+    return json.dumps([vars(row) for row in rows], indent=1) + "\n"
+
+
+def load_sizes(path: Path = SIZES_FILE) -> SizeTable:
+    """Read a table.
+
+    Raises:
+        DataFileError: the file is missing or malformed.
+    """
+    try:
+        rows = [_row(entry) for entry in json.loads(path.read_text(encoding="utf-8"))]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataFileError(
+            f"{path} is no table of sizes: {error}.", "Write one: quasiomni exam calibrate --out FILE."
+        ) from error
+    return SizeTable(
+        visible=tuple(row for row in rows if row.known and row.points),
+        invisible=tuple(row for row in rows if row.known and not row.points),
+        unknown=tuple(row for row in rows if not row.known),
+    )
+
+
+def _row(entry: dict[str, Any]) -> EffectSize:
+    points = tuple((float(size), float(units)) for size, units in entry["points"])
+    return EffectSize(**{**entry, "points": points})
