@@ -12,6 +12,7 @@ import can
 from emulator.firmware.description import read_network_description
 from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.network import DeviceNetwork
+from emulator.firmware.storage import Memory
 from hil.buses.lockstep import LockstepHub
 from hil.buses.wire import BusLoad
 from hil.clock import SimulatedClock
@@ -30,6 +31,7 @@ class LockstepBench:
         ground: under its wheels, to be made slippery; `emulator.ground.Ground` for the emulated vehicle.
         seed: of the randomness of faults.
         delays: frames wait for arbitration and take their bit times.
+        memory: where the nodes store parameters (1010h); without one they outlive resets only.
 
     Attributes:
         bus: the master's endpoint.
@@ -50,6 +52,7 @@ class LockstepBench:
         ground: Slippery | None = None,
         seed: int = 0,
         delays: bool = False,
+        memory: Memory | None = None,
     ) -> None:
         self.vehicle = vehicle
         described = load_network(network)
@@ -59,7 +62,7 @@ class LockstepBench:
         description = read_network_description(network)
 
         def nodes(tapped: TappedVehicle, send: Callable[[int, bytes], None]) -> DeviceNetwork:
-            return DeviceNetwork(tapped, description, send)
+            return DeviceNetwork(tapped, description, send, memory)
 
         def make(send: Callable[[int, bytes], None]) -> FaultInjector:
             self.faults = FaultInjector(nodes, TappedVehicle(vehicle), send, described, ground, seed)

@@ -82,10 +82,16 @@ def server(
     *,
     seed: int = 0,
     delays: bool = False,
+    storage: Path | None = None,
 ) -> VehicleServer:
-    """A server of an emulated vehicle on a bus; `seed` is that of its faults, see `VehicleServer`."""
+    """A server of an emulated vehicle on a bus; `seed` is that of its faults, see `VehicleServer`.
+
+    Args:
+        storage: folder where the nodes store parameters.
+    """
     ground = Ground(emulated.engine)
-    return VehicleServer(emulated, bus, clock, network, lockstep, ground, seed, delays)
+    memory = None if storage is None else FolderMemory(storage)
+    return VehicleServer(emulated, bus, clock, network, lockstep, ground, seed, delays, memory)
 
 
 def read_faults(texts: Sequence[str]) -> list[Fault]:

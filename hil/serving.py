@@ -12,6 +12,7 @@ import can
 from emulator.firmware.description import read_network_description
 from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.network import DeviceNetwork
+from emulator.firmware.storage import Memory
 from hil.buses.frame_kinds import device_frame
 from hil.buses.unix import UnixHub
 from hil.buses.wire import Wire
@@ -66,6 +67,7 @@ class VehicleServer:
         ground: under its wheels, to be made slippery.
         seed: of the randomness of faults.
         delays: frames wait for arbitration and take their bit times, in simulated time.
+        memory: where the nodes store parameters (1010h); without one they outlive resets only.
 
     Attributes:
         faults: what can go wrong between the bus and the nodes.
@@ -82,6 +84,7 @@ class VehicleServer:
         ground: Slippery | None = None,
         seed: int = 0,
         delays: bool = False,
+        memory: Memory | None = None,
     ) -> None:
         described = load_network(network)
         self._bus = bus
@@ -92,7 +95,7 @@ class VehicleServer:
         description = read_network_description(network)
 
         def nodes(tapped: TappedVehicle, send: Callable[[int, bytes], None]) -> DeviceNetwork:
-            return DeviceNetwork(tapped, description, send)
+            return DeviceNetwork(tapped, description, send, memory)
 
         def make(send: Callable[[int, bytes], None]) -> FaultInjector:
             self.faults = FaultInjector(nodes, TappedVehicle(vehicle), send, described, ground, seed)
