@@ -9,6 +9,7 @@ from pathlib import Path
 
 import can
 
+from emulator.firmware.storage import FolderMemory
 from emulator.ground import Ground
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle

@@ -46,6 +46,9 @@ def emulate(
     control: Annotated[
         Path | None, typer.Option(help="Socket for `can fault`. Default: beside a `unix:` bus, PATH.control.")
     ] = None,
+    storage: Annotated[
+        Path | None, typer.Option(help="Folder where the nodes keep parameters stored by 1010h, for the next start.")
+    ] = None,
     duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
     effect: EffectOption = None,
     gui: GuiOption = False,
@@ -62,7 +65,9 @@ def emulate(
         if stand is Stand.JACK:
             vehicle.lift()
         console.print(f"{prototype} is up on {bus}, {'in lockstep' if lockstep else 'in real time'}. Ctrl-C ends it.")
-        server = emulation.server(vehicle, opened, WallClock(), network_file, lockstep, seed=seed, delays=bit_times)
+        server = emulation.server(
+            vehicle, opened, WallClock(), network_file, lockstep, seed=seed, delays=bit_times, storage=storage
+        )
         for one in faults:
             server.faults.add(one)
         with _commands(control, bus, server.faults) as poll, contextlib.suppress(KeyboardInterrupt):
