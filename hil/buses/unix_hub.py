@@ -68,6 +68,11 @@ class UnixHub(can.BusABC):
         self.channel_info = f"hub of unix:{path}"
         super().__init__(channel=str(path))
 
+    @property
+    def clients(self) -> int:
+        """Number of clients that hear this bus."""
+        return sum(client.wants is not None for client in self._clients)
+
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Send a frame to every client.
 
