@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import itemgetter
 
 from emulator.firmware.description import (
     DRIVE_ROLES,
@@ -19,6 +20,8 @@ from emulator.firmware.node import Application, Node
 from emulator.firmware.nodebus import NodeBus, Routes
 from emulator.firmware.storage import Memory, VolatileMemory
 from emulator.firmware.timers import Timers
+
+_identifier = itemgetter(0)
 
 _FRAME_TIME = 135e-6
 """When the other nodes hear a frame of a node [s]: 135 bits, 8 bytes with all stuff bits, at 1 Mbit/s."""
@@ -127,11 +130,11 @@ class DeviceNetwork:
             nodes = tuple(node for node in nodes if node.accepts_sync(data))
         for node in nodes:
             node.latch()
-        frames = [(can_id, data, node) for node in nodes for can_id, data in node.sync_frames()]
+        frames = [frame for node in nodes for frame in node.sync_frames()]
         # All nodes ask for the bus at once: the lowest identifier wins the arbitration.
         frames.sort(key=_identifier)
-        for can_id, data, node in frames:
-            self._transmit(node.network, can_id, data)
+        for can_id, data, bus in frames:
+            self._transmit(bus, can_id, data)
 
     def _produce_sync(self, can_id: int, data: bytes) -> None:
         self._send(can_id, data)
@@ -174,7 +177,3 @@ class DeviceNetwork:
 
         bus = NodeBus(self._routes)
         return Node(description.node_id, description.eds, bus, self._timers, self._memory, application)
-
-
-def _identifier(frame: tuple[int, bytes, Node]) -> int:
-    return frame[0]

@@ -132,10 +132,10 @@ class Node:
             for tpdo in self.pdos.sampled_tpdos:
                 tpdo.sample()
 
-    def sync_frames(self) -> list[tuple[int, bytes]]:
-        """The TPDOs that go out with this SYNC."""
-        counter = self.sync.counter
-        return [(tpdo.can_id, tpdo.data()) for tpdo in self.pdos.sync_tpdos if tpdo.due_at_sync(counter)]
+    def sync_frames(self) -> list[tuple[int, bytes, NodeBus]]:
+        """The TPDOs that go out with this SYNC: identifier, data, and the controller that sends them."""
+        counter, bus = self.sync.counter, self.network
+        return [(tpdo.can_id, tpdo.data(), bus) for tpdo in self.pdos.sync_tpdos if tpdo.due_at_sync(counter)]
 
     def notify_event(self) -> None:
         """Something worth an event-driven TPDO has happened."""

@@ -36,6 +36,10 @@ class PdoParameters(ABC):
         dictionary: the object dictionary of the node.
         indices: where the parameters are.
         changed: called when something was written that alters the behaviour of the PDO.
+
+    Attributes:
+        can_id: CAN identifier of the PDO.
+        synchronous: it goes with the SYNC.
     """
 
     receives = False
@@ -45,8 +49,8 @@ class PdoParameters(ABC):
         self._indices = indices
         self._changed = changed
         self.stale = True
-        self.cob_id = INVALID
-        self.transmission_type = 255
+        self._take_cob_id(INVALID)
+        self._take_transmission_type(EVENT_DRIVEN[-1])
         self.entries: tuple[int, ...] = ()
         dictionary.on_write(indices.communication, 1, self._write_cob_id)
         dictionary.on_write(indices.communication, 2, self._write_transmission_type)
@@ -59,21 +63,11 @@ class PdoParameters(ABC):
         """The PDO exists and carries something."""
         return not self.cob_id & INVALID and bool(self.entries)
 
-    @property
-    def can_id(self) -> int:
-        """CAN identifier of the PDO."""
-        return self.cob_id & 0x7FF
-
-    @property
-    def synchronous(self) -> bool:
-        """The PDO goes with the SYNC."""
-        return self.transmission_type <= SYNCHRONOUS_MAX
-
     def load(self) -> None:
         """Take everything from the dictionary, as after a reset."""
         read = self._dictionary.value
-        self.cob_id = read(self._indices.communication, 1)
-        self.transmission_type = read(self._indices.communication, 2)
+        self._take_cob_id(read(self._indices.communication, 1))
+        self._take_transmission_type(read(self._indices.communication, 2))
         self.entries = self._stored(read(self._indices.mapping, 0))
 
     def codes(self) -> str:
@@ -104,13 +98,21 @@ class PdoParameters(ABC):
     def _write_cob_id(self, value: int) -> None:
         check_cob_id(value)
         check_change(self.cob_id, value)
-        self.cob_id = value
+        self._take_cob_id(value)
         self._alter()
+
+    def _take_cob_id(self, value: int) -> None:
+        self.cob_id = value
+        self.can_id = value & 0x7FF
+
+    def _take_transmission_type(self, value: int) -> None:
+        self.transmission_type = value
+        self.synchronous = value <= SYNCHRONOUS_MAX
 
     def _write_transmission_type(self, value: int) -> None:
         if value > SYNCHRONOUS_MAX and value not in self.acyclic_types():
             raise AbortError(AbortCode.VALUE_RANGE_EXCEEDED)
-        self.transmission_type = value
+        self._take_transmission_type(value)
         self._alter()
 
     def acyclic_types(self) -> tuple[int, ...]:

@@ -92,6 +92,8 @@ class Tpdo(PdoParameters):
         Args:
             counter: the number in the SYNC, 0 where SYNCs are not numbered.
         """
+        if self.transmission_type == 1 and not self._awaits_start:
+            return True
         if self.transmission_type == 0:
             due, self.event_pending = self.event_pending, False
             return due
