@@ -128,7 +128,7 @@ def _slip_size(plain: Segment, changed: Segment, noise: Array, geometry: Geometr
     first, moving = _slips(plain, geometry)
     second, also_moving = _slips(changed, geometry)
     difference = (second - first)[moving & also_moving]
-    return max(_rms(difference[:, row]) / noise[row] for row in range(8) if noise[row] > 0)
+    return max(_rms(difference[:, row]) / float(noise[row]) for row in range(8) if noise[row] > 0)
 
 
 def _slip_noise(segment: Segment, geometry: Geometry) -> Array:

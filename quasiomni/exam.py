@@ -1,0 +1,110 @@
+"""The commands of the withheld exam of the gap diagnosis: seal, diagnose, score, calibrate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from hil.exam.cases import Composition
+from hil.exam.folder import ExamFolder, write_atomically
+from hil.exam.score_names import PERMUTED, WITHOUT_TRUE
+from hil.exam.score_report import reliability_svg, score_json, score_markdown, summary_lines
+from hil.exam.scoring import modesty, permuted, read_answers, removable, score
+from hil.exam.sizes import SIZES_FILE, load_sizes
+from hil.exam.statistics import Rate
+from hil.workflow import progress
+from quasiomni.application import app, console
+from quasiomni.options import load_emulation
+
+exam = typer.Typer(no_args_is_help=True, help="The withheld exam of the gap diagnosis.")
+app.add_typer(exam, name="exam")
+
+JobsOption = Annotated[int, typer.Option(min=1, help="Processes on this machine.")]
+SchedulerOption = Annotated[
+    str | None, typer.Option(help="Address of a Dask scheduler, e.g. tcp://host:8786. Default: this machine.")
+]
+FolderArgument = Annotated[Path, typer.Argument(help="Folder of the exam.")]
+
+_DEFAULT = Composition()
+
+
+@exam.command()
+def seal(
+    out: Annotated[Path, typer.Option(help="Folder to write, or to go on with.")],
+    first_seed: Annotated[int, typer.Option(min=1, help="First seed of the noise; two a case.")] = 500000,
+    effects: Annotated[int, typer.Option(min=0, help="Cases with one effect of the library.")] = _DEFAULT.effects,
+    pairs: Annotated[int, typer.Option(min=0, help="Cases with two.")] = _DEFAULT.pairs,
+    none: Annotated[int, typer.Option(min=0, help="Cases without any.")] = _DEFAULT.none,
+    unknown: Annotated[int, typer.Option(min=0, help="Cases with one the library lacks.")] = _DEFAULT.unknown,
+    invisible: Annotated[int, typer.Option(min=0, help="Cases with one below the noise.")] = _DEFAULT.invisible,
+    sizes: Annotated[Path, typer.Option(help="Table of sizes.")] = SIZES_FILE,
+    jobs: JobsOption = 2,
+    scheduler: SchedulerOption = None,
+) -> None:
+    """Draw cases, drive the emulator over CAN, write records and a sealed answer; goes on where it stopped."""
+    load_emulation()
+    from hil.exam.sealing import SealingOrder, seal
+
+    composition = Composition(effects, pairs, none, unknown, invisible)
+    order = SealingOrder(out, "prototype", composition, first_seed, jobs, scheduler)
+    with _bar("sealing") as shown:
+        sealed = seal(order, load_sizes(sizes), shown)
+    console.print(f"{len(sealed.identifiers)} cases. SHA-256 of the sealed answer: {sealed.answer_hash}")
+    console.print(f"Next: [bold]quasiomni exam diagnose {out}[/bold]")
+
+
+@exam.command()
+def diagnose(
+    folder: FolderArgument,
+    without_true_candidate: Annotated[
+        bool, typer.Option("--without-true-candidate", help="Open the answer; leave each true candidate out.")
+    ] = False,
+    jobs: JobsOption = 2,
+    scheduler: SchedulerOption = None,
+) -> None:
+    """Diagnose every case from records and nominal model alone; this process cannot import the emulator."""
+    from hil.exam.diagnosing import diagnose_exam
+
+    opened = ExamFolder(folder)
+    removed = removable(opened) if without_true_candidate else None
+    with _bar("diagnosing") as shown:
+        diagnose_exam(opened, jobs=jobs, scheduler=scheduler, progress=shown, removed=removed)
+    console.print(f"Next: [bold]quasiomni exam score {folder}[/bold]")
+
+
+@exam.command("score")
+def score_command(folder: FolderArgument) -> None:
+    """Open the sealed answer and score; writes score.md, score.json and reliability.svg."""
+    opened = ExamFolder(folder)
+    answers = read_answers(opened)
+    result, chance = score(answers), score(permuted(answers, np.random.default_rng(0)))
+    extra: dict[str, Rate] = {PERMUTED: chance.rates["top-1 or in the set"]}
+    if (folder / "diagnoses_without").is_dir():
+        extra[WITHOUT_TRUE] = modesty(read_answers(opened, removed=True))
+    for line in summary_lines(result):
+        console.print(line, highlight=False)
+    for name, rate in extra.items():
+        console.print(f"{name:<44} {rate}", highlight=False)
+    for name, text in (
+        ("score.md", score_markdown(result, "Exam", extra)),
+        ("score.json", score_json(result, extra)),
+        ("reliability.svg", reliability_svg(result.bins)),
+    ):
+        write_atomically(folder / name, text.encode())
+    console.print(f"Written: {folder / 'score.md'}, score.json, reliability.svg")
+
+
+@contextmanager
+def _bar(what: str) -> Iterator[Callable[[int, int], None]]:
+    with progress(console) as bars:
+        task = bars.add_task(what, total=None)
+
+        def shown(done: int, total: int) -> None:
+            bars.update(task, completed=done, total=total, description=f"{what} {done}/{total}")
+
+        yield shown
