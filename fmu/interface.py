@@ -14,7 +14,7 @@ MODEL_IDENTIFIER: Final = "quasiomni"
 
 LOG_CATEGORIES: Final[Mapping[str, str]] = {
     "logStatusError": "Calls that are refused, with the variable at fault; always written",
-    "logStatusDiscard": "Steps and derivatives that the model cannot compute",
+    "logStatusDiscard": "Steps and derivatives that the model cannot compute; always written",
     "logStatusWarning": "What an importer should know and can do without",
     "logEvents": "Events",
 }

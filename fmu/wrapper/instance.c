@@ -101,7 +101,7 @@ qo_answer qo_trial(const qo_instance *me, qo_status status)
     return status == QO_OK ? QO_ANSWER_OK : qo_tell(me, QO_ANSWER_DISCARD, "%s", me->now.model.message);
 }
 
-/* Errors are always told: an importer that asks for silence still wants to know why a call was refused. */
+/* An importer that asks for silence still wants to know why a call was refused or a step discarded. */
 qo_answer qo_set_logging(qo_instance *me, int on, size_t n, const char *const categories[])
 {
     int chosen = 0, category;
@@ -119,7 +119,7 @@ qo_answer qo_set_logging(qo_instance *me, int on, size_t n, const char *const ca
         chosen |= 1 << category;
     }
     chosen = n == 0 ? (1 << QO_CATEGORIES) - 1 : chosen;
-    me->categories = (on ? chosen : 0) | QO_LOG_ERROR;
+    me->categories = (on ? chosen : 0) | QO_LOG_ERROR | QO_LOG_DISCARD;
     return QO_ANSWER_OK;
 }
 

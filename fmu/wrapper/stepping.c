@@ -9,6 +9,12 @@
 /* To what an event is told to lie [s]. */
 #define EVENT_RESOLUTION 1e-6
 
+/* Share of a step that is left over by rounding alone. */
+#define SPLINTER 1e-12
+
+/* Internal steps of one communication step; qo_step has the same limit. */
+#define MOST_STEPS 50000
+
 static double rounding(double time)
 {
     return 1e-12 * fabs(time);
@@ -17,10 +23,10 @@ static double rounding(double time)
 static qo_answer check(const qo_instance *me, double time, double size)
 {
     const double slack = SAME_INSTANT * size + rounding(time);
-    if (!(size > 0.0) || size - size != 0.0) {
-        return qo_tell(me, QO_ANSWER_ERROR, "communicationStepSize must be a positive number.");
+    if (!(size > 0.0 && fabs(time + size) < HUGE_VAL)) {
+        return qo_tell(me, QO_ANSWER_ERROR, "communicationStepSize must be a positive number; the step must end at a finite time.");
     }
-    if (!(fabs(time - me->now.time) <= slack)) {
+    if (!(fabs(time) < HUGE_VAL && fabs(time - me->now.time) <= slack)) {
         return qo_tell(me, QO_ANSWER_ERROR, "currentCommunicationPoint must be %.17g, where the last step ended.",
                        me->now.time);
     }
@@ -38,19 +44,23 @@ static qo_status look_for_event(const qo_model *model, int *event)
 }
 
 /* Internal steps up to `size`, or to an event, or to where the importer asks to return, where it allows that. */
-static qo_status advance(qo_instance *me, double time, double size, qo_step_end *end)
+static qo_answer advance(qo_instance *me, double time, double size, qo_step_end *end)
 {
     qo_model *model = &me->now.model;
     double done = 0.0, longest = size;
-    while (done < size && !end->early) {
+    int changed, count;
+    for (count = 0; done < size && !end->early; count++) {
         const qo_model before = *model;
         double taken;
         qo_status status = qo_advance(model, fmin(longest, size - done), &taken);
-        if (status == QO_OK && me->events_told) {
-            status = look_for_event(model, &end->event);
+        if (status == QO_OK) {
+            status = me->events_told ? look_for_event(model, &end->event) : qo_update_discrete(model, &changed);
         }
         if (status != QO_OK) {
-            return status;
+            return qo_pass(me, status);
+        }
+        if (count == MOST_STEPS) {
+            return qo_tell(me, QO_ANSWER_DISCARD, "The step takes too many internal steps: shorten it.");
         }
         if (end->event && me->early_return && taken > EVENT_RESOLUTION) {
             *model = before;
@@ -58,7 +68,7 @@ static qo_status advance(qo_instance *me, double time, double size, qo_step_end 
             continue;
         }
         longest = 2 * taken;
-        done = taken < size - done ? done + taken : size;
+        done = size - done - taken > SPLINTER * size ? done + taken : size;
         me->now.time = end->time = time + done;
         end->early = end->event && me->early_return;
         if (me->between != NULL) {
@@ -67,27 +77,26 @@ static qo_status advance(qo_instance *me, double time, double size, qo_step_end 
         }
         end->early &= done < size;
     }
-    return QO_OK;
+    return QO_ANSWER_OK;
 }
 
 qo_answer qo_do_step(qo_instance *me, double time, double size, qo_step_end *end)
 {
     const qo_model before = me->now.model;
     const double before_time = me->now.time;
-    qo_status status;
+    qo_answer answer;
     end->time = me->now.time;
     end->event = end->early = 0;
     if (check(me, time, size) != QO_ANSWER_OK) {
         return QO_ANSWER_ERROR;
     }
     if (me->events_told || me->between != NULL) {
-        status = advance(me, time, size, end);
+        answer = advance(me, time, size, end);
     } else {
-        status = qo_step(&me->now.model, size);
+        answer = qo_pass(me, qo_step(&me->now.model, size));
         end->time = time + size;
     }
-    if (status != QO_OK) {
-        const qo_answer answer = qo_pass(me, status);
+    if (answer != QO_ANSWER_OK) {
         me->now.model = before;
         me->now.time = end->time = before_time;
         me->now.known = 0;

@@ -1,0 +1,142 @@
+"""An FMU as the vehicle behind the connector: its physics, with the drives and encoders of the emulator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+from emulator.drive import Drive
+from emulator.encoder import Encoder
+from emulator.noise import Disturbances
+from emulator.prototype import Prototype
+from hil.fmu_instance import FmuInstance
+from ident.vehicle.geometry import WHEELS
+
+PLANT_PREFIX: Final = "fmu:"
+"""In front of the path of an FMU, where a plant is named."""
+
+STEP: Final = 1e-3
+"""Communication step [s]: that of the emulator's physics engine."""
+
+_FREE: Final = 1e-9
+"""Friction of the contacts on the jack-stand [-]: a micronewton, where a drive's own friction is some newtons."""
+
+_STEP_TOLERANCE: Final = 1e-6
+"""Fraction of a step by which a duration may miss a whole number of steps through rounding."""
+
+
+class _Joints:
+    """Angles and rates of the FMU's joints, as drives and encoders take them."""
+
+    def __init__(self) -> None:
+        self.step_size = STEP
+        self.values: Sequence[float] = [0.0] * len(_SENSED)
+
+    def wheel_angle(self, wheel: int) -> float:
+        """[rad]."""
+        return self.values[wheel]
+
+    def wheel_rate(self, wheel: int) -> float:
+        """[rad/s]."""
+        return self.values[len(WHEELS) + wheel]
+
+    def steering_angle(self, side: int) -> float:
+        """As the encoder of a side (0 left, 1 right) reports it [rad]."""
+        return self.values[2 * len(WHEELS) + side]
+
+
+_SENSED: Final = (
+    *(f"beta_{wheel}" for wheel in WHEELS),
+    *(f"beta_{wheel}_dot" for wheel in WHEELS),
+    "alpha_l_reported",
+    "alpha_r_reported",
+)
+
+
+class FmuVehicle:
+    """The vehicle of an FMU with torque inputs; hardware of the firmware, as the emulated vehicle is.
+
+    Drives, encoders and the noise of their readings are those of a prototype; the fluctuating load of the emulator is
+    not, since the FMU is the model itself.
+
+    Args:
+        path: of the FMU.
+        prototype: whose drives and encoders it has.
+        seed: of the noise.
+        start: values of FMU variables that differ from its start values, by name.
+
+    Attributes:
+        drives: of the wheels fl, rl, fr, rr.
+        encoders: of the steering, left and right.
+
+    Raises:
+        FmuError: the FMU cannot be run, or has other inputs.
+    """
+
+    drives: tuple[Drive, Drive, Drive, Drive]
+    encoders: tuple[Encoder, Encoder]
+
+    def __init__(self, path: Path, prototype: Prototype, *, seed: int, start: dict[str, float] | None = None) -> None:
+        self.instance = FmuInstance(path, start or {})
+        self._noise = Disturbances(prototype, seed=seed, scale=1.0, step=STEP)
+        self._joints = _Joints()
+        self._ratio = prototype.geometry.gear_ratio
+        fl, rl, fr, rr = (
+            Drive(prototype.drive, prototype.power_stage, wheel, self._ratio, self._joints, self._noise)
+            for wheel in range(4)
+        )
+        self.drives = (fl, rl, fr, rr)
+        left, right = (Encoder(prototype.encoder, side, self._joints, self._noise) for side in range(2))
+        self.encoders = (left, right)
+        self._torques = self.instance.port([f"torque_{wheel}" for wheel in WHEELS])
+        self._friction = self.instance.port([f"friction_limit_{wheel}" for wheel in WHEELS])
+        self._floor = self.instance.read(self._friction)
+        self._sensed = self.instance.port(_SENSED)
+        self._steps = 0
+        self._owed = 0.0
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._steps * STEP
+
+    def advance(self, duration: float) -> None:
+        """Let `duration` [s] pass in whole steps; a remainder is carried to the next call."""
+        self._owed += duration
+        steps = math.floor(self._owed / STEP + _STEP_TOLERANCE)
+        self._owed -= steps * STEP
+        for _ in range(steps):
+            self._step()
+
+    def lift(self) -> None:
+        """Wheels free: the floor has no grip."""
+        self.instance.write(self._friction, [_FREE] * len(WHEELS))
+
+    def lower(self) -> None:
+        """Back on the floor."""
+        self.instance.write(self._friction, self._floor)
+
+    def close(self) -> None:
+        """Free the FMU."""
+        self.instance.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _step(self) -> None:
+        # As in the emulator: the torque that the drives report at t acts over the step that starts at t.
+        self.instance.write(self._torques, [drive.wheel_torque / self._ratio for drive in self.drives])
+        self.instance.step(STEP)
+        self._joints.values = self.instance.read(self._sensed)
+        self._steps += 1
+        for drive in self.drives:
+            drive.advance()
+        self._noise.advance()
