@@ -32,6 +32,8 @@ class Floors:
 def noise_floors(rows: Rows, models: Series, left: Array) -> Floors:
     """Noise from what differs between repeats, or, without any, from what a smooth function of the states leaves.
 
+    Never below what a block tolerates.
+
     Args:
         rows: of the blocks.
         models: of every block's target, (N,).
@@ -50,7 +52,8 @@ def noise_floors(rows: Rows, models: Series, left: Array) -> Floors:
             variance = total / count if count else float(np.mean(left[place] ** 2)) if left[place].size else 0.0
         values.append(np.sqrt(variance))
         measured.append(count > 0)
-    return Floors(np.maximum(values, np.finfo(float).tiny), np.array(measured, dtype=bool))
+    least = [max(block.tolerance, np.finfo(float).tiny) for block, _ in rows.blocks]
+    return Floors(np.maximum(values, least), np.array(measured, dtype=bool))
 
 
 def held_out_gap(rows: Rows, floors: Floors, before: Series, after: Series) -> Gap:

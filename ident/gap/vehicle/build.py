@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -18,14 +18,14 @@ from ident.gap.vehicle import rows
 from ident.gap.vehicle.library import DRIFTS, TermCause, placed_parameters, term_causes
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
-from ident.gap.vehicle.transforms import Setting, TransformCause, transform_causes
-from ident.records.record import Record, Step
+from ident.gap.vehicle.transforms import Setting, TransformCause, transform_cause, transform_causes
+from ident.records.record import Record, Step, base_step
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.effects import EffectName
+from ident.vehicle.effect_terms import TERMS, term_of
+from ident.vehicle.effects import Effect, EffectName
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES, PARAMETER_UNITS, Parameters
-from ident.vehicle.vectorised import Vectorised
 
 Array = NDArray[np.float64]
 Cause = TermCause | TransformCause
@@ -39,7 +39,7 @@ OVERSAMPLED: Final = 3.0
 ASKEW: Final = 0.4
 """Steering angle beyond which a wheel that steers at standstill pushes the chassis aside [rad]."""
 
-CREEP: Final = 1e-3
+CREEP: Final = 3e-4
 """Part of the rolling speed by which a wheel may creep, as any tyre does at some percent of its adhesion [-]."""
 
 PRIOR_WEIGHT: Final = 1e-4
@@ -75,9 +75,7 @@ class Source:
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of its rows, a block each."""
-        if self.channel is Channel.DYNAMIC:
-            return self.spec.coordinates
-        return rows.kinematic_coordinates(self.spec)
+        return rows.coordinates(self.channel, self.spec)
 
 
 @dataclass(frozen=True)
@@ -88,11 +86,27 @@ class Context:
         geometry: of the vehicle.
         processing: filters and thresholds.
         parameters: p (11,) at which columns are taken.
+        formulas: the equations, effects that are given in them.
+        given: effects with a memory that are part of the model too.
     """
 
     geometry: Geometry
     processing: Processing
     parameters: Array
+    formulas: rows.Formulas
+    given: tuple[tuple[TransformCause, float], ...] = ()
+
+    @property
+    def constants(self) -> tuple[Array, Array, Array]:
+        """What the formulas take beside the inputs."""
+        return self.geometry.as_vector(), np.array([COULOMB_EPSILON]), self.parameters
+
+    def inputs(self, source: Source) -> Array:
+        """Measured signals of a source, the given effects with a memory taken out."""
+        inputs, setting = source.inputs, Setting(self.geometry, self.parameters, source.sample_time)
+        for cause, size in self.given:
+            inputs = cause.transform(inputs, cause.place, size, setting)
+        return inputs
 
     def filtered(self, values: Array, source: Source) -> Array:
         """Columns (M, ...) through the filter, thinned to the rows of the source's blocks."""
@@ -100,31 +114,32 @@ class Context:
 
 
 def build_problem(
-    record: Record,
+    records: Sequence[Record],
     vehicle: VehicleDescription,
     model: Parameters | None = None,
     *,
+    given: Sequence[Effect] = (),
     effects: Sequence[EffectName] = tuple(EffectName),
     steps: Sequence[Step] = DIAGNOSED,
     processing: Processing | None = None,
 ) -> Problem:
-    """Rows and causes of a record.
+    """Rows and causes of some records.
 
     Args:
-        record: of a campaign.
+        records: of campaigns with this vehicle as it is.
         vehicle: its geometry is taken as true, its prior only for what no row shows.
         model: values being judged; None: they are refitted, and changed values are no cause.
+        given: effects that the model has already.
         effects: that are looked for.
         steps: whose rows are used, variants of them included.
         processing: filters and thresholds.
 
     Raises:
-        RecordError: none of the steps is in the record.
+        RecordError: none of the steps is in a record.
     """
     processing = processing or Processing()
-    sources = sources_of(record, vehicle.geometry, steps, processing)
-    values = model.values if model else fitted_parameters(sources, vehicle, processing)
-    context = Context(vehicle.geometry, processing, values)
+    sources = [source for record in records for source in sources_of(record, vehicle.geometry, steps, processing)]
+    context = make_context(sources, vehicle, model, given, processing)
     causes = _causes(effects, model is not None)
     units = [unit for cause in causes if isinstance(cause, TermCause) for v in cause.variants for unit in v.units]
     tables = [_table(source, context, units) for source in sources]
@@ -137,6 +152,23 @@ def build_problem(
         candidates=tuple(_candidate(cause, columns, sources, tables, context) for cause in causes),
         nominal=Nominal(model.values, model.std) if model else None,
     )
+
+
+def make_context(
+    sources: Sequence[Source],
+    vehicle: VehicleDescription,
+    model: Parameters | None,
+    given: Sequence[Effect],
+    processing: Processing,
+) -> Context:
+    """Context of some sources; without a model, parameters are fitted to them."""
+    terms = rows.Formulas([term_of(effect) for effect in given if effect.name in TERMS])
+    memories = tuple(
+        (transform_cause(effect.name, effect.where), effect.size) for effect in given if effect.name not in TERMS
+    )
+    context = Context(vehicle.geometry, processing, vehicle.prior.values, terms, memories)
+    values = model.values if model else fitted_parameters(sources, vehicle, context)
+    return replace(context, parameters=values)
 
 
 def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], processing: Processing) -> list[Source]:
@@ -160,8 +192,8 @@ def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], proces
 
 
 def _spec(step: str, steps: Sequence[Step]) -> RowsOfStep | None:
-    """Rows of a step or of a variant of it, which is named `<step>_<variant>`."""
-    return next((ROWS[known] for known in steps if step == known or step.startswith(f"{known}_")), None)
+    base = base_step(step)
+    return ROWS[base] if base is not None and base in steps else None
 
 
 def _sources(signals: Signals, spec: RowsOfStep, processing: Processing) -> Iterable[Source]:
@@ -214,10 +246,9 @@ def _rolling(signals: Signals, spec: RowsOfStep, processing: Processing) -> NDAr
     return np.asarray(near)
 
 
-def fitted_parameters(sources: Sequence[Source], vehicle: VehicleDescription, processing: Processing) -> Array:
+def fitted_parameters(sources: Sequence[Source], vehicle: VehicleDescription, context: Context) -> Array:
     """p (11,) by least squares over the dynamic rows; what they do not show stays at the vehicle file's guesses."""
     prior = vehicle.prior.values
-    context = Context(vehicle.geometry, processing, prior)
     normal, right = np.zeros((2, len(prior), len(prior)))[0], np.zeros(len(prior))
     for source in sources:
         if source.channel is Channel.DYNAMIC:
@@ -238,9 +269,8 @@ _COLUMNS: Final = 1 + len(PARAMETER_NAMES)
 
 def _table(source: Source, context: Context, units: Sequence[rows.UnitTerm]) -> Array:
     """Filtered residual at p = 0, regressor and columns of a source: (N, rows, 12 + units)."""
-    make = rows.linearised_dynamic if source.channel is Channel.DYNAMIC else rows.linearised_kinematic
-    constants = (context.geometry.as_vector(), np.array([COULOMB_EPSILON]), context.parameters)
-    return context.filtered(make(source.spec, units)(source.inputs, *constants), source)
+    function = context.formulas.linearised(source.channel, source.spec, units)
+    return context.filtered(function(context.inputs(source), *context.constants), source)
 
 
 def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
@@ -335,18 +365,14 @@ def _changes(
 
 def _change(cause: Cause, source: Source, context: Context, values: Array, parameters: Array) -> Array:
     """The same for one source before the filter (M, rows)."""
-    constants = (context.geometry.as_vector(), np.array([COULOMB_EPSILON]), parameters)
-    plain = _exact(source, None)
-    before = plain(source.inputs, *constants, np.zeros(0))
+    context = replace(context, parameters=parameters)
+    inputs, plain = context.inputs(source), context.formulas.exact(source.channel, source.spec)
+    before = plain(inputs, *context.constants, np.zeros(0))
     if isinstance(cause, TermCause):
-        after = _exact(source, cause)(source.inputs, *constants, values)
+        exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)
+        after = exact(inputs, *context.constants, values)
     else:
         setting = Setting(context.geometry, parameters, source.sample_time)
-        changed = cause.transform(source.inputs, cause.place, float(values[0]), setting)
-        after = plain(changed, *constants, np.zeros(0))
+        changed = cause.transform(inputs, cause.place, float(values[0]), setting)
+        after = plain(changed, *context.constants, np.zeros(0))
     return np.asarray((after - before)[..., 0])
-
-
-def _exact(source: Source, cause: TermCause | None) -> Vectorised:
-    make = rows.exact_dynamic if source.channel is Channel.DYNAMIC else rows.exact_kinematic
-    return make(source.spec, None, "") if cause is None else make(source.spec, cause.name, cause.where)

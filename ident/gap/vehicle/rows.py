@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Final
 
 import casadi as ca
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.estimate.equations import RowsOfStep
+from ident.gap.problem import Channel
 from ident.vehicle import symbolic
 from ident.vehicle.effect_terms import (
     EffectTerm,
@@ -182,18 +182,46 @@ class UnitTerm:
     symbol: Expression
 
 
-def linearised_dynamic(spec: RowsOfStep, units: Sequence[UnitTerm]) -> Vectorised:
-    """(z, geometry, ε, p) -> (N, rows, 12 + units): dynamic rows at p = 0, then ∂/∂p, then ∂/∂unit."""
-    z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
-    names = dynamic_coordinates(spec)
-    rows = dynamic_rows(spec.mode, z, p, [unit.term for unit in units])
-    return _linearise(ca.vertcat(*(rows[names.index(name)] for name in spec.coordinates)), z, p, units)
+class Formulas:
+    """The rows as numpy functions, made when they are first needed.
+
+    Args:
+        given: effects that are known to be there, part of the model itself.
+    """
+
+    def __init__(self, given: Sequence[EffectTerm] = ()) -> None:
+        self._given = tuple(given)
+        self._exact: dict[tuple[Channel, RowsOfStep, EffectName | None, str], Vectorised] = {}
+
+    def linearised(self, channel: Channel, spec: RowsOfStep, units: Sequence[UnitTerm]) -> Vectorised:
+        """(z, geometry, ε, p) -> (N, rows, 12 + units): the rows at p = 0, then ∂/∂p, then ∂/∂unit."""
+        z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
+        rows = _rows(channel, spec, z, p, [*(unit.term for unit in units), *self._given])
+        return _linearise(rows, z, p, units)
+
+    def exact(self, channel: Channel, spec: RowsOfStep, name: EffectName | None = None, where: str = "") -> Vectorised:
+        """(z, geometry, ε, p, values) -> (N, rows, 1): the rows of a step with one effect more, or with none."""
+        key = (channel, spec, name, where)
+        if key not in self._exact:
+            z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
+            terms = [] if name is None else [symbolic_term(name, where)]
+            rows = _rows(channel, spec, z, p, [*terms, *self._given])
+            values = ca.vertcat(*(value for term in terms for value in term.values.values()))
+            inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON, p, values]
+            self._exact[key] = Vectorised(ca.Function("rows", inputs, [ca.cse(ca.densify(rows))]))
+        return self._exact[key]
 
 
-def linearised_kinematic(spec: RowsOfStep, units: Sequence[UnitTerm]) -> Vectorised:
-    """The same for the kinematic rows, which do not depend on p."""
-    z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
-    return _linearise(kinematic_rows(spec, z, [unit.term for unit in units]), z, p, units)
+def coordinates(channel: Channel, spec: RowsOfStep) -> tuple[str, ...]:
+    """Names of the rows that a step has in a channel."""
+    return spec.coordinates if channel is Channel.DYNAMIC else kinematic_coordinates(spec)
+
+
+def _rows(channel: Channel, spec: RowsOfStep, z: _Inputs, p: Expression, terms: Sequence[EffectTerm]) -> Expression:
+    if channel is Channel.KINEMATIC:
+        return kinematic_rows(spec, z, terms)
+    names, rows = dynamic_coordinates(spec), dynamic_rows(spec.mode, z, p, terms)
+    return ca.vertcat(*(rows[names.index(name)] for name in spec.coordinates))
 
 
 def _linearise(rows: Expression, z: _Inputs, p: Expression, units: Sequence[UnitTerm]) -> Vectorised:
@@ -207,28 +235,3 @@ def _linearise(rows: Expression, z: _Inputs, p: Expression, units: Sequence[Unit
     )
     inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON, p]
     return Vectorised(ca.Function("rows", inputs, [ca.cse(ca.densify(table))]))
-
-
-@cache
-def exact_dynamic(spec: RowsOfStep, name: EffectName | None, where: str) -> Vectorised:
-    """(z, geometry, ε, p, values) -> dynamic rows (n,) of a step with one effect, or with none."""
-    z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
-    terms = [] if name is None else [symbolic_term(name, where)]
-    names = dynamic_coordinates(spec)
-    rows = dynamic_rows(spec.mode, z, p, terms)
-    kept = ca.vertcat(*(rows[names.index(coordinate)] for coordinate in spec.coordinates))
-    return _function(kept, z, p, terms)
-
-
-@cache
-def exact_kinematic(spec: RowsOfStep, name: EffectName | None, where: str) -> Vectorised:
-    """(z, geometry, ε, p, values) -> kinematic rows (n,) of a step with one effect, or with none."""
-    z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
-    terms = [] if name is None else [symbolic_term(name, where)]
-    return _function(kinematic_rows(spec, z, terms), z, p, terms)
-
-
-def _function(rows: Expression, z: _Inputs, p: Expression, terms: Sequence[EffectTerm]) -> Vectorised:
-    values = ca.vertcat(*(value for term in terms for value in term.values.values()))
-    inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON, p, values]
-    return Vectorised(ca.Function("rows", inputs, [ca.cse(ca.densify(rows))]))

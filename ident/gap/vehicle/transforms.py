@@ -159,11 +159,16 @@ _TRANSFORMS: Final[Mapping[tuple[EffectName, str], tuple[Transform, float]]] = M
 
 def transform_causes(names: tuple[EffectName, ...]) -> list[TransformCause]:
     """All places of the effects named that have a memory."""
-    causes = []
-    for name in names:
-        for where in EFFECTS[name].places:
-            kind = _DRIVE if where in DRIVES else _SIDE
-            if (name, kind) in _TRANSFORMS:
-                places = next(places for places in (DRIVES, ENCODERS, STEERING) if where in places)
-                causes.append(TransformCause(name, where, places.index(where), *_TRANSFORMS[name, kind]))
-    return causes
+    known = {name for name, _ in _TRANSFORMS}
+    return [transform_cause(name, where) for name in names if name in known for where in EFFECTS[name].places]
+
+
+def transform_cause(name: EffectName, where: str) -> TransformCause:
+    """One of them.
+
+    Raises:
+        KeyError: the effect has no memory.
+    """
+    places = next(places for places in (DRIVES, ENCODERS, STEERING) if where in places)
+    kind = _DRIVE if places is DRIVES else _SIDE
+    return TransformCause(name, where, places.index(where), *_TRANSFORMS[name, kind])

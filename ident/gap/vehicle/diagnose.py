@@ -1,0 +1,77 @@
+"""The diagnosis of the platform from its records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ident.errors import RecordError
+from ident.gap.diagnosis import Diagnosis
+from ident.gap.judge import Findings, judge
+from ident.gap.problem import Problem
+from ident.gap.split import split_problem
+from ident.gap.vehicle.build import build_problem
+from ident.gap.vehicle.experiments import next_experiment
+from ident.records.record import Record
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effects import EffectName
+from ident.vehicle.parameters import Parameters
+
+
+@dataclass(frozen=True)
+class VehicleDiagnosis:
+    """What was found, and what to drive next.
+
+    Attributes:
+        findings: everything that reports show.
+        next_experiment: for people; None where nothing would tell more.
+    """
+
+    findings: Findings
+    next_experiment: str | None
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """The answer as it is written down."""
+        return self.findings.diagnosis(self.next_experiment)
+
+
+def diagnose_vehicle(
+    fit: Sequence[Record],
+    confirm: Sequence[Record],
+    vehicle: VehicleDescription,
+    model: Parameters | None = None,
+    *,
+    seed: int = 1,
+    effects: Sequence[EffectName] = tuple(EffectName),
+) -> VehicleDiagnosis:
+    """What the model of the platform lacks.
+
+    Args:
+        fit: records that causes are looked for in.
+        confirm: independent records; none: a part of `fit` confirms.
+        vehicle: its geometry is taken as true.
+        model: the values being judged; None: they are refitted, and only structure can be missing.
+        seed: of the surrogates.
+        effects: that are looked for.
+
+    Raises:
+        RecordError: a record holds none of the steps of a diagnosis, or the confirming records none of those fitted.
+    """
+    fitted = build_problem(fit, vehicle, model, effects=effects)
+    if confirm:
+        confirming = build_problem(confirm, vehicle, model, effects=effects)
+        _refuse_strangers(fitted, confirming)
+    else:
+        fitted, confirming = split_problem(fitted)
+    findings = judge(fitted, confirming, seed=seed)
+    return VehicleDiagnosis(findings, next_experiment(findings, [block.step for block in fitted.blocks]))
+
+
+def _refuse_strangers(fitted: Problem, confirming: Problem) -> None:
+    labels, others = ({block.label for block in problem.blocks} for problem in (fitted, confirming))
+    if not labels & others:
+        raise RecordError(
+            f"The records to confirm hold none of the steps fitted ({', '.join(sorted(labels))}).",
+            "Confirm on another drive of the same steps.",
+        )
