@@ -88,25 +88,27 @@ MEASURED = (0x6041, 0x6077, 0x6064, 0x606C, 0x6078)
 """What a drive has to bring up to date before it sends its TPDOs."""
 
 
+def durand_slave(node_id: int) -> tuple[DurandBus, ObjectDictionary]:
+    bus, objects = DurandBus(), ObjectDictionary()
+    for index, datatype in PLAIN_OBJECTS.items():
+        objects[index] = Variable(datatype, "rw", value=0)
+    node = MinimalNode(bus, node_id, objects)
+    node.rpdo[0].mapping = ((0x6040, 0), (0x6071, 0))
+    node.tpdo[0].mapping = ((0x6041, 0), (0x6077, 0), (0x6064, 0))
+    node.tpdo[1].mapping = ((0x606C, 0), (0x6078, 0))
+    for pdo in (node.rpdo[0], node.tpdo[0], node.tpdo[1]):
+        pdo.transmission_type = 1
+    bus.handlers[0](0, bytes((0x01, node_id)))
+    return bus, objects
+
+
 def durand_cycle(live: bool) -> Callable[[int], int]:
     """The same PDOs on durand's nodes, without application and timers.
 
     Live values change with every cycle, as ours do; others stand still, and durand sends what it has packed before.
     """
-    buses, dictionaries = [], []
-    for node_id in DRIVES:
-        bus, objects = DurandBus(), ObjectDictionary()
-        for index, datatype in PLAIN_OBJECTS.items():
-            objects[index] = Variable(datatype, "rw", value=0)
-        node = MinimalNode(bus, node_id, objects)
-        node.rpdo[0].mapping = ((0x6040, 0), (0x6071, 0))
-        node.tpdo[0].mapping = ((0x6041, 0), (0x6077, 0), (0x6064, 0))
-        node.tpdo[1].mapping = ((0x606C, 0), (0x6078, 0))
-        for pdo in (node.rpdo[0], node.tpdo[0], node.tpdo[1]):
-            pdo.transmission_type = 1
-        bus.handlers[0](0, bytes((0x01, node_id)))
-        buses.append(bus)
-        dictionaries.append(objects)
+    slaves = [durand_slave(node_id) for node_id in DRIVES]
+    buses, dictionaries = [bus for bus, _ in slaves], [objects for _, objects in slaves]
 
     def cycle(number: int) -> int:
         frame = FRAMES[number % 50]
