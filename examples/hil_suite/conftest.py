@@ -28,5 +28,5 @@ def driving(bench: World, controller: VehicleController) -> VehicleController:
         controller.step()
 
     bench.every_cycle(step)
-    bench.run(3.0)
+    bench.run(2.0)
     return controller
