@@ -9,7 +9,7 @@ from emulator.firmware.tpdo import Tpdo
 
 
 class EventSender:
-    """Sends one TPDO on events and on its event timer, never within the inhibit time.
+    """Sends one TPDO when an event has changed it, and on its event timer; never within the inhibit time.
 
     Args:
         tpdo: what to send.
@@ -24,6 +24,8 @@ class EventSender:
         self._event_timer: Timer | None = None
         self._inhibit: Timer | None = None
         self._enabled = False
+        self._sent = b""
+        self._overdue = False
 
     def enable(self, enabled: bool) -> None:
         """Start (again) or stop; an event-driven TPDO is sent once when it starts."""
@@ -31,33 +33,49 @@ class EventSender:
             if timer is not None:
                 timer.cancel()
         self._event_timer = self._inhibit = None
+        self._overdue = False
         starting, self._enabled = enabled and not self._enabled, enabled
         if starting:
-            self.event()
+            self._transmit(self.tpdo.data())
         elif enabled:
             self._restart_event_timer()
 
     def event(self) -> None:
-        """An event has happened: send now, or when the inhibit time is over."""
+        """An event has happened: send what is new now, or when the inhibit time is over."""
         self.tpdo.event_pending = True
         if self._enabled and self._inhibit is None:
-            self._transmit()
+            self._send_news()
 
-    def _transmit(self) -> None:
-        self.tpdo.event_pending = False
-        self._send(self.tpdo.can_id, self.tpdo.data())
+    def _send_news(self) -> None:
+        data = self.tpdo.data()
+        if data != self._sent:
+            self._transmit(data)
+
+    def _transmit(self, data: bytes) -> None:
+        self.tpdo.event_pending = self._overdue = False
+        self._sent = data
+        self._send(self.tpdo.can_id, data)
         if self.tpdo.inhibit_time > 0.0:
             self._inhibit = self._timers.after(self.tpdo.inhibit_time, self._release)
         self._restart_event_timer()
 
     def _release(self) -> None:
         self._inhibit = None
-        if self.tpdo.event_pending:
-            self._transmit()
+        if self._overdue:
+            self._transmit(self.tpdo.data())
+        elif self.tpdo.event_pending:
+            self._send_news()
+
+    def _expire(self) -> None:
+        self._event_timer = None
+        if self._inhibit is None:
+            self._transmit(self.tpdo.data())
+        else:
+            self._overdue = True
 
     def _restart_event_timer(self) -> None:
         if self._event_timer is not None:
             self._event_timer.cancel()
             self._event_timer = None
         if self.tpdo.event_timer > 0.0:
-            self._event_timer = self._timers.after(self.tpdo.event_timer, self.event)
+            self._event_timer = self._timers.after(self.tpdo.event_timer, self._expire)

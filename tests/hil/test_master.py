@@ -386,7 +386,8 @@ def test_a_tpdo_of_another_length_is_named(bench, network) -> None:
     # The stray frame came before the SYNC and is not taken for an answer to it ...
     master.exchange(STILL)
     # ... but one that the node itself sends is.
-    bench.devices.nodes[3].sync_frames = lambda: [(0x183, b"\x00")]
+    node = bench.devices.nodes[3]
+    node.sync_frames = lambda: [(0x183, b"\x00", node.network)]
     with pytest.raises(ConfigurationError, match=r"node 3 \(drive_fr\).*1 bytes"):
         master.exchange(STILL)
 

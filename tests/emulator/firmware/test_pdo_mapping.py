@@ -94,6 +94,52 @@ def test_a_read_only_object_cannot_be_received(wire) -> None:
     assert wire.write(1, 0x1600, 1, entry(0x6041, 0, 16)) == 0x06040041
 
 
+@pytest.mark.parametrize("count", [9, 64, 0xFE, 0xFF])
+@pytest.mark.parametrize("base", [0x1400, 0x1800])
+def test_more_than_eight_objects_do_not_fit(wire, base: int, count: int) -> None:
+    switch_off(wire, base, 0x201 if base == 0x1400 else 0x181)
+    wire.write(1, base + 0x200, 0, b"\x00")
+    assert wire.write(1, base + 0x200, 0, bytes((count,))) == 0x06040042
+
+
+def test_what_is_counted_must_be_mapped(wire) -> None:
+    """Sub-index 0 may not be larger than the number of entries that are there."""
+    switch_off(wire, 0x1801, 0x281)
+    wire.write(1, 0x1A01, 0, b"\x00")
+    for subindex in range(1, 9):
+        assert wire.write(1, 0x1A01, subindex, entry(0, 0, 0)) == 0
+    wire.write(1, 0x1A01, 1, entry(0x6041, 0, 16))
+    assert wire.write(1, 0x1A01, 0, b"\x02") == 0x06020000
+    assert wire.write(1, 0x1A01, 0, b"\x01") == 0
+
+
+def test_a_pdo_that_was_refused_keeps_its_mapping(wire) -> None:
+    switch_off(wire)
+    wire.write(1, 0x1A00, 0, b"\x00")
+    wire.write(1, 0x1A00, 1, entry(0x5555, 0, 16))
+    assert wire.read(1, 0x1A00, 1) == 0x60410010
+
+
+def test_an_inhibit_time_is_fixed_while_the_tpdo_exists(wire) -> None:
+    assert wire.write(1, 0x1800, 3, b"\x0a\x00") == 0x08000022
+    switch_off(wire)
+    assert wire.write(1, 0x1800, 3, b"\x0a\x00") == 0
+
+
+def test_two_rpdos_with_one_identifier_are_both_applied(wire) -> None:
+    switch_off(wire, 0x1401, 0x301)
+    wire.write(1, 0x1601, 0, b"\x00")
+    wire.write(1, 0x1601, 1, entry(0x6040, 0, 16))
+    wire.write(1, 0x1601, 2, entry(0x60FF, 0, 32))
+    wire.write(1, 0x1601, 0, b"\x02")
+    assert wire.write(1, 0x1401, 1, u32(0x201)) == 0
+    wire.write(1, 0x1400, 2, b"\xff")
+    wire.write(1, 0x1401, 2, b"\xff")
+    wire.nmt(0x01, 1)
+    wire.send(0x201, struct.pack("<Hi", 0x06, 77))
+    assert (wire.read(1, 0x6040), wire.read(1, 0x6071), wire.read(1, 0x60FF)) == (0x06, 77, 77)
+
+
 def test_more_than_eight_bytes_do_not_fit(wire) -> None:
     switch_off(wire)
     wire.write(1, 0x1A00, 0, b"\x00")
@@ -117,7 +163,9 @@ def test_the_identifier_of_an_existing_pdo_cannot_change(wire) -> None:
 
 
 @pytest.mark.parametrize("transmission_type", [241, 251, 252, 253])
-def test_reserved_and_rtr_transmission_types_are_refused(wire, transmission_type: int) -> None:
+def test_reserved_types_and_those_for_forbidden_remote_frames_are_refused(
+    wire, transmission_type: int
+) -> None:
     assert wire.write(1, 0x1800, 2, bytes((transmission_type,))) == 0x06090030
 
 
