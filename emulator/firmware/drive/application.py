@@ -155,7 +155,7 @@ class DriveApplication:
         motion, limited = self._motion, self.axis.limited
         if motion is not None:
             motion.take()
-            if self.axis.limited is not limited:
+            if motion.ticks or self.axis.limited is not limited:
                 self._update_status()
 
     def sample(self) -> None:

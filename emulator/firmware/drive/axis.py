@@ -22,6 +22,11 @@ def wrap(count: int) -> int:
     return (count + _HALF) % _SPAN - _HALF
 
 
+def shorter_way(distance: float) -> float:
+    """`distance` [increments] by the shorter way round the 32-bit register."""
+    return (distance + _HALF) % _SPAN - _HALF
+
+
 def approach(value: float, target: float, step: float) -> float:
     """`value` moved towards `target` by at most `step`."""
     return min(value + step, target) if target > value else max(value - step, target)
@@ -104,8 +109,8 @@ class Axis:
         return self.hardware.velocity()
 
     def following_error(self) -> float:
-        """Position demand less position, by the shorter way round the 32-bit register [increments]."""
-        return (self.position_demand - self.position() + _HALF) % _SPAN - _HALF
+        """Position demand less position [increments]."""
+        return shorter_way(self.position_demand - self.position())
 
     def take_over(self) -> None:
         """Start velocity control without a jump: from the present speed and the torque asked for last."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Final, Protocol
 
-from emulator.firmware.drive.axis import TICK, Axis, approach, wrap
+from emulator.firmware.drive.axis import TICK, Axis, approach, shorter_way
 
 
 class Mode(IntEnum):
@@ -201,11 +201,9 @@ class Interpolation:
         self.left = max(1, round(duration / TICK))
 
     def step(self, distance: float) -> float:
-        """What to move in this tick when `distance` is left."""
-        if not self.left:
-            return 0.0
-        part = distance / self.left
-        self.left -= 1
+        """What to move in this tick when `distance` is left; all of it once the time is over."""
+        part = distance / max(self.left, 1)
+        self.left = max(self.left - 1, 0)
         return part
 
 
@@ -270,7 +268,7 @@ class CyclicPosition:
         """One step along the line, and of the position and velocity loops."""
         axis, parameters = self._axis, self._axis.parameters
         points, speed = axis.points, parameters.max_motor_speed * axis.increments
-        distance = wrap(round(points.target_position + points.position_offset - axis.position_demand))
+        distance = shorter_way(points.target_position + points.position_offset - axis.position_demand)
         asked = self._line.step(distance) / TICK
         slope = min(max(asked, -speed), speed)
         axis.position_demand += slope * TICK
