@@ -6,7 +6,6 @@
 
 #include "qo_equations.h"
 #include "qo_internal.h"
-#include "qo_table.h"
 
 static void append(char *message, const char *text) {
     size_t used = strlen(message);
@@ -40,7 +39,7 @@ int qo_first_not_finite(const double *values, int count) {
 const char *qo_state_name(int index) { return qo_states[index].name; }
 const char *qo_input_name(int index) { return qo_inputs[index].name; }
 const char *qo_parameter_name(int index) { return qo_parameters[index].name; }
-const char *qo_output_name(int index) { return qo_output_names[index]; }
+const char *qo_output_name(int index) { return qo_outputs_by_name[index]; }
 
 static void start_values(double *values, const qo_row *rows, int count) {
     int index;
@@ -107,7 +106,7 @@ qo_status qo_outputs(qo_model *model) {
     qo_eq_outputs(model->x, model->u, model->p, y);
     broken = qo_first_not_finite(y, QO_NY);
     if (broken >= 0) {
-        return qo_fail(model, QO_ERROR, "Output ", qo_output_names[broken], " is not finite.");
+        return qo_fail(model, QO_ERROR, "Output ", qo_outputs_by_name[broken], " is not finite.");
     }
     memcpy(model->y, y, sizeof y);
     return QO_OK;

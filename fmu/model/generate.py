@@ -31,6 +31,9 @@ FIRST_STEP: Final = 1e-3
 _WRITTEN: Final = ("core.h", "core.c", "solver.c", "qo_internal.h")
 """Files of the core that are written by hand."""
 
+_ROWS: Final = (("states", "NX", Block.STATE), ("inputs", "NU", Block.INPUT), ("parameters", "NP", Block.PARAMETER))
+"""Arrays of rows: name, size and block."""
+
 _HELPERS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "sq": "static double qo_sq(double x) { return x * x; }",
@@ -72,7 +75,7 @@ def generate_core(table: VariableTable, effects: Sequence[Effect], inputs: Input
     written = {name: (resources.files("fmu.model") / name).read_text(encoding="utf-8") for name in _WRITTEN}
     generated = {
         "qo_sizes.h": _sizes(table, jacobian_size, model.z.numel()),
-        "qo_table.h": _table(table),
+        "qo_table.c": _table(table),
         "qo_equations.h": _prototypes(routines),
         "qo_equations.c": _definitions(routines),
     }
@@ -207,24 +210,11 @@ def _sizes(table: VariableTable, jacobian_size: int, indicators: int) -> str:
 
 
 def _table(table: VariableTable) -> str:
-    lines = [
-        "#include <math.h>",
-        "",
-        "typedef struct {",
-        "    const char *name;",
-        "    double start, minimum, maximum, nominal;",
-        "    int positive;",
-        "} qo_row;",
-        "",
-    ]
-    for name, block in (("states", Block.STATE), ("inputs", Block.INPUT), ("parameters", Block.PARAMETER)):
-        lines += [f"static const qo_row qo_{name}[] = {{", *map(_row, table.block(block)), "};", ""]
+    lines = ["/* The table of variables. Generated. */", '#include "qo_internal.h"', "", "#include <math.h>", ""]
+    for name, size, block in _ROWS:
+        lines += [f"const qo_row qo_{name}[QO_{size}] = {{", *map(_row, table.block(block)), "};", ""]
     names = [f'    "{row.name}",' for row in table.block(Block.OUTPUT)]
-    return _guarded(
-        "QO_TABLE_H",
-        "The table of variables.",
-        [*lines, "static const char *const qo_output_names[] = {", *names, "};"],
-    )
+    return "\n".join([*lines, "const char *const qo_outputs_by_name[QO_NY] = {", *names, "};", ""])
 
 
 def _row(row: Variable) -> str:

@@ -15,10 +15,9 @@
 #include "core.h"
 #include "qo_equations.h"
 #include "qo_internal.h"
-#include "qo_table.h"
 
 #define STAGES 4
-#define MAX_ATTEMPTS 200000
+#define MAX_INTERNAL_STEPS 20000
 #define LONGEST_STEP 1e3
 #define SHORTEST_STEP 1e-15
 #define NEGLIGIBLE 1e-30
@@ -238,8 +237,8 @@ qo_status qo_advance(qo_model *model, double h, double *taken) {
 /* What is left of h; the last step ends at h exactly, and is not a splinter of rounding. */
 static qo_status integrate_all(qo_model *model, double h) {
     double done = 0.0;
-    int attempts;
-    for (attempts = 0; attempts < MAX_ATTEMPTS; ++attempts) {
+    int count;
+    for (count = 0; count < MAX_INTERNAL_STEPS; ++count) {
         double taken = 0.0;
         qo_status status = integrate(model, h - done, &taken);
         if (status != QO_OK) {
