@@ -1,0 +1,181 @@
+"""Experiments without a vehicle: records that the plain model would make, to see what each could show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.campaign.excitation import FourierSeries, resting_projection, series_of
+from ident.campaign.steps import EXCITATIONS, StepSpec
+from ident.records.record import Record, Segment, Step, make_segment
+from ident.vehicle import dynamics, kinematics
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effects import Effect, EffectName, make_effect
+from ident.vehicle.modes import Mode
+
+Array = NDArray[np.float64]
+
+SAMPLE_TIME: Final = 0.004
+PERIODS: Final = 2
+DITHER: Final = 0.15
+"""Rms of the torque dither, in units of the rated torque."""
+TURN_TIME: Final = 6.0
+"""Of half a turn on the spot [s]."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One step of an experiment.
+
+    Attributes:
+        step: base step.
+        variant: appended to its name, empty for the step itself.
+        speed: factor on the step's speed.
+        dither: whether the motors work against each other too.
+        turned: whether the vehicle is turned by half a turn before.
+    """
+
+    step: Step
+    variant: str = ""
+    speed: float = 1.0
+    dither: bool = False
+    turned: bool = False
+
+    @property
+    def name(self) -> str:
+        """In records."""
+        return f"{self.step}_{self.variant}" if self.variant else str(self.step)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Steps that are driven beside the four of the campaign.
+
+    Attributes:
+        advice: to a person who is to drive it.
+        drives: its steps.
+        given: effects that are there and known while it is driven.
+    """
+
+    advice: str
+    drives: tuple[Drive, ...]
+    given: tuple[Effect, ...] = ()
+
+
+FOUR: Final = tuple(Drive(step) for step in (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION))
+
+DIAGNOSTIC: Final[Mapping[str, Experiment]] = MappingProxyType(
+    {
+        "two headings": Experiment(
+            "drive straight a second time after half a turn on the spot",
+            (Drive(Step.STRAIGHT, "turned", turned=True),),
+        ),
+        "torque dither": Experiment(
+            "drive straight and rotation with torque dither, the motors working against each other",
+            (Drive(Step.STRAIGHT, "dither", dither=True), Drive(Step.ROTATION, "dither", dither=True)),
+        ),
+        "wheels lifted": Experiment("drive wheel_lifted on a jack-stand", (Drive(Step.WHEEL_LIFTED),)),
+        "lateral": Experiment("drive lateral", (Drive(Step.LATERAL),)),
+        "several speeds": Experiment(
+            "drive straight and rotation at half and at a quarter of the speed too",
+            tuple(
+                Drive(step, variant, speed)
+                for step in (Step.STRAIGHT, Step.ROTATION)
+                for variant, speed in (("half", 0.5), ("quarter", 0.25))
+            ),
+        ),
+        "on a slope": Experiment(
+            "drive straight and rotation on a floor inclined by two degrees",
+            (Drive(Step.STRAIGHT, "slope"), Drive(Step.ROTATION, "slope")),
+            (make_effect(EffectName.SLOPE, "chassis", {"angle": 0.035}),),
+        ),
+    }
+)
+"""Experiments by name, the easiest first."""
+
+
+def ideal_record(drives: Sequence[Drive], vehicle: VehicleDescription, seed: int = 1) -> Record:
+    """A record without noise of the plain model with the vehicle file's parameters; random excitation by `seed`."""
+    generator = np.random.default_rng(seed)
+    segments: list[Segment] = []
+    for drive in drives:
+        if drive.turned:
+            segments.append(_turn(vehicle))
+        segments.append(_segment(drive, vehicle, generator))
+    return Record(segments, "ideal")
+
+
+def _segment(drive: Drive, vehicle: VehicleDescription, generator: np.random.Generator) -> Segment:
+    spec = EXCITATIONS[drive.step]
+    series = _series(spec, drive.speed, generator)
+    per_period = round(spec.period / SAMPLE_TIME)
+    time = np.linspace(0.0, PERIODS * spec.period, PERIODS * per_period, endpoint=False)
+    motion = series.evaluate(time)
+    alpha, beta, torques = (
+        _lifted(motion, vehicle) if spec.mode is None else _on_the_floor(spec, spec.mode, motion, vehicle)
+    )
+    if drive.dither and spec.mode is not None:
+        torques = torques + _dither(spec.mode, alpha, time, vehicle, generator)
+    period = np.repeat(np.arange(PERIODS), per_period)
+    return make_segment(Segment(drive.name, 0.0, time, torques, beta, alpha, period), "ideal")
+
+
+def _series(spec: StepSpec, speed: float, generator: np.random.Generator) -> FourierSeries:
+    series = series_of(resting_projection(spec.harmonics) @ generator.normal(size=2 * spec.harmonics), spec.period)
+    position, velocity, acceleration = series.evaluate(np.linspace(0, spec.period, 400))
+    limits = zip((spec.stroke, spec.speed, spec.acceleration), (position, velocity, acceleration), strict=True)
+    return series.scaled(0.9 * speed * min(limit / float(np.abs(values).max()) for limit, values in limits))
+
+
+def _lifted(motion: tuple[Array, Array, Array], vehicle: VehicleDescription) -> tuple[Array, Array, Array]:
+    position, velocity, acceleration = motion
+    rates, accelerations = np.zeros((2, len(position), 9))
+    rates[:, 5:], accelerations[:, 5:] = velocity[:, None], acceleration[:, None]
+    torques = (dynamics.regressor(rates, accelerations) @ vehicle.prior.values)[:, 5:] / vehicle.geometry.gear_ratio
+    return np.zeros((len(position), 2)), np.tile(position[:, None], 4), torques
+
+
+def _on_the_floor(
+    spec: StepSpec, mode: Mode, motion: tuple[Array, Array, Array], vehicle: VehicleDescription
+) -> tuple[Array, Array, Array]:
+    """Angles by the constant column of H_k that these steps drive, torques by (21)."""
+    position, velocity, acceleration = motion
+    names = kinematics.GENERALIZED_VELOCITIES[mode]
+    row = names.index(spec.coordinate)
+    alpha = np.tile(spec.steering(vehicle.geometry), (len(position), 1))
+    column = kinematics.complement(mode, alpha[:1], vehicle.geometry)[0, 5:, row]
+    velocities, accelerations = np.zeros((2, len(position), len(names)))
+    velocities[:, row], accelerations[:, row] = velocity, acceleration
+    if mode is Mode.ALIGNMENT:
+        alpha[:, row] += position
+    torques = dynamics.feed_forward(mode, alpha, velocities, accelerations, vehicle.prior.values, vehicle.geometry)
+    return alpha, position[:, None] * column, torques
+
+
+def _dither(
+    mode: Mode, alpha: Array, time: Array, vehicle: VehicleDescription, generator: np.random.Generator
+) -> Array:
+    """Torques (N, 4) that move nothing: a tone of its own along every direction that H_kᵀ B does not see."""
+    matrix = dynamics.projected_input(mode, alpha[:1], vehicle.geometry)[0]
+    silent = np.linalg.svd(matrix)[2][len(matrix) :]
+    tones = np.sin(2 * np.pi * np.outer(time, generator.uniform(0.5, 3.0, len(silent))))
+    return np.asarray(np.sqrt(2) * DITHER * vehicle.limits.rated_torque * tones @ silent)
+
+
+def _turn(vehicle: VehicleDescription) -> Segment:
+    """Half a turn on the spot; a step that no row is made of."""
+    time = np.linspace(0.0, TURN_TIME, round(TURN_TIME / SAMPLE_TIME), endpoint=False)
+    share = time / TURN_TIME
+    angle = np.pi * (share - np.sin(2 * np.pi * share) / (2 * np.pi))
+    spec = EXCITATIONS[Step.ROTATION]
+    alpha = np.tile(spec.steering(vehicle.geometry), (len(time), 1))
+    column = kinematics.complement(Mode.ROTATION, alpha[:1], vehicle.geometry)[0, 5:, 0]
+    period = np.full(len(time), -1)
+    return make_segment(
+        Segment("turn", 0.0, time, np.zeros((len(time), 4)), angle[:, None] * column, alpha, period), ""
+    )

@@ -1,0 +1,138 @@
+"""What an experiment can see, split and place: rank of the causes' columns beside the baseline, from the equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.gap.problem import Channel, Problem, Variant
+from ident.gap.rows import Rows, make_rows
+from ident.gap.vehicle.build import build_problem
+from ident.gap.vehicle.ideal import DIAGNOSTIC, FOUR, Drive, ideal_record
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effects import Effect, EffectName
+
+Array = NDArray[np.float64]
+
+VISIBLE: Final = 0.02
+"""Part of a column that the baseline must leave."""
+
+ALIKE: Final = 0.98
+"""Cosine of the angle between what two causes leave, from which they count as one."""
+
+NEGLIGIBLE: Final = 1e-3
+"""Norm of a column, over the largest one of the same cause, that means nothing."""
+
+NOISE: Final = 0.01
+"""Noise of a generalized torque, in units of its rms; that of the rolling rows is what they tolerate."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What an experiment shows of one cause.
+
+    Attributes:
+        visible: whether the baseline leaves anything of it.
+        alike: keys of other causes that look the same.
+    """
+
+    visible: bool
+    alike: tuple[str, ...]
+
+    def alike_effects(self, own: str) -> tuple[str, ...]:
+        """Names of other effects among them."""
+        return tuple(dict.fromkeys(name for key in self.alike if (name := key.partition("@")[0]) != own))
+
+
+def sights(problem: Problem) -> Mapping[str, Sight]:
+    """What the rows of a problem show of every candidate, by key."""
+    rows = make_rows(problem)
+    scale = _noise(rows)
+    baseline = _orthonormal(rows.baseline / scale[:, None])
+    found = [_left(rows.columns[:, column.place] / scale[:, None], baseline) for column in rows.layout]
+    owners = [problem.candidates[column.candidate].key for column in rows.layout]
+    return {
+        candidate.key: Sight(
+            any(basis.shape[1] > 0 for basis, owner in zip(found, owners, strict=True) if owner == candidate.key),
+            _twins(candidate.key, found, owners),
+        )
+        for candidate in problem.candidates
+    }
+
+
+def _noise(rows: Rows) -> Array:
+    """Noise (n,) of the rows."""
+    scale = np.ones(len(rows))
+    for (block, _), place in zip(rows.blocks, rows.block_slices, strict=True):
+        rms = float(np.sqrt(np.mean(rows.target[place] ** 2))) if place.stop > place.start else 1.0
+        scale[place] = block.tolerance if block.channel is Channel.KINEMATIC else NOISE * rms
+    return scale
+
+
+def _orthonormal(columns: Array) -> Array:
+    norms = np.linalg.norm(columns, axis=0)
+    used = columns[:, norms > 0] / norms[norms > 0]
+    vectors, singular, _ = np.linalg.svd(used, full_matrices=False)
+    return np.asarray(vectors[:, singular > 1e-6 * singular.max(initial=0.0)])
+
+
+def _left(columns: Array, baseline: Array) -> Array:
+    """Orthonormal basis of what the baseline leaves of some columns."""
+    norms = np.linalg.norm(columns, axis=0)
+    kept = norms > NEGLIGIBLE * norms.max(initial=0.0)
+    used = columns[:, kept] / norms[kept]
+    left = used - baseline @ (baseline.T @ used)
+    vectors, singular, _ = np.linalg.svd(left, full_matrices=False)
+    return np.asarray(vectors[:, singular > VISIBLE])
+
+
+def _twins(key: str, found: Sequence[Array], owners: Sequence[str]) -> tuple[str, ...]:
+    own = [basis for basis, owner in zip(found, owners, strict=True) if owner == key]
+    alike = {
+        owner
+        for basis, owner in zip(found, owners, strict=True)
+        if owner != key and any(_cosine(mine, basis) > ALIKE for mine in own)
+    }
+    return tuple(sorted(alike))
+
+
+def _cosine(first: Array, second: Array) -> float:
+    """Largest cosine of the principal angles between two spaces; 0 where one is empty."""
+    if not (first.shape[1] and second.shape[1]):
+        return 0.0
+    return float(np.linalg.norm(first.T @ second, 2))
+
+
+def sights_of(experiment: str, vehicle: VehicleDescription) -> Mapping[str, Sight]:
+    """What the four steps show together with one diagnostic experiment; without any for the name `four steps`."""
+    four = _problem(FOUR, (), vehicle)
+    extra = DIAGNOSTIC.get(experiment)
+    return sights(four if extra is None else _joined(four, _problem(extra.drives, extra.given, vehicle)))
+
+
+def _problem(drives: Sequence[Drive], given: Sequence[Effect], vehicle: VehicleDescription) -> Problem:
+    # At the vehicle file's parameters: an experiment of few steps does not show all of them.
+    effects = [name for name in EffectName if name is not EffectName.PARAMETER_CHANGE]
+    problem = build_problem([ideal_record(drives, vehicle)], vehicle, vehicle.prior, given=given, effects=effects)
+    return replace(problem, nominal=None)
+
+
+def _joined(first: Problem, second: Problem) -> Problem:
+    """The blocks of both, one candidate for both."""
+    candidates = tuple(
+        replace(one, variants=tuple(_behind(a, b) for a, b in zip(one.variants, other.variants, strict=True)))
+        for one, other in zip(first.candidates, second.candidates, strict=True)
+    )
+    return replace(first, blocks=(*first.blocks, *second.blocks), candidates=candidates)
+
+
+def _behind(first: Variant, second: Variant) -> Variant:
+    return replace(first, columns=(*first.columns, *second.columns))
+
+
+EXPERIMENTS: Final = ("four steps", *DIAGNOSTIC)
+"""Columns of the table: the four steps alone, then together with each diagnostic experiment."""
