@@ -63,7 +63,7 @@ class Drive:
         self._wheel = wheel
         self._shafts = shafts
         self._disturbances = disturbances
-        self._stage = PowerStage(stage, data.rated_torque, data.rated_current, data.peak_current, shafts.step_size)
+        self._stage = PowerStage(stage, data.rated_torque, data.peak_torque, data.rated_current, shafts.step_size)
         self._enabled = False
         self._target = self._setpoint = 0.0
         self._ramp_steps = max(1, round(data.interpolation_time / shafts.step_size))

@@ -9,7 +9,7 @@ from enum import Enum, auto
 from typing import Final
 
 _PEAK_SHARE: Final = 0.95
-"""Share of the peak current from which on the peak-time of the power stage counts [-]."""
+"""Share of the peak torque from which on the peak-time of the power stage counts [-]."""
 
 _STALL_SPEED: Final = 1.0
 """Speed of the motor shaft below which it counts as standing [rad/s]; 10 rpm."""
@@ -65,7 +65,8 @@ class PowerStage:
 
     Args:
         data: data sheet.
-        rated_torque, rated_current, peak_current: of the motor [Nm], rms [A].
+        rated_torque, peak_torque: of the motor [Nm]; torque is proportional to current.
+        rated_current: rms [A].
         step: of the engine [s].
 
     Attributes:
@@ -74,7 +75,7 @@ class PowerStage:
     """
 
     def __init__(
-        self, data: PowerStageData, rated_torque: float, rated_current: float, peak_current: float, step: float
+        self, data: PowerStageData, rated_torque: float, peak_torque: float, rated_current: float, step: float
     ) -> None:
         self._step = step
         self._capacitance = data.link_capacitance
@@ -83,9 +84,8 @@ class PowerStage:
         self._trip_energy = self._energy_at(data.over_voltage)
         self._chopped = data.chopper_power * step
         self._rated_torque = rated_torque
-        ratio = peak_current / rated_current
-        self._peak_torque = _PEAK_SHARE * rated_torque * ratio
-        # Torque is proportional to current: copper loss of the rated current belongs to the rated torque.
+        ratio = peak_torque / rated_torque
+        self._peak_torque = _PEAK_SHARE * peak_torque
         self._copper = 3.0 * data.phase_resistance * (rated_current / rated_torque) ** 2
         time_constant = -data.overload_time / math.log1p(-THERMAL_LIMIT / ratio**2)
         self._heating = -math.expm1(-step / time_constant)

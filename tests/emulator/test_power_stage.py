@@ -22,13 +22,13 @@ DATA = PowerStageData(
     overload_time=3.0,
     stall_time=2.0,
 )
-RATED, CURRENT, PEAK = 1.0, 2.0, 6.0
+RATED, PEAK, CURRENT = 1.0, 3.0, 2.0
 COPPER = 3 * DATA.phase_resistance * (CURRENT / RATED) ** 2
 """Loss at a torque of 1 Nm [W]."""
 
 
 def stage() -> PowerStage:
-    return PowerStage(DATA, RATED, CURRENT, PEAK, STEP)
+    return PowerStage(DATA, RATED, PEAK, CURRENT, STEP)
 
 
 def run(power_stage: PowerStage, torque: float, speed: float, duration: float) -> tuple[float, Trip | None]:
