@@ -132,11 +132,13 @@ class FmuVehicle:
         self.close()
 
     def _step(self) -> None:
-        # As in the emulator: the torque that the drives report at t acts over the step that starts at t.
-        self.instance.write(self._torques, [drive.wheel_torque / self._ratio for drive in self.drives])
+        # Torque moves within the step; the FMU gets its mean, so that it does not lag behind what the drives report.
+        before = [drive.wheel_torque for drive in self.drives]
+        for drive in self.drives:
+            drive.advance()
+        torques = [(old + drive.wheel_torque) / 2 for old, drive in zip(before, self.drives, strict=True)]
+        self.instance.write(self._torques, [torque / self._ratio for torque in torques])
         self.instance.step(STEP)
         self._joints.values = self.instance.read(self._sensed)
         self._steps += 1
-        for drive in self.drives:
-            drive.advance()
         self._noise.advance()

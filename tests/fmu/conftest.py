@@ -23,14 +23,19 @@ Build = Callable[[FmiVersion, Inputs], Path]
 VARIANTS = [(version, inputs) for version in FmiVersion for inputs in Inputs]
 
 
-def need(program: str) -> str:
+@pytest.fixture(scope="session")
+def need() -> Callable[[str], str]:
     """Path of a system program; without it the test skips, but not in CI."""
-    path = shutil.which(program)
-    if path is None:
-        if os.environ.get("QUASIOMNI_CI"):
-            pytest.fail(f"{program} is not installed")
-        pytest.skip(f"{program} is not installed")
-    return path
+
+    def find(program: str) -> str:
+        path = shutil.which(program)
+        if path is None:
+            if os.environ.get("QUASIOMNI_CI"):
+                pytest.fail(f"{program} is not installed")
+            pytest.skip(f"{program} is not installed")
+        return path
+
+    return find
 
 
 @pytest.fixture(scope="session")
