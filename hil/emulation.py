@@ -18,15 +18,20 @@ from hil.buses import open_served_bus
 from hil.clock import Clock
 from hil.faults import Fault, parse_fault, parse_script
 from hil.network import Network
+from hil.plants import FmuVehicle
 from hil.serving import VehicleServer
+from ident.errors import UserError
 from ident.vehicle.effects import Effect
+
+Plant = EmulatedVehicle | FmuVehicle
+"""What the nodes can sit on."""
 
 
 @dataclass(frozen=True)
 class BenchOperator:
     """Lifts and lowers the emulated vehicle."""
 
-    vehicle: EmulatedVehicle
+    vehicle: Plant
 
     def lift(self) -> None:
         """On the jack-stand."""
@@ -47,16 +52,32 @@ class Bench:
 
 
 @contextmanager
-def vehicle(prototype: str, seed: int, gui: bool, effects: Sequence[Effect] = ()) -> Iterator[EmulatedVehicle]:
-    """The emulated prototype with effects, closed at the end."""
-    with EmulatedVehicle(load_prototype(prototype), seed=seed, gui=gui, effects=effects) as emulated:
-        yield emulated
+def vehicle(
+    prototype: str, seed: int, gui: bool, effects: Sequence[Effect] = (), fmu: Path | None = None
+) -> Iterator[Plant]:
+    """The emulated prototype with effects, or an FMU with the prototype's drives and encoders; closed at the end.
+
+    Raises:
+        UserError: an effect or a window is asked of an FMU, or it cannot be run.
+    """
+    if fmu is None:
+        with EmulatedVehicle(load_prototype(prototype), seed=seed, gui=gui, effects=effects) as emulated:
+            yield emulated
+        return
+    if effects or gui:
+        raise UserError(
+            "An FMU takes no --effect and has no window.", "Tune the effect's parameters in the FMU itself."
+        )
+    with FmuVehicle(fmu, load_prototype(prototype), seed=seed) as plant:
+        yield plant
 
 
 @contextmanager
-def bench(prototype: str, seed: int, gui: bool, network: Path, effects: Sequence[Effect] = ()) -> Iterator[Bench]:
-    """The emulated prototype with effects behind an in-process bus in lockstep."""
-    with vehicle(prototype, seed, gui, effects) as emulated, LockstepBench(emulated, network) as lockstep:
+def bench(
+    prototype: str, seed: int, gui: bool, network: Path, effects: Sequence[Effect] = (), fmu: Path | None = None
+) -> Iterator[Bench]:
+    """What `vehicle` gives, behind an in-process bus in lockstep."""
+    with vehicle(prototype, seed, gui, effects, fmu) as emulated, LockstepBench(emulated, network) as lockstep:
         yield Bench(lockstep.bus, lockstep.clock, BenchOperator(emulated))
 
 
@@ -75,7 +96,7 @@ def server_bus(name: str, network: Network) -> Iterator[can.BusABC]:
 
 
 def server(
-    emulated: EmulatedVehicle,
+    emulated: Plant,
     bus: can.BusABC,
     clock: Clock,
     network: Path,
@@ -90,7 +111,7 @@ def server(
     Args:
         storage: folder where the nodes store parameters.
     """
-    ground = Ground(emulated.engine)
+    ground = Ground(emulated.engine) if isinstance(emulated, EmulatedVehicle) else emulated
     memory = None if storage is None else FolderMemory(storage)
     return VehicleServer(emulated, bus, clock, network, lockstep, ground, seed, delays, memory)
 

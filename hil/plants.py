@@ -12,11 +12,10 @@ from emulator.drive import Drive
 from emulator.encoder import Encoder
 from emulator.noise import Disturbances
 from emulator.prototype import Prototype
-from hil.fmu_instance import FmuInstance
+from hil.fmu_instance import FmuError, FmuInstance
 from ident.vehicle.geometry import WHEELS
 
-PLANT_PREFIX: Final = "fmu:"
-"""In front of the path of an FMU, where a plant is named."""
+_PREFIX: Final = "fmu:"
 
 STEP: Final = 1e-3
 """Communication step [s]: that of the emulator's physics engine."""
@@ -26,6 +25,17 @@ _FREE: Final = 1e-9
 
 _STEP_TOLERANCE: Final = 1e-6
 """Fraction of a step by which a duration may miss a whole number of steps through rounding."""
+
+
+def plant_path(text: str) -> Path:
+    """The FMU that `fmu:FILE` names.
+
+    Raises:
+        FmuError: the text is not of that form.
+    """
+    if not text.startswith(_PREFIX):
+        raise FmuError(f"{text!r} is no plant.", "Write fmu:FILE, with an FMU of `quasiomni fmu`.")
+    return Path(text.removeprefix(_PREFIX))
 
 
 class _Joints:
@@ -94,6 +104,8 @@ class FmuVehicle:
         self._torques = self.instance.port([f"torque_{wheel}" for wheel in WHEELS])
         self._friction = self.instance.port([f"friction_limit_{wheel}" for wheel in WHEELS])
         self._floor = self.instance.read(self._friction)
+        self._grip = list(self._floor)
+        self._lifted = False
         self._sensed = self.instance.port(_SENSED)
         self._steps = 0
         self._owed = 0.0
@@ -112,12 +124,27 @@ class FmuVehicle:
             self._step()
 
     def lift(self) -> None:
-        """Wheels free: the floor has no grip."""
-        self.instance.write(self._friction, [_FREE] * len(WHEELS))
+        """Wheels free: nothing under them has grip."""
+        self._lifted = True
+        self._ground()
 
     def lower(self) -> None:
         """Back on the floor."""
-        self.instance.write(self._friction, self._floor)
+        self._lifted = False
+        self._ground()
+
+    def wet(self, wheel: int, coefficient: float) -> None:
+        """Let a wheel (fl, rl, fr, rr: 0 to 3) roll on ground with another coefficient of friction [-]."""
+        self._grip[wheel] = coefficient
+        self._ground()
+
+    def dry(self, wheel: int) -> None:
+        """Give a wheel the ground back that it had before."""
+        self._grip[wheel] = self._floor[wheel]
+        self._ground()
+
+    def _ground(self) -> None:
+        self.instance.write(self._friction, [_FREE] * len(WHEELS) if self._lifted else self._grip)
 
     def close(self) -> None:
         """Free the FMU."""

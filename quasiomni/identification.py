@@ -30,10 +30,12 @@ from quasiomni.options import (
     InertiaOption,
     InertiaStdOption,
     NetworkOption,
+    PlantOption,
     SeedOption,
     VehicleOption,
     load_emulation,
     parse_effects,
+    parse_plant,
 )
 
 LOCKSTEP = "emulator, in lockstep"
@@ -78,6 +80,7 @@ def campaign(
         bool, typer.Option("--lockstep", help="With --bus: the other side is an emulator that SYNC moves.")
     ] = False,
     effect: EffectOption = None,
+    plant: PlantOption = None,
     gui: GuiOption = False,
 ) -> None:
     """Drive the identification steps and record every frame; on the emulator, or with --bus on a real vehicle.
@@ -87,12 +90,16 @@ def campaign(
     """
     steps, inertia = _steps(skip or (), lateral, b_w), _known_inertia(b_w, b_w_std)
     effects = parse_effects(effect)
-    if effects and bus is not None:
-        raise UserError("--effect is of the emulator, and --bus names another vehicle.", "Leave one of them out.")
-    prototype, where = (vehicle, LOCKSTEP) if bus is None else ("", bus)
+    if bus is not None and (effects or plant):
+        raise UserError(
+            "--effect and --plant are of the emulator, and --bus names another vehicle.", "Leave one of them out."
+        )
+    prototype, where = (vehicle, LOCKSTEP) if bus is None and plant is None else ("", bus or plant or "")
     order = Order(out, vehicle, network, steps, periods, seed, inertia, log_format, where, prototype)
     run = _resumed(order, context) if resume else workflow.plan_run(order, console)
-    if bus is None:
+    if plant is not None:
+        _drive_on_fmu(run, order, vehicle, plant)
+    elif bus is None:
         _drive_on_emulator(run, order, effects, gui)
     else:
         _drive_on_bus(run, order, bus, ask=not yes, lockstep=lockstep)
@@ -148,6 +155,12 @@ def _drive_on_emulator(run: Run, order: Order, effects: Sequence[Effect], gui: b
     network = run.network.path
     with emulation.bench(run.prototype, run.seed, gui, network, effects) as bench, _stop_is_no_error(order.out):
         workflow.drive_run(run, order, bench.bus, bench.clock, bench.operator, console, lambda: True)
+
+
+def _drive_on_fmu(run: Run, order: Order, prototype: str, plant: str) -> None:
+    bench = load_emulation().bench(prototype, run.seed, False, run.network.path, fmu=parse_plant(plant))
+    with bench as opened, _stop_is_no_error(order.out):
+        workflow.drive_run(run, order, opened.bus, opened.clock, opened.operator, console, lambda: True)
 
 
 def _drive_on_bus(run: Run, order: Order, name: str, *, ask: bool, lockstep: bool) -> None:

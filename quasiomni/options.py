@@ -32,12 +32,22 @@ EffectOption = Annotated[
         "Noted nowhere in the run: name it again to --resume.",
     ),
 ]
+PlantOption = Annotated[
+    str | None, typer.Option("--plant", help="`fmu:FILE`: an FMU with torque inputs in place of the physics engine.")
+]
 GuiOption = Annotated[bool, typer.Option("--gui", help="Show the emulated vehicle in a window.")]
 
 
 def parse_effects(texts: Sequence[str] | None) -> tuple[Effect, ...]:
     """The effects that were asked for."""
     return tuple(parse_effect(text) for text in texts or ())
+
+
+def parse_plant(text: str | None) -> Path | None:
+    """The FMU that was asked for."""
+    from hil.plants import plant_path
+
+    return None if text is None else plant_path(text)
 
 
 def load_emulation() -> ModuleType:

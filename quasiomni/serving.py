@@ -16,7 +16,16 @@ from hil.clock import WallClock
 from hil.control import ControlServer, Injection, control_path
 from hil.network import load_network
 from quasiomni.application import app, console
-from quasiomni.options import EffectOption, GuiOption, NetworkOption, SeedOption, load_emulation, parse_effects
+from quasiomni.options import (
+    EffectOption,
+    GuiOption,
+    NetworkOption,
+    PlantOption,
+    SeedOption,
+    load_emulation,
+    parse_effects,
+    parse_plant,
+)
 
 
 class Stand(StrEnum):
@@ -51,6 +60,7 @@ def emulate(
     ] = None,
     duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
     effect: EffectOption = None,
+    plant: PlantOption = None,
     gui: GuiOption = False,
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
@@ -59,12 +69,14 @@ def emulate(
     faults = emulation.read_faults(fault or [])
     end = None if duration is None else time.monotonic() + duration
     with (
-        emulation.vehicle(prototype, seed, gui, parse_effects(effect)) as vehicle,
+        emulation.vehicle(prototype, seed, gui, parse_effects(effect), parse_plant(plant)) as vehicle,
         emulation.server_bus(bus, load_network(network_file)) as opened,
     ):
         if stand is Stand.JACK:
             vehicle.lift()
-        console.print(f"{prototype} is up on {bus}, {'in lockstep' if lockstep else 'in real time'}. Ctrl-C ends it.")
+        console.print(
+            f"{plant or prototype} is up on {bus}, {'in lockstep' if lockstep else 'in real time'}. Ctrl-C ends it."
+        )
         server = emulation.server(
             vehicle, opened, WallClock(), network_file, lockstep, seed=seed, delays=bit_times, storage=storage
         )
