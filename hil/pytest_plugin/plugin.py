@@ -181,6 +181,7 @@ def _attach(item: pytest.Item, report: pytest.TestReport) -> None:
     artifacts = item.stash[_ARTIFACTS]
     files = artifacts.write(item.stash[_WORLD])
     report.sections.append(("hil", "\n".join(f"{name}: {path}" for name, path in files.items())))
-    properties = [(f"hil_{name}", str(path)) for name, path in files.items()]
-    known = dict(report.user_properties)
-    report.user_properties += [entry for entry in properties if entry[0] not in known]
+    # On the item: what JUnit XML tells comes with the report of the teardown.
+    known = dict(item.user_properties)
+    item.user_properties += [(f"hil_{name}", str(path)) for name, path in files.items() if f"hil_{name}" not in known]
+    report.user_properties = list(item.user_properties)

@@ -83,7 +83,7 @@ def test_a_failure_says_what_was_expected_and_found_and_leaves_recording_and_pic
     words = " ".join(text for text in svg.getroot().itertext())
     for word in (
         "drive_fl",
-        "operation enabled",
+        "switch on disabled",
         "fault",
         "2310h",
         "trip@drive_fl",
