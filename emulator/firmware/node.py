@@ -160,12 +160,17 @@ class Node:
         self.application.nmt_changed(state)
         self.pdos.wire(state is NmtState.OPERATIONAL)
         self.sync.run(state in _TALKING)
+        if state not in _TALKING:
+            self._sdo.reset()
 
     def _take_sdo(self, can_id: int, data: bytes) -> None:
         if self.nmt.state in _TALKING:
             self._sdo.receive(can_id, data)
 
     def _heartbeat_lost(self, node_id: int) -> None:
+        if self.nmt.state is NmtState.INITIALISATION:
+            # A node without supply misses nobody.
+            return
         self.emergency.report_communication(ErrorCode.HEARTBEAT, node_id)
         self._connection_lost()
 

@@ -64,8 +64,9 @@ class SyncService:
 
     def run(self, running: bool) -> None:
         """Produce or not, as the NMT state allows."""
-        self._running = running
-        self._restart()
+        if running is not self._running:
+            self._running = running
+            self._restart()
 
     def accepts(self, data: bytes) -> bool:
         """Whether a SYNC has the length that it should have; takes its number."""

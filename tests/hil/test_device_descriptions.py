@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import configparser
+import warnings
 from pathlib import Path
 
 import canopen
 import cantools
 import pytest
+from dcf.device import Device
+from dcf.lint import lint
+from dcf.parse import parse_file
 from durand.object_dictionary import Variable
 
 from emulator.firmware.dictionary import Dictionary
@@ -15,7 +19,7 @@ from emulator.firmware.flywheels import Flywheels
 from hil.bench import LockstepBench
 from hil.descriptions import configured_values, write_dbc, write_dcf, write_device_files
 from hil.master import Master
-from hil.network import DEFAULT_NETWORK, Network, Role, load_network
+from hil.network import DEFAULT_NETWORK, Network, PdoDirection, Role, load_network
 
 DATA = DEFAULT_NETWORK.parent
 COMPACT = DATA / "compact.toml"
@@ -57,6 +61,32 @@ def test_other_readers_load_the_eds(name: str) -> None:
             assert zero == highest or mapping, section
         elif section[:1] in "126" and "DataType" in plain[section]:
             assert plain[section]["AccessType"] in ("ro", "rw", "wo", "const", "rww", "rwr"), section
+
+
+def lely_accepts(path: Path, environment: dict[str, int]) -> Device:
+    """What `dcfchk` of the Lely CANopen tools does; its complaints are warnings."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        parsed = parse_file(str(path))
+        assert lint(parsed)
+        return Device(parsed, environment)
+
+
+@pytest.mark.parametrize("name", ["drive.eds", "encoder.eds"])
+def test_the_checker_of_lely_finds_nothing_in_the_eds(name: str) -> None:
+    device = lely_accepts(DATA / name, {"NODEID": 4})
+    assert device.tpdo[1].cob_id & 0x7FF == 0x184
+
+
+def test_the_checker_of_lely_finds_nothing_in_the_dcf(described: Network, tmp_path: Path) -> None:
+    for node in described.nodes:
+        (path := tmp_path / "node.dcf").write_text(write_dcf(node, described))
+        device = lely_accepts(path, {})
+        for pdo in node.pdos:
+            found = (device.rpdo if pdo.direction is PdoDirection.RECEIVE else device.tpdo)[pdo.number]
+            assert found.cob_id & 0xBFFFFFFF == pdo.cob_id(node.node_id)
+            assert found.transmission_type == pdo.transmission_type
+            assert [entry.index for entry in found.mapping.values()] == [item.index for item in pdo.objects]
 
 
 @pytest.mark.parametrize("name", ["drive.eds", "encoder.eds"])

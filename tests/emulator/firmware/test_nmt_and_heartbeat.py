@@ -139,6 +139,18 @@ def test_a_drive_can_follow_what_another_node_sends(wire) -> None:
     assert wire.read(1, 0x6071) == wire.read(5, 0x6004) & 0xFFFF
 
 
+def test_a_node_without_supply_misses_nobody_and_boots_afterwards(wire) -> None:
+    watch(wire, 1, 0x7F, 100)
+    wire.nmt(0x01, 1)
+    wire.send(0x77F, b"\x05")
+    wire.devices.power_off(1)
+    assert wire.wait(1.0) == []
+    wire.frames()
+    wire.devices.power_on(1)
+    assert wire.frames() == [(0x701, b"\x00")]
+    assert wire.read(1, 0x1001) == 0
+
+
 STATES_AFTER_LOSS = {0: 0x7F, 1: 0x05, 2: 0x04}
 
 

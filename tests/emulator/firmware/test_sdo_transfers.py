@@ -266,6 +266,14 @@ def test_a_transfer_that_is_left_alone_is_given_up(wire, bare, begin: str) -> No
     assert wire.wait(10.0) == []
 
 
+def test_a_node_that_is_stopped_in_a_transfer_stays_silent(wire, bare) -> None:
+    bare.ask("4008100000000000")
+    wire.nmt(0x02, 1)
+    assert wire.wait(10.0) == []
+    wire.nmt(0x80, 1)
+    assert bare.ask("60" + "00" * 7) == abort(0x05040001)
+
+
 def test_a_slow_client_is_not_given_up(wire, bare) -> None:
     bare.ask("4008100000000000")
     for toggle in (0x60, 0x70, 0x60):

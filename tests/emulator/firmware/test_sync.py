@@ -57,6 +57,21 @@ def test_a_stopped_node_produces_no_sync(wire) -> None:
     assert len(wire.wait(0.1)) == 10
 
 
+def test_a_producer_keeps_its_beat_when_it_becomes_operational(wire) -> None:
+    set_period(wire, 3, 10_000)
+    produce(wire, 3)
+    wire.wait(0.015)
+    wire.nmt(0x01, 3)
+    assert [can_id for can_id, _ in wire.wait(0.0051)][:1] == [0x080]
+
+
+def test_a_node_that_was_reset_produces_no_longer(wire) -> None:
+    set_period(wire, 3, 10_000)
+    produce(wire, 3)
+    wire.nmt(0x82, 3)
+    assert wire.wait(0.1) == []
+
+
 def test_the_identifier_of_a_producer_is_fixed(wire) -> None:
     set_period(wire, 3, 10_000)
     produce(wire, 3)
