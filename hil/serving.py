@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import can
 
@@ -13,7 +15,7 @@ from emulator.firmware.description import read_network_description
 from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.network import DeviceNetwork
 from emulator.firmware.storage import Memory
-from hil.buses.frame_kinds import device_frame
+from hil.buses.frame_kinds import ERROR_FRAME, EXTENDED, REMOTE, STANDARD_MASK, device_frame
 from hil.buses.unix import UnixHub
 from hil.buses.wire import Wire
 from hil.buses.wired import Devices, WiredDevices
@@ -49,6 +51,36 @@ class ServingReport:
     syncs: int = 0
     overruns: int = 0
     worst_lag: float = 0.0
+
+
+class _Port(Protocol):
+    """Frames as (identifier with the flags of `can_frame`, data): no message is built for each."""
+
+    def take(self, timeout: float) -> tuple[int, bytes] | None: ...
+
+    def send_data(self, can_id: int, data: bytes) -> None: ...
+
+    def burst(self) -> AbstractContextManager[None]: ...
+
+
+class _BusPort:
+    """Any python-can bus as port."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self._bus = bus
+
+    def take(self, timeout: float) -> tuple[int, bytes] | None:
+        message = self._bus.recv(timeout)
+        if message is None:
+            return None
+        flags = EXTENDED * message.is_extended_id | REMOTE * message.is_remote_frame
+        return message.arbitration_id | flags | ERROR_FRAME * message.is_error_frame, bytes(message.data)
+
+    def send_data(self, can_id: int, data: bytes) -> None:
+        self._bus.send(device_frame(can_id, data))
+
+    def burst(self) -> AbstractContextManager[None]:
+        return contextlib.nullcontext()
 
 
 class VehicleServer:
@@ -87,7 +119,7 @@ class VehicleServer:
         memory: Memory | None = None,
     ) -> None:
         described = load_network(network)
-        self._bus = bus
+        self._port: _Port = bus if isinstance(bus, UnixHub) else _BusPort(bus)
         self._clock = clock
         self._lockstep = lockstep
         self._period = described.cycle_period
@@ -107,9 +139,7 @@ class VehicleServer:
             wire = Wire(described.bit_rate)
             self._devices = self._wired = WiredDevices(make, wire, self._send_at, vehicle.time)
         else:
-            self._devices = make(self._send)
-        # A hub hands the frames of one SYNC over together.
-        self._together = bus.burst if isinstance(bus, UnixHub) else contextlib.nullcontext
+            self._devices = make(self._port.send_data)
         self._grid = self._devices.time
         self._behind = clock.now() - self._devices.time
         self._stepping = False
@@ -120,14 +150,14 @@ class VehicleServer:
         """Serve until `stop()`, which is asked at least every millisecond of idleness."""
         with steady_memory():
             while not stop():
-                message = self._bus.recv(self._patience())
-                if message is None:
+                frame = self._port.take(self._patience())
+                if frame is None:
                     self._follow_clock()
-                elif message.is_remote_frame and not message.is_extended_id:
+                elif frame[0] <= STANDARD_MASK:
+                    self._take(*frame)
+                elif frame[0] & ~REMOTE <= STANDARD_MASK:
                     self._follow_clock()
-                    self._devices.receive_remote(message.arbitration_id)
-                elif not (message.is_extended_id or message.is_error_frame):
-                    self._take(message.arbitration_id, bytes(message.data))
+                    self._devices.receive_remote(frame[0] & STANDARD_MASK)
         return self.report
 
     def _patience(self) -> float:
@@ -143,7 +173,7 @@ class VehicleServer:
             self._devices.receive(can_id, data)
         else:
             self.report.syncs += 1
-            with self._together():
+            with self._port.burst():
                 self._take_sync(can_id, data)
         if self._wired is not None and self._stepping:
             # Nothing else moves time before the next SYNC, and the master waits for what is on the wire.
@@ -182,8 +212,5 @@ class VehicleServer:
             self.report.worst_lag = max(self.report.worst_lag, lag)
         self._devices.advance(round(instant, 9))
 
-    def _send(self, can_id: int, data: bytes) -> None:
-        self._bus.send(device_frame(can_id, data))
-
     def _send_at(self, can_id: int, data: bytes, _instant: float) -> None:
-        self._bus.send(device_frame(can_id, data))
+        self._port.send_data(can_id, data)

@@ -59,7 +59,7 @@ class UnixHub(can.BusABC):
         self._path = path
         self._now = now
         self._send_timeout = send_timeout
-        self._received: deque[can.Message] = deque()
+        self._received: deque[tuple[bytes, float]] = deque()
         self._clients: list[_Client] = []
         self._burst: list[bytes] | None = None
         self._server = _listen(path)
@@ -81,11 +81,20 @@ class UnixHub(can.BusABC):
         """
         if self._is_shutdown:
             raise can.CanOperationError("the bus has been shut down")
-        packet = pack_frame(msg)
-        if self._burst is None:
-            self._broadcast(packet, None)
-        else:
-            self._burst.append(packet)
+        self._send_packet(pack_frame(msg))
+
+    def send_data(self, can_id: int, data: bytes) -> None:
+        """Send a frame without the detour of a message; `can_id` carries the flags of `can_frame`."""
+        self._send_packet(FRAME.pack(can_id, len(data), 0, data))
+
+    def take(self, timeout: float) -> tuple[int, bytes] | None:
+        """The next frame as identifier, with the flags of `can_frame`, and data; None after `timeout` [s]."""
+        if not self._received:
+            self._serve(timeout)
+            if not self._received:
+                return None
+        can_id, length, _, data = FRAME.unpack(self._received.popleft()[0])
+        return can_id, data[:length]
 
     @contextlib.contextmanager
     def burst(self) -> Iterator[None]:
@@ -105,7 +114,7 @@ class UnixHub(can.BusABC):
             raise can.CanOperationError("the bus has been shut down")
         if not self._received:
             self._serve(timeout)
-        return (self._received.popleft() if self._received else None), False
+        return (unpack_frame(*self._received.popleft()) if self._received else None), False
 
     def shutdown(self) -> None:
         """Close the bus for everybody."""
@@ -153,7 +162,7 @@ class UnixHub(can.BusABC):
         if packet and len(packet) % FRAME_SIZE == 0:
             for begin in range(0, len(packet), FRAME_SIZE):
                 frame = packet[begin : begin + FRAME_SIZE]
-                self._received.append(unpack_frame(frame, self._now()))
+                self._received.append((frame, self._now()))
                 self._broadcast(frame, client)
         elif (hello := unpack_hello(packet)) is not None:
             client.wants = hello
@@ -169,6 +178,12 @@ class UnixHub(can.BusABC):
                 continue
             if wants.everything or wants.passes(FRAME.unpack(packet)[0]):
                 self._send_to(client, packet if client is not sender else marked_as_own(packet))
+
+    def _send_packet(self, packet: bytes) -> None:
+        if self._burst is None:
+            self._broadcast(packet, None)
+        else:
+            self._burst.append(packet)
 
     def _send_burst(self, packets: list[bytes]) -> None:
         for client in tuple(self._clients):
