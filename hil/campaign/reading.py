@@ -96,7 +96,7 @@ def join(records: Sequence[Record]) -> Record:
 def _record(logs: Sequence[tuple[str, Path]], network: Network, plan: Plan | None, source: str) -> Record:
     decoded = [(step, path, decode_log(path, network)) for step, path in logs]
     notes = tuple(note for _, path, log in decoded if (note := _note(path, log)))
-    return Record([_segment(step, path, log, network, plan) for step, path, log in decoded], source, notes)
+    return Record([segment_of(step, path, log, network, plan) for step, path, log in decoded], source, notes)
 
 
 def _note(path: Path, log: DecodedLog) -> str:
@@ -108,7 +108,12 @@ def _note(path: Path, log: DecodedLog) -> str:
     )
 
 
-def _segment(step: str, path: Path, log: DecodedLog, network: Network, plan: Plan | None) -> Segment:
+def segment_of(step: str, path: Path, log: DecodedLog, network: Network, plan: Plan | None) -> Segment:
+    """The segment of a decoded step; the repeats of its excitation are those of the plan.
+
+    Raises:
+        RecordError: a sample breaks the contract of records.
+    """
     return make_segment(
         Segment(
             step=step,

@@ -6,6 +6,7 @@ The same code drives the emulator and a real vehicle: it sees a bus, a clock and
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from typing import Final, Protocol
 
 import can
@@ -17,7 +18,7 @@ from hil.clock import Clock
 from hil.master.master import Master
 from hil.network import Network
 from hil.realtime import steady_memory
-from hil.recorder import Recorder, finished_steps
+from hil.recorder import finished_steps
 from ident.campaign.controller import Controller
 from ident.campaign.reference import Reference
 from ident.errors import CampaignError
@@ -49,6 +50,16 @@ Progress = Callable[[str, int, int], None]
 """Called with step, cycles driven and cycles to drive."""
 
 
+class StepRecorder(Protocol):
+    """Takes every frame, one log a step."""
+
+    def __call__(self, message: can.Message) -> None:
+        """Take a frame."""
+
+    def step(self, name: str) -> AbstractContextManager[object]:
+        """The frames inside belong to this step."""
+
+
 class Operator(Protocol):
     """Hands beside the vehicle; called while its drives are without power."""
 
@@ -78,10 +89,19 @@ class CampaignRunner:
         recorder: takes every frame.
         operator: lifts and lowers the vehicle.
         progress: shown to people.
+        spare_alignments: leave out an alignment where the wheels stand right already.
     """
 
     def __init__(
-        self, run: Run, bus: can.BusABC, clock: Clock, recorder: Recorder, operator: Operator, progress: Progress
+        self,
+        run: Run,
+        bus: can.BusABC,
+        clock: Clock,
+        recorder: StepRecorder,
+        operator: Operator,
+        progress: Progress,
+        *,
+        spare_alignments: bool = False,
     ) -> None:
         self._run = run
         self._plan = run.plan
@@ -90,6 +110,7 @@ class CampaignRunner:
         self._recorder = recorder
         self._operator = operator
         self._progress = progress
+        self._spare_alignments = spare_alignments
         self.overruns = 0
 
     def drive(self) -> None:
@@ -131,6 +152,8 @@ class CampaignRunner:
         target = self._plan.posture(step)
         for _ in range(ALIGNMENTS):
             start = np.array(master.exchange(_STANDSTILL).steering_angles)
+            if self._spare_alignments and float(np.abs(start - target).max()) < ALIGNED:
+                return
             reached = self._drive(master, self._plan.alignment(start, step, self._plan.vehicle.prior))
             error = float(np.abs(np.array(reached) - target).max())
             if error < ALIGNED:

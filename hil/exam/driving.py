@@ -2,22 +2,53 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+
+import can
+import numpy as np
 
 from emulator.effects.injection import AnyEffect
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
 from hil.bench import LockstepBench
 from hil.campaign.folder import Run, RunFolder, network_file_of
-from hil.campaign.reading import read_driven
+from hil.campaign.reading import segment_of
 from hil.campaign.runner import CampaignRunner
+from hil.frames import FrameTable, decode_frames
 from hil.network import load_network
-from hil.recorder import Recorder
 from ident.campaign.plan import Plan
 from ident.records.record import Record, Step
+
+_SOURCE = "record"
+
+
+Frame = tuple[float, int, bytes]
+"""Stamp [s], identifier, data."""
+
+
+class FramesInMemory:
+    """A recorder that keeps the frames of each step; those between steps are let go."""
+
+    def __init__(self) -> None:
+        self.steps: list[tuple[str, list[Frame]]] = []
+        self._frames: list[Frame] | None = None
+
+    def __call__(self, message: can.Message) -> None:
+        """Take a frame: what it holds now, for a master may send the same object again."""
+        if self._frames is not None:
+            self._frames.append((message.timestamp, message.arbitration_id, bytes(message.data)))
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        """The frames inside belong to this step."""
+        self._frames = []
+        self.steps.append((name, self._frames))
+        try:
+            yield
+        finally:
+            self._frames = None
 
 
 class NobodyThere:
@@ -32,36 +63,45 @@ class NobodyThere:
         raise AssertionError("an exam has no lifted step")
 
 
-def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[AnyEffect], noise_scale: float = 1.0) -> Record:
+def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[AnyEffect]) -> Record:
     """Record of a plan driven by a vehicle with effects.
 
-    The alignments between the steps are left out: how many there were depends on the effect.
+    The alignments between the steps are no part of it: how many there were depends on the effect.
 
     Args:
         plan: the campaign.
         prototype: of the emulator, by name.
         seed: of all noise.
         effects: that the vehicle has.
-        noise_scale: factor on every random source of the emulator.
 
     Raises:
         UserError: the vehicle cannot have the effects, or cannot drive with them.
     """
     network = load_network(network_file_of(prototype))
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = RunFolder(Path(scratch))
-        run = Run(folder, plan, network, seed, "", prototype, None)
-        recorder = Recorder(folder.frames)
-        try:
-            with (
-                EmulatedVehicle(
-                    load_prototype(prototype), seed=seed, effects=effects, noise_scale=noise_scale
-                ) as vehicle,
-                LockstepBench(vehicle, network.path) as bench,
-            ):
-                CampaignRunner(run, bench.bus, bench.clock, recorder, NobodyThere(), lambda *_: None).drive()
-        finally:
-            recorder.close()
-        record = read_driven(run)
-    segments = [segment for segment in record.segments if segment.step != Step.ALIGNMENT]
-    return replace(record, segments=segments, source="record")
+    run = Run(RunFolder(Path(_SOURCE)), plan, network, seed, "", prototype, None)
+    frames = FramesInMemory()
+    with (
+        EmulatedVehicle(load_prototype(prototype), seed=seed, effects=effects) as vehicle,
+        LockstepBench(vehicle, network.path) as bench,
+    ):
+        CampaignRunner(
+            run, bench.bus, bench.clock, frames, NobodyThere(), lambda *_: None, spare_alignments=True
+        ).drive()
+    return Record(
+        [
+            segment_of(step, Path(_SOURCE), decode_frames(_table(kept), network, _SOURCE), network, plan)
+            for step, kept in frames.steps
+            if step != Step.ALIGNMENT
+        ],
+        _SOURCE,
+    )
+
+
+def _table(frames: Sequence[Frame]) -> FrameTable:
+    stamps, identifiers, data = zip(*frames, strict=True)
+    return FrameTable(
+        time=np.array(stamps),
+        can_id=np.array(identifiers, dtype=np.uint32),
+        length=np.array([len(each) for each in data], dtype=np.uint8),
+        data=np.frombuffer(b"".join(each.ljust(8, b"\0") for each in data), dtype=np.uint8).reshape(-1, 8),
+    )

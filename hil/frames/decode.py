@@ -66,6 +66,15 @@ def decode_log(path: Path, network: Network, accept_truncated: bool = False, lon
     return _Decoder(read_log(path, accept_truncated), network, path, accept_truncated).decode(longest_gap)
 
 
+def decode_frames(table: FrameTable, network: Network, source: str) -> DecodedLog:
+    """Decode the frames of a step that were kept in memory; `source` is named in messages.
+
+    Raises:
+        RecordError: as `decode_log`.
+    """
+    return _Decoder(table, network, Path(source), False).decode(0)
+
+
 class _Decoder:
     def __init__(self, table: FrameTable, network: Network, path: Path, drop_last: bool) -> None:
         self._table = table
