@@ -10,13 +10,15 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from hil.campaign.folder import network_file_of
 from hil.exam.cases import Composition
 from hil.exam.folder import ExamFolder, write_atomically
 from hil.exam.score_names import PERMUTED, WITHOUT_TRUE
 from hil.exam.score_report import reliability_svg, score_json, score_markdown, summary_lines
 from hil.exam.scoring import modesty, permuted, read_answers, removable, score
-from hil.exam.sizes import SIZES_FILE, load_sizes
+from hil.exam.sizes import SIZES_FILE, load_sizes, table_text
 from hil.exam.statistics import Rate
+from hil.network import load_network
 from hil.workflow import progress
 from quasiomni.application import app, console
 from quasiomni.options import load_emulation
@@ -75,6 +77,21 @@ def diagnose(
     with _bar("diagnosing") as shown:
         diagnose_exam(opened, jobs=jobs, scheduler=scheduler, progress=shown, removed=removed)
     console.print(f"Next: [bold]quasiomni exam score {folder}[/bold]")
+
+
+@exam.command()
+def calibrate(
+    out: Annotated[Path, typer.Option(help="Table of sizes to write.")] = SIZES_FILE,
+) -> None:
+    """Measure what size each effect has in noise units, from pairs of runs that differ by the effect alone."""
+    load_emulation()
+    from hil.exam.calibration import calibrate
+
+    cycle = load_network(network_file_of("prototype")).cycle_period
+    with _bar("measuring") as shown:
+        rows = calibrate("prototype", cycle, shown)
+    write_atomically(out, table_text(rows).encode())
+    console.print(f"Written: {out}")
 
 
 @exam.command("score")
