@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from emulator.firmware.drive.axis import TICK, Axis
+from emulator.firmware.drive.activity import Activity, make_motions
+from emulator.firmware.drive.axis import Axis
 from emulator.firmware.drive.faults import (
     CONNECTION_LOST,
     FOLLOWING_ERROR,
@@ -13,19 +14,7 @@ from emulator.firmware.drive.faults import (
     SETPOINTS_MISSING,
     Fault,
 )
-from emulator.firmware.drive.homing import Homing
-from emulator.firmware.drive.modes import (
-    HALTING_MODES,
-    TORQUE_MODES,
-    CyclicPosition,
-    CyclicTorque,
-    CyclicVelocity,
-    Mode,
-    Motion,
-    NoMotion,
-    ProfileTorque,
-    ProfileVelocity,
-)
+from emulator.firmware.drive.modes import HALTING_MODES, TORQUE_MODES, Mode, Motion
 from emulator.firmware.drive.objects import bind
 from emulator.firmware.drive.options import (
     DISABLE_OPERATION_OPTIONS,
@@ -44,7 +33,6 @@ from emulator.firmware.drive.supervision import EncoderWatch
 from emulator.firmware.hardware import DriveHardware
 from emulator.firmware.nmt import NmtState
 from emulator.firmware.node import Node
-from emulator.firmware.timers import Timer
 from emulator.power_stage import Trip
 
 _HALT = 1 << 8
@@ -78,16 +66,8 @@ class DriveApplication:
         self.axis = Axis(hardware, self._parameters, node.timers)
         self._points = self.axis.points
         self._machine = StateMachine(self._carry_out, self._ready)
-        self._position = CyclicPosition(self.axis)
-        self._motions: Mapping[Mode, Motion] = {
-            Mode.NONE: NoMotion(self.axis),
-            Mode.PROFILE_VELOCITY: ProfileVelocity(self.axis),
-            Mode.PROFILE_TORQUE: ProfileTorque(self.axis),
-            Mode.HOMING: Homing(self.axis),
-            Mode.CYCLIC_POSITION: self._position,
-            Mode.CYCLIC_VELOCITY: CyclicVelocity(self.axis),
-            Mode.CYCLIC_TORQUE: CyclicTorque(self.axis),
-        }
+        self._motions = make_motions(self.axis)
+        self._activity = Activity(node.timers, self._tick)
         self._encoder = EncoderWatch(hardware.counts_per_revolution)
         self._stop = Stop(self.axis)
         self._reaction = StopKind.DISABLE
@@ -107,11 +87,9 @@ class DriveApplication:
         self.mode = Mode.NONE
         self.error_code = 0
         self.statusword = 0
-        self._motion: Motion | None = None
         self._halted = False
         self._warns = False
         self._supervised_at = 0.0
-        self._timer: Timer | None = None
         hardware.watch(self._tripped)
         bind(self, node.object_dictionary)
 
@@ -152,7 +130,7 @@ class DriveApplication:
 
     def follow(self) -> None:
         """Act on set-points that have changed."""
-        motion, limited = self._motion, self.axis.limited
+        motion, limited = self._activity.motion, self.axis.limited
         if motion is not None:
             motion.take()
             if motion.ticks or self.axis.limited is not limited:
@@ -160,7 +138,7 @@ class DriveApplication:
 
     def sample(self) -> None:
         """Look after the drive; process values are read when they are sent, time stands still meanwhile."""
-        motion = self._motion
+        motion = self._activity.motion
         if motion is not None and not motion.ticks:
             self._supervise()
 
@@ -283,30 +261,18 @@ class DriveApplication:
         self._run(self._stop)
 
     def _run(self, motion: Motion | None) -> None:
-        """Make `motion` what the axis does from now on."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-        self._motion = motion
         if motion is None:
             self._encoder.reset()
-        else:
-            motion.start()
-            if motion.ticks:
-                self._timer = self._node.timers.after(TICK, self._tick)
+        self._activity.run(motion)
 
-    def _tick(self) -> None:
-        motion = self._motion
-        if motion is None:
-            return
-        self._timer = self._node.timers.after(TICK, self._tick)
+    def _tick(self, motion: Motion) -> None:
         self._supervise()
-        if motion is not self._motion:
+        if motion is not self._activity.motion:
             return
         motion.tick()
         if motion is self._stop and self._stop.done and self._after_stop is not None:
             self._machine.take(self._after_stop)
-        elif self._position.failed and motion is self._position:
+        elif motion.failed:
             self.fail(FOLLOWING_ERROR)
         self._update_status()
 
@@ -324,7 +290,7 @@ class DriveApplication:
             self._update_status()
 
     def _update_status(self) -> None:
-        last, motion = self.statusword, self._motion
+        last, motion = self.statusword, self._activity.motion
         self.statusword = compose(
             self._machine.state,
             remote=self._node.nmt.state is NmtState.OPERATIONAL,

@@ -39,7 +39,7 @@ class Homing:
     The index pulse is the zero of the motor encoder, once in a revolution.
     """
 
-    ticks = True
+    ticks, failed = True, False
 
     def __init__(self, axis: Axis) -> None:
         self._axis = axis

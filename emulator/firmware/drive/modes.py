@@ -39,6 +39,9 @@ class Motion(Protocol):
     ticks: bool
     """Whether it needs the drive's own loops; a torque set-point of the bus needs none."""
 
+    failed: bool
+    """The following error has lasted too long."""
+
     def start(self) -> None:
         """From now on."""
 
@@ -75,7 +78,7 @@ class Steady:
 class NoMotion:
     """No mode selected: no torque."""
 
-    ticks = False
+    ticks = failed = False
 
     def __init__(self, axis: Axis) -> None:
         self._axis = axis
@@ -101,7 +104,7 @@ class NoMotion:
 class CyclicTorque:
     """Cyclic synchronous torque: 6071h + 60B2h, interpolated by the current loop."""
 
-    ticks = False
+    ticks = failed = False
 
     def __init__(self, axis: Axis) -> None:
         self.start = self.take = axis.follow_torque
@@ -117,7 +120,7 @@ class CyclicTorque:
 class ProfileTorque:
     """Profile torque: 6071h, approached at the torque slope 6087h."""
 
-    ticks = True
+    ticks, failed = True, False
 
     def __init__(self, axis: Axis) -> None:
         self._axis = axis
@@ -144,7 +147,7 @@ class ProfileTorque:
 class ProfileVelocity:
     """Profile velocity: 60FFh, approached at 6083h and 6084h."""
 
-    ticks = True
+    ticks, failed = True, False
 
     def __init__(self, axis: Axis) -> None:
         self._axis = axis
@@ -210,7 +213,7 @@ class Interpolation:
 class CyclicVelocity:
     """Cyclic synchronous velocity: 60FFh + 60B1h, interpolated, with 60B2h as extra torque."""
 
-    ticks = True
+    ticks, failed = True, False
 
     def __init__(self, axis: Axis) -> None:
         self._axis = axis

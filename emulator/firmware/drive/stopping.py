@@ -18,7 +18,7 @@ class Stop:
     The slow-down ramp of the torque modes takes the torque to zero at 6087h instead; the shaft then coasts.
     """
 
-    ticks = True
+    ticks, failed = True, False
 
     def __init__(self, axis: Axis) -> None:
         self._axis = axis
