@@ -55,7 +55,7 @@ class Directions:
     Attributes:
         basis: (n, D).
         places: of every variant in the basis; empty where the baseline absorbs it.
-        least: (D,) amplitudes below which a direction counts nothing.
+        least, negligible: (D,) amplitudes, and sizes of them, below which a direction counts nothing.
         residual: (n,) target minus its projection on the baseline.
         volume: log of the determinant of each variant's columns beside the baseline.
     """
@@ -63,6 +63,7 @@ class Directions:
     basis: Array
     places: tuple[slice, ...]
     least: Array
+    negligible: Array
     residual: Array
     volume: Array
 
@@ -71,9 +72,13 @@ class Directions:
         """Number of directions of every variant."""
         return np.array([place.stop - place.start for place in self.places])
 
+    def possible(self, amplitudes: Array) -> Mask:
+        """Which amplitudes (..., D) are as large as they must be."""
+        return (amplitudes >= self.least) & (np.abs(amplitudes) >= self.negligible)
+
     def ratios(self, amplitudes: Array) -> Array:
         """Sums of squared amplitudes (..., D) over the directions of every variant, (..., V)."""
-        counted = np.where(amplitudes >= self.least, amplitudes, 0.0)
+        counted = np.where(self.possible(amplitudes), amplitudes, 0.0)
         squares = np.concatenate([np.zeros((*amplitudes.shape[:-1], 1)), np.cumsum(counted**2, axis=-1)], axis=-1)
         starts = [place.start for place in self.places]
         stops = [place.stop for place in self.places]
@@ -89,19 +94,20 @@ def directions(white: White, layout: Sequence[Column], rows: Mask | None = None)
     left = columns - base @ (base.T @ columns)
     full = np.linalg.norm(white.columns, axis=0)
     parts, places, volumes, end = [np.zeros((len(target), 0))], [], [], 0
-    least: list[float] = []
+    bounds: list[tuple[float, float]] = []
     for column in layout:
         scale = np.where(full[column.place] > 0, full[column.place], 1.0)
         vectors, singular, _ = np.linalg.svd(left[:, column.place] / scale, full_matrices=False)
         count = int(np.sum(singular > VISIBLE))
-        length = float(vectors[:, 0] @ left[:, column.place.start]) if count else 0.0
-        bounded = count > 0 and column.least > -math.inf
-        parts.append(vectors[:, :count] * (np.sign(length) if bounded else 1.0))
-        least += [column.least * abs(length) if bounded else -math.inf] * count
+        single = count == 1 and vectors.shape[1] == 1
+        length = float(vectors[:, 0] @ left[:, column.place.start]) if single else 1.0
+        parts.append(vectors[:, :count] * np.sign(length))
+        bounds += [(column.least * abs(length), column.negligible * abs(length))] * count
         places.append(slice(end, end + count))
         volumes.append(2 * float(np.sum(np.log(np.maximum(singular, VISIBLE)))))
         end += count
-    return Directions(np.hstack(parts), tuple(places), np.array(least), residual, np.array(volumes))
+    least, negligible = np.array(bounds).reshape(-1, 2).T
+    return Directions(np.hstack(parts), tuple(places), least, negligible, residual, np.array(volumes))
 
 
 def orthonormal(columns: Array) -> Array:
@@ -239,7 +245,8 @@ def _joint(evidence: Evidence, first: int, second: int, rows: int) -> tuple[floa
     scale = max(evidence.scale[first], evidence.scale[second])
     price = 0.5 * int(kept.sum()) * math.log(rows)
     turned = evidence.amplitudes[picked] @ turn
-    possible = bool(np.all(turn @ turned >= found.least[picked]))
+    sizes = turn @ turned
+    possible = bool(np.all((sizes >= found.least[picked]) & (np.abs(sizes) >= found.negligible[picked])))
     joint = 0.5 * float(np.sum(turned**2)) / scale - price if possible else -np.inf
     return joint, 0.5 * np.sum((evidence.surrogates[:, picked] @ turn) ** 2, axis=1) / scale - price
 

@@ -100,6 +100,7 @@ class Candidate:
         drift: it is a changed value of the model, no structure that the model lacks.
         least: what the coefficient of a single column must reach, 0 for a play or a mass; if the data want it smaller,
             this is not the cause. None: anything is possible.
+        negligible: size of the coefficient of a single column up to which it means nothing, in its unit.
     """
 
     effect: str
@@ -109,6 +110,7 @@ class Candidate:
     contribution: Contribution | None = None
     drift: bool = False
     least: float | None = None
+    negligible: float = 0.0
 
     @property
     def key(self) -> str:

@@ -50,12 +50,14 @@ class Column:
         candidate, variant: numbers.
         place: among all columns.
         least: value that its one coefficient must reach, -inf where there is none such.
+        negligible: size that its one coefficient must exceed.
     """
 
     candidate: int
     variant: int
     place: slice
     least: float
+    negligible: float
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,6 @@ class Rows:
         layout: which are whose.
         group: (n,) rows of one channel, step and coordinate of one problem share the colour of their noise.
         run: (n,) uninterrupted stretches, numbered through.
-        rate: (n,) rows a second.
         confirming: (n,) rows that take no part in the fit.
         blocks: of the problems, in order, with the samples kept of each.
     """
@@ -80,7 +81,6 @@ class Rows:
     layout: tuple[Column, ...]
     group: Indices
     run: Indices
-    rate: Array
     confirming: NDArray[np.bool_]
     blocks: tuple[tuple[Block, Kept], ...]
 
@@ -131,7 +131,6 @@ def make_rows(fit: Problem, confirm: Problem | None = None) -> Rows:
         layout=layout,
         group=np.repeat(_groups([(n, b.channel, b.step, b.coordinate) for n, b, _ in blocks]), counts),
         run=_through([rows.runs for rows in kept]),
-        rate=np.repeat(np.array([rows.rate for rows in kept]), counts),
         confirming=np.repeat(np.array([number == 1 for number, _, _ in blocks], dtype=bool), counts),
         blocks=tuple((block, rows) for _, block, rows in blocks),
     )
@@ -162,13 +161,15 @@ def _candidate_columns(problems: Sequence[Problem], kept: Sequence[Kept]) -> tup
             series = [column for candidate in candidates for column in candidate.variants[number].columns]
             width = next((column.shape[1] for column in series if column is not None), 0)
             stacks.append(_stack(kept, series, width))
-            layout.append(Column(index, number, slice(end, end + width), _least(candidates[0], width)))
+            layout.append(Column(index, number, slice(end, end + width), *_bounds(candidates[0], width)))
             end += width
     return np.hstack(stacks), tuple(layout)
 
 
-def _least(candidate: Candidate, width: int) -> float:
-    return candidate.least if candidate.least is not None and width == 1 else -math.inf
+def _bounds(candidate: Candidate, width: int) -> tuple[float, float]:
+    if width != 1:
+        return -math.inf, 0.0
+    return -math.inf if candidate.least is None else candidate.least, candidate.negligible
 
 
 def _groups(labels: Sequence[tuple[int, str, str, str]]) -> Indices:

@@ -23,6 +23,7 @@ from ident.gap.whitening import Whitener, fit_whitener
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+ROWS_PER_CONTENDER: Final = 40
 CONTENDERS: Final = 12
 """Candidates that are taken off before the colour of the noise is found."""
 
@@ -34,7 +35,8 @@ class Settings:
     Attributes:
         level: largest probability by chance, over all candidates at once, at which an effect is believed.
         confirmation: smallest log Bayes factor of the confirming rows.
-        stretch: length of the stretches whose sign a surrogate flips [s].
+        stretch: rows of the stretches whose sign a surrogate flips, well beyond the memory of whitened rows.
+        stretches: that there shall be at least; short records have shorter ones.
         surrogates: how many.
         most: effects named at most.
         lead: log evidence by which another candidate must beat one already taken to replace it.
@@ -42,7 +44,8 @@ class Settings:
 
     level: float = 0.05
     confirmation: float = 0.5
-    stretch: float = 1.0
+    stretch: int = 15
+    stretches: int = 40
     surrogates: int = 600
     most: int = 4
     lead: float = 0.5
@@ -74,7 +77,8 @@ class Regression:
         self.problem = problem
         self.rows = rows
         self.settings = settings
-        self.stretch = _stretches(rows, settings.stretch)
+        length = max(1, min(settings.stretch, len(rows) // settings.stretches))
+        self.stretch = _stretches(rows, length)
         nominal = problem.nominal
         self._prior = 0 if nominal is None else len(nominal.values)
         count = int(np.unique(self.stretch).size) + self._prior
@@ -102,16 +106,28 @@ class Regression:
         """
         plain = self._colour(variants)
         best = self._best(directions(self.white(plain, variants), self.rows.layout), variants)
-        return self._colour((*variants, *best[:CONTENDERS]))
+        return self._colour((*variants, *best[: min(CONTENDERS, len(self.rows) // ROWS_PER_CONTENDER)]))
 
     def _colour(self, variants: Sequence[int]) -> Whitener:
         """Colour of what the baseline and these variants leave, fitted by turns with them."""
         design = np.hstack([self.rows.baseline, self.columns_of(variants)])
-        residual = self.rows.target - design @ least_squares(design, self.rows.target)
+        weighted = np.column_stack([design, self.rows.target]) / self._scale[:, None]
+        residual = self.rows.target - design @ least_squares(weighted[:, :-1], weighted[:, -1])
         whitener = fit_whitener(self.rows, residual, design.shape[1])
         white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
         residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
         return fit_whitener(self.rows, residual, design.shape[1])
+
+    @cached_property
+    def _scale(self) -> Array:
+        """Rms (n,) of what the baseline alone leaves of the group of a row: groups have different units."""
+        scale = np.ones(len(self.rows))
+        for group in np.unique(self.rows.group):
+            place = self.rows.group == group
+            baseline, target = self.rows.baseline[place], self.rows.target[place]
+            left = target - baseline @ least_squares(baseline, target)
+            scale[place] = max(float(np.sqrt(np.mean(left**2))), np.finfo(float).tiny)
+        return scale
 
     def _best(self, found: Directions, given: Sequence[int]) -> list[int]:
         """The best variant of every candidate that is not given, by likelihood ratio."""
@@ -253,12 +269,11 @@ def _without(taken: tuple[int, ...], index: int) -> tuple[int, ...]:
     return (*taken[:index], *taken[index + 1 :])
 
 
-def _stretches(rows: Rows, duration: float) -> NDArray[np.int64]:
+def _stretches(rows: Rows, length: int) -> NDArray[np.int64]:
     """Number (n,) of the stretch of a run that every row belongs to."""
     number, first = np.zeros(len(rows), dtype=np.int64), 0
     for run in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows.run) != 0) + 1):
         if run.size:
-            length = max(1, round(duration * rows.rate[run[0]]))
             count = max(1, round(run.size / length))
             number[run] = first + np.arange(run.size) * count // run.size
             first += count

@@ -52,14 +52,6 @@ class Whitener:
                 white[place] /= predictor.deviations[depth]
         return white
 
-    def log_deviation(self, rows: Rows) -> float:
-        """Sum over all rows of the log of the prediction error's deviation."""
-        age, total = row_ages(rows), 0.0
-        for group, predictor in enumerate(self.predictors):
-            depth = np.minimum(age[rows.group == group], len(predictor.deviations) - 1)
-            total += float(np.sum(np.log(predictor.deviations[depth])))
-        return total
-
 
 def row_ages(rows: Rows) -> NDArray[np.int64]:
     """How many rows of the same run lie before each row (n,)."""

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.gap.axis.motion import AxisMotion
+from ident.gap.axis.motion import AxisMotion, derivative
 from ident.gap.problem import Candidate, Variant
 from ident.records.axis_record import AxisKind
 from ident.vehicle.effects import EffectName, EffectParameter
@@ -29,6 +29,8 @@ BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
 """Tried first, over the range of the position."""
 LEAST_SHARE: Final = 0.1
 """Of the effort that must lie behind a play for it to be one."""
+SHORTEST_DELAY: Final = 0.55
+"""Of a sample interval. Half of one is what holding the effort over the interval does."""
 RIPPLE_STEP: Final = 0.5
 MOST_RIPPLES: Final = 30.0
 """Periods over the range of the position that are tried, and their step."""
@@ -173,17 +175,21 @@ def _time_delay(axis: AxisModel) -> Candidate:
         return axis.alone(delayed(axis.effort, -float(values[0]), axis.sample_time) - axis.effort)
 
     parameters = (EffectParameter("delay", "s", "of the motion behind the effort, as reported"),)
-    slope = np.gradient(axis.effort, axis.sample_time)
+    slope = derivative(axis.effort, axis.sample_time)
     variants = (Variant(axis.alone(slope[:, None])),)
-    return Candidate(EffectName.TIME_DELAY, axis.place, parameters, variants, contribution)
+    shortest = SHORTEST_DELAY * axis.sample_time
+    return Candidate(EffectName.TIME_DELAY, axis.place, parameters, variants, contribution, negligible=shortest)
 
 
 def _elasticity(axis: AxisModel) -> Candidate:
     """u = M q'' + ... - c M u'': the load follows the drive through a spring; first order in its compliance c."""
     unit = f"{axis.kind.position_unit}/{axis.kind.effort_unit}"
     meaning = "between drive and load, all inertia behind it; negative where the position is measured behind it"
-    bend = np.gradient(np.gradient(axis.effort, axis.sample_time), axis.sample_time)
-    return _linear(axis, EffectName.ELASTICITY, [EffectParameter("compliance", unit, meaning)], -axis.inertia * bend)
+    bend = derivative(derivative(axis.effort, axis.sample_time), axis.sample_time)
+    sampling = axis.sample_time**2 / abs(axis.inertia)
+    column = axis.alone((-axis.inertia * bend)[:, None])
+    parameters = (EffectParameter("compliance", unit, meaning),)
+    return Candidate(EffectName.ELASTICITY, axis.place, parameters, (Variant(column),), negligible=sampling)
 
 
 def _backlash(axis: AxisModel) -> Candidate:

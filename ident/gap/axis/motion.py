@@ -12,7 +12,7 @@ from scipy import ndimage, signal
 
 from ident.errors import EstimationError
 from ident.estimate.axis.processing import smoothed
-from ident.estimate.filters import differentiate
+from ident.gap.rows import ROWS_PER_CUTOFF
 from ident.records.axis_record import AxisRecord, AxisSignals
 
 Array = NDArray[np.float64]
@@ -20,15 +20,21 @@ Array = NDArray[np.float64]
 LARGEST_CUTOFF: Final = 0.4
 """Of the position filter, over the sampling frequency."""
 ROWS_CUTOFF: Final = 0.4
-"""Largest cutoff of the rows over that of the position filter: sign(v) then sees the velocity itself."""
+"""Cutoff of the rows over that of the position filter: sign(v) then sees the velocity itself."""
+LARGEST_ROWS_CUTOFF: Final = 1.0
+"""Largest cutoff of the rows times the sample time."""
+NOISE_SHARE: Final = 0.1
+"""Of the effort's noise that the noise of the acceleration may reach."""
 SPECTRUM_SEGMENTS: Final = 8
 BAND: Final = 1.3
 """Ratio of the ends of the bands over which spectra are averaged."""
-LEAST_ROWS_CUTOFF: Final = 0.04
+LEAST_ROWS: Final = 300
+"""Rows that the shortest repeat, or a record without any, shall have."""
 EFFORT_SHARE: Final = 0.99
 """Of the power of the effort that the rows keep. What lies above belongs to drives and structures, not to the axis."""
+DIFFERENCES: Final = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60
 STUCK_SPEED: Final = 0.01
-"""Over the 95th percentile of the speed: below it for longer than the filter's memory, an axis rests."""
+"""Over the 95th percentile of the speed: below it an axis may stick."""
 REPEAT_MISMATCH: Final = 0.03
 """Rms difference of two repeats of a motion over its standard deviation, at most."""
 ALMOST_WHOLE: Final = 0.95
@@ -39,17 +45,19 @@ FEWEST_ROWS: Final = 60
 
 @dataclass(frozen=True)
 class AxisMotion:
-    """Smoothed motion of an axis.
+    """Motion of an axis.
 
     Attributes:
-        position, velocity, acceleration: (N,) [m or rad, and per s, s²].
+        position, velocity, acceleration: (N,) smoothed, for what is nonlinear in them [m or rad, and per s, s²].
+        linear: (N, 2) acceleration and velocity of the unfiltered position, to be filtered like the effort.
         effort: (N,) measured, unfiltered [N or Nm].
-        moving: (N,) false where the axis rests and at the ends, where filters have not settled.
+        moving: (N,) false where the axis may stick, and at the ends, where filters have not settled.
     """
 
     position: Array
     velocity: Array
     acceleration: Array
+    linear: Array
     effort: Array
     moving: NDArray[np.bool_]
 
@@ -58,7 +66,7 @@ def position_cutoff(record: AxisRecord) -> float:
     """Cutoff for the positions of a record [rad/s]: where the noise of their second derivative begins to prevail.
 
     The power spectrum of the acceleration falls with the motion and rises with the fourth power of the frequency where
-    noise is left; its smoothed minimum lies between, and the smallest over the axes is taken.
+    only noise is left; its smoothed minimum lies between, and the smallest over the axes is taken.
     """
     rate = 1 / record.sample_time
     lowest = min(20 / (len(record) * record.sample_time), LARGEST_CUTOFF * rate)
@@ -66,38 +74,75 @@ def position_cutoff(record: AxisRecord) -> float:
     return 2 * math.pi * float(np.clip(min(found), lowest, LARGEST_CUTOFF * rate))
 
 
-def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float) -> AxisMotion:
-    """Motion of an axis by a zero-phase filter of `cutoff` [rad/s] and central differences.
+def noise_limit(axis: AxisSignals, inertia: float, cutoff: float, sample_time: float) -> float:
+    """Frequency [rad/s] below which the noise of the acceleration, times the inertia, is well below that of the effort.
+
+    Beyond it, errors of the regressor look like an elastic drive. Between ROWS_CUTOFF of the position's cutoff and it.
+    """
+    position, effort = (_noise_power(series, sample_time) for series in (axis.position, axis.effort))
+    level = NOISE_SHARE * effort / max(inertia**2 * position, np.finfo(float).tiny)
+    return float(np.clip(level**0.25, ROWS_CUTOFF * cutoff, min(cutoff, LARGEST_ROWS_CUTOFF / sample_time)))
+
+
+def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth: float) -> AxisMotion:
+    """Motion of an axis by a zero-phase filter of `cutoff` and differences, for rows up to `bandwidth` [rad/s].
+
+    Where an axis reverses it may stick, and friction is then whatever holds it: such rows are left out, with the memory
+    of the rows' filter around them.
 
     Raises:
         EstimationError: the record is too short for the filter, or the axis does not move.
     """
     dt = record.sample_time
-    memory = 4 / (ROWS_CUTOFF * cutoff)
-    if len(record) * dt * ROWS_CUTOFF * cutoff / (2 * math.pi) < FEWEST_ROWS / 3:
+    memory = 4 / bandwidth
+    if len(record) * dt * bandwidth / (2 * math.pi) < FEWEST_ROWS / ROWS_PER_CUTOFF:
         raise EstimationError(
             f"{record.source} lasts {len(record) * dt:.3g} s, too short for its bandwidth of "
-            f"{cutoff / (2 * math.pi):.3g} Hz.",
+            f"{bandwidth / (2 * math.pi):.3g} Hz.",
             "Record longer, at least some ten strokes.",
         )
     position = smoothed(axis.position, cutoff, dt)
-    velocity = differentiate(position, dt)
+    velocity = derivative(position, dt)
     speed = float(np.percentile(np.abs(velocity), 95))
     if not speed * len(record) * dt > 1e-9 or np.ptp(axis.position) < 1e-9:
         raise EstimationError(f"{record.source}: {axis.label} does not move.", "Record it while it is driven.")
-    resting = ndimage.binary_opening(np.abs(velocity) < STUCK_SPEED * speed, np.ones(max(1, round(memory / dt))))
-    moving = ~ndimage.binary_dilation(resting, np.ones(2 * round(memory / dt) + 1))
+    slow = (np.abs(velocity) < STUCK_SPEED * speed) | (np.diff(np.sign(velocity), prepend=np.sign(velocity[0])) != 0)
+    moving = ~ndimage.binary_dilation(slow, np.ones(2 * round(memory / dt) + 1))
     ends = max(1, round(2 * memory / dt))
     moving[:ends] = moving[-ends:] = False
-    return AxisMotion(position, velocity, differentiate(velocity, dt), axis.effort, moving)
+    rate = derivative(axis.position, dt)
+    linear = np.stack([derivative(rate, dt), rate], axis=1)
+    return AxisMotion(position, velocity, derivative(velocity, dt), linear, axis.effort, moving)
 
 
-def effort_bandwidth(effort: Array, cutoff: float, sample_time: float) -> float:
-    """Cutoff for the rows of an axis [rad/s]: what holds EFFORT_SHARE of the power of its modelled effort (N,)."""
+def derivative(values: Array, sample_time: float) -> Array:
+    """Central differences of sixth order along axis 0, the ends repeated.
+
+    Those of second order lose a sixth of (ω T)², twice for the acceleration: as much as an elastic drive would.
+    """
+    return np.asarray(ndimage.correlate1d(values, DIFFERENCES, axis=0, mode="nearest") / sample_time)
+
+
+def effort_bandwidth(effort: Array, duration: float, limit: float, sample_time: float) -> float:
+    """Cutoff for the rows of an axis [rad/s].
+
+    Args:
+        effort: (N,) modelled, of which the rows keep EFFORT_SHARE of the power.
+        duration: of a repeat, or of the record without any [s]; short ones need a wider band for enough rows.
+        limit: that must not be exceeded [rad/s].
+        sample_time: [s].
+    """
     frequency, power = signal.periodogram(effort, 1 / sample_time, detrend="constant")
     share = np.cumsum(power) / max(float(power.sum()), np.finfo(float).tiny)
-    found = 2 * math.pi * float(frequency[np.searchsorted(share, EFFORT_SHARE)])
-    return float(np.clip(found, LEAST_ROWS_CUTOFF * cutoff, ROWS_CUTOFF * cutoff))
+    found = float(frequency[np.searchsorted(share, EFFORT_SHARE)])
+    return min(2 * math.pi * max(found, LEAST_ROWS / (ROWS_PER_CUTOFF * duration)), limit)
+
+
+def repeat_duration(record: AxisRecord) -> float:
+    """Duration of a repeat of a record, or of the whole of it without any [s]."""
+    period = with_repeats(record)
+    numbers, counts = np.unique(period[period >= 0], return_counts=True)
+    return float(counts.min() if len(numbers) >= 2 else len(record)) * record.sample_time
 
 
 def with_repeats(record: AxisRecord) -> NDArray[np.int64]:
@@ -111,6 +156,13 @@ def with_repeats(record: AxisRecord) -> NDArray[np.int64]:
     if len(record) - period[-1] * length < ALMOST_WHOLE * length:
         period[period == period[-1]] = -1
     return np.asarray(period, dtype=np.int64)
+
+
+def _noise_power(series: Array, sample_time: float) -> float:
+    """Power density of what is left of a series (N,) in the upper half of its band, per hertz."""
+    length = max(16, len(series) // SPECTRUM_SEGMENTS)
+    frequency, power = signal.welch(series, 1 / sample_time, nperseg=min(length, len(series)), detrend="linear")
+    return float(np.median(power[len(frequency) // 2 :]))
 
 
 def _quietest(position: Array, rate: float) -> float:

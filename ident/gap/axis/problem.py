@@ -10,10 +10,20 @@ from numpy.typing import NDArray
 
 from ident.errors import RecordError
 from ident.estimate.axis.identify import PARAMETER_UNITS
-from ident.estimate.axis.processing import PARAMETERS
+from ident.estimate.axis.processing import PARAMETERS, smoothed
 from ident.estimate.filters import zero_phase
 from ident.gap.axis.candidates import AxisModel, axis_candidates
-from ident.gap.axis.motion import ROWS_CUTOFF, AxisMotion, axis_motion, effort_bandwidth, position_cutoff, with_repeats
+from ident.gap.axis.motion import (
+    LARGEST_CUTOFF,
+    ROWS_CUTOFF,
+    AxisMotion,
+    axis_motion,
+    effort_bandwidth,
+    noise_limit,
+    position_cutoff,
+    repeat_duration,
+    with_repeats,
+)
 from ident.gap.problem import Block, Candidate, Channel, Problem, Variant
 from ident.records.axis_record import AxisRecord, AxisSignals
 
@@ -70,12 +80,22 @@ def axis_reference(records: Sequence[AxisRecord], cutoff: float | None = None) -
     chosen = cutoff or min(position_cutoff(record) for record in records)
     signals = [_signals(record, chosen, ROWS_CUTOFF * chosen) for record in records]
     scales = tuple(_scale(signals, index) for index in range(len(records[0].axes)))
+    limit = min(
+        noise_limit(axis, scale.values[0], chosen, record.sample_time)
+        for record in records
+        for axis, scale in zip(record.axes, scales, strict=True)
+    )
     bandwidth = max(
-        effort_bandwidth(_first_estimate(one, index, scale), chosen, one.record.sample_time)
+        effort_bandwidth(_first_estimate(one, index, scale), repeat_duration(one.record), limit, one.record.sample_time)
         for one in signals
         for index, scale in enumerate(scales)
     )
-    return Reference(chosen, bandwidth, scales)
+    return Reference(max(chosen, min(bandwidth / ROWS_CUTOFF, largest_cutoff(records))), bandwidth, scales)
+
+
+def largest_cutoff(records: Sequence[AxisRecord]) -> float:
+    """Of a position filter, at the rates of these records [rad/s]."""
+    return min(2 * np.pi * LARGEST_CUTOFF / record.sample_time for record in records)
 
 
 def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem:
@@ -120,10 +140,13 @@ class _Signals:
 
     record: AxisRecord
     motions: list[AxisMotion]
+    cutoff: float
     bandwidth: float
 
     def filtered(self, values: Array) -> Array:
-        return zero_phase(values, self.bandwidth, self.record.sample_time)
+        """The filter of the positions and that of the rows, on everything alike."""
+        dt = self.record.sample_time
+        return zero_phase(smoothed(values, self.cutoff, dt), self.bandwidth, dt)
 
     @property
     def moving(self) -> Mask:
@@ -136,7 +159,7 @@ class _Signals:
 
 
 def _signals(record: AxisRecord, cutoff: float, bandwidth: float) -> _Signals:
-    return _Signals(record, [axis_motion(record, axis, cutoff) for axis in record.axes], bandwidth)
+    return _Signals(record, [axis_motion(record, axis, cutoff, bandwidth) for axis in record.axes], cutoff, bandwidth)
 
 
 def _scale(signals: Sequence[_Signals], index: int) -> Scale:
@@ -149,9 +172,11 @@ def _scale(signals: Sequence[_Signals], index: int) -> Scale:
 
 
 def _first_estimate(signals: _Signals, index: int, scale: Scale) -> Array:
-    """Effort (N,) of an axis by a first estimate, unfiltered."""
-    places, raw = _baseline(signals.motions, index)
-    return np.asarray(raw[:, places] @ scale.values)
+    """Effort (N,) of an axis by a first estimate, from its smoothed motion."""
+    motions = signals.motions
+    own = [motions[index].acceleration, motions[index].velocity, np.sign(motions[index].velocity)]
+    columns = [*own, np.ones_like(own[0]), *(motion.acceleration for motion in motions if motion is not motions[index])]
+    return np.asarray(np.stack(columns, axis=1) @ scale.values)
 
 
 def _of_record(signals: _Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]]]:
@@ -211,8 +236,8 @@ def _baseline_names(axes: Sequence[AxisSignals]) -> list[tuple[str, str]]:
 def _baseline(motions: Sequence[AxisMotion], index: int) -> tuple[list[int], Array]:
     """Columns that an axis has in the baseline, and all of them (N, p), unfiltered, zero where they are not its own."""
     motion = motions[index]
-    own = [motion.acceleration, motion.velocity, np.sign(motion.velocity), np.ones_like(motion.velocity)]
-    own += [other.acceleration for other in motions if other is not motion]
+    own = [*motion.linear.T, np.sign(motion.velocity), np.ones_like(motion.velocity)]
+    own += [other.linear[:, 0] for other in motions if other is not motion]
     raw = np.zeros((len(motion.velocity), len(own) * len(motions)))
     places = list(range(index * len(own), (index + 1) * len(own)))
     raw[:, places] = np.stack(own, axis=1)
@@ -259,4 +284,6 @@ def _across(parts: Sequence[Candidate]) -> Candidate:
         return tuple(one for each in series for one in each)
 
     exact = contribution if first.contribution is not None else None
-    return Candidate(first.effect, first.where, first.parameters, variants, exact, first.drift, first.least)
+    return Candidate(
+        first.effect, first.where, first.parameters, variants, exact, first.drift, first.least, first.negligible
+    )
