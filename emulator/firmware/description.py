@@ -23,9 +23,8 @@ class NodeDescription:
 
 @dataclass(frozen=True)
 class NetworkDescription:
-    """The nodes in ascending order of their ids, and the identifier of the SYNC."""
+    """The nodes in ascending order of their ids."""
 
-    sync_cob_id: int
     nodes: tuple[NodeDescription, ...]
 
 
@@ -37,7 +36,6 @@ def read_network_description(path: Path) -> NetworkDescription:
     """
     document = read_toml(path)
     devices = require_table(document, "devices", path)
-    master = require_table(document, "master", path)
     nodes = []
     for entry in document.get("nodes", ()):
         if entry.get("role") not in DRIVE_ROLES + ENCODER_ROLES:
@@ -48,4 +46,4 @@ def read_network_description(path: Path) -> NetworkDescription:
         device = require_table(devices, str(entry.get("device")), path)
         nodes.append(NodeDescription(int(entry["id"]), entry["role"], path.parent / str(device.get("eds"))))
     nodes.sort(key=lambda node: node.node_id)
-    return NetworkDescription(int(master.get("sync_cob_id", 0x80)), tuple(nodes))
+    return NetworkDescription(tuple(nodes))

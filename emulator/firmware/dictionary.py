@@ -16,6 +16,8 @@ from canopen.objectdictionary.eds import import_eds
 from durand.datatypes import DatatypeEnum
 from durand.object_dictionary import ObjectDictionary, Record, Variable
 
+from ident.errors import DataFileError
+
 
 class AbortCode(IntEnum):
     """SDO abort codes of CiA 301, table 22, as far as these nodes have a use for them."""
@@ -107,6 +109,7 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
 
     def __init__(self, eds: Path, node_id: int) -> None:
         super().__init__()
+        self._source = eds
         self.mappable: set[tuple[int, int]] = set()
         self._pdo_writers: dict[tuple[int, int], Callable[[int], None]] = {}
         content = eds.read_text(encoding="utf-8")
@@ -142,9 +145,25 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
         """Change a value from inside the device: no access check, no reaction."""
         self._data[index, subindex] = value
 
-    def value(self, index: int, subindex: int = 0) -> int:
-        """The value that an SDO read would give."""
-        return int(self.read(index, subindex))
+    def value(self, index: int, subindex: int = 0, default: int | None = None) -> int:
+        """The value that an SDO read would give.
+
+        Args:
+            index, subindex: the object.
+            default: what an object that the EDS does not have counts as.
+
+        Raises:
+            DataFileError: the EDS does not have the object, and the device cannot do without it.
+        """
+        try:
+            return int(self.read(index, subindex))
+        except KeyError as error:
+            if default is not None:
+                return default
+            raise DataFileError(
+                f"{self._source}: object {index:04X}h:{subindex} is missing, and the emulated device needs it.",
+                "Add it to the EDS, or emulate with the EDS files of hil/data.",
+            ) from error
 
     def on_read(self, index: int, subindex: int, read: Callable[[], int | bytes]) -> None:
         """Let `read` give the value of an object."""

@@ -60,11 +60,15 @@ class Emergency:
     Args:
         dictionary: holds 1001h, 1003h, 1014h and 1015h.
         timers: simulated time, for the inhibit time.
+        node_id: for the identifier of the pre-defined connection set.
         send: transmits an EMCY message where the NMT state allows it.
     """
 
-    def __init__(self, dictionary: Dictionary, timers: Timers, send: Callable[[int, bytes], None]) -> None:
+    def __init__(
+        self, dictionary: Dictionary, timers: Timers, node_id: int, send: Callable[[int, bytes], None]
+    ) -> None:
         self._dictionary = dictionary
+        self._usual_cob_id = 0x080 + node_id
         self._timers = timers
         self._send = send
         self._device: dict[int, ErrorRegister] = {}
@@ -143,10 +147,10 @@ class Emergency:
         if not self._waiting:
             return
         data = self._waiting.popleft()
-        cob_id = self._dictionary.value(0x1014)
+        cob_id = self._cob_id()
         if not cob_id & INVALID:
             self._send(cob_id & 0x7FF, data)
-        inhibit = self._dictionary.value(0x1015)
+        inhibit = self._dictionary.value(0x1015, default=0)
         if inhibit:
             self._inhibited = True
             self._timers.after(inhibit * _INHIBIT_UNIT, self._send_next)
@@ -170,4 +174,7 @@ class Emergency:
         if value & NO_REMOTE:
             raise AbortError(AbortCode.VALUE_RANGE_EXCEEDED)
         check_cob_id(value)
-        check_change(self._dictionary.value(0x1014), value)
+        check_change(self._cob_id(), value)
+
+    def _cob_id(self) -> int:
+        return self._dictionary.value(0x1014, default=self._usual_cob_id)

@@ -48,7 +48,7 @@ class NodeGuarding:
 
     def request(self, state: int) -> None:
         """A remote frame of the master has come in this NMT state."""
-        if self._dictionary.value(0x1017):
+        if self._dictionary.value(0x1017, default=0):
             return
         self._answer(state | self._toggle)
         self._toggle ^= _TOGGLE
@@ -56,13 +56,14 @@ class NodeGuarding:
             self._missing = False
             self._found()
         self._stop()
-        life_time = self._dictionary.value(0x100C) * self._dictionary.value(0x100D) / 1000.0
+        guard_time, factor = (self._dictionary.value(index, default=0) for index in (0x100C, 0x100D))
+        life_time = guard_time * factor / 1000.0
         if life_time:
             self._watch = self._timers.after(life_time, self._expire)
 
     def _expire(self) -> None:
         self._watch = None
-        if not self._dictionary.value(0x1017):
+        if not self._dictionary.value(0x1017, default=0):
             self._missing = True
             self._lost()
 

@@ -27,7 +27,7 @@ class HeartbeatProducer:
     def reset(self) -> None:
         """Start again with the value in the dictionary."""
         self._stop()
-        period = self._dictionary.value(0x1017)
+        period = self._dictionary.value(0x1017, default=0)
         if period:
             self._timer = self._timers.after(period / 1000.0, lambda: self._beat(period))
 
@@ -69,7 +69,7 @@ class HeartbeatConsumer:
         self._bus = bus
         self._lost = lost
         self._found = found
-        self._entries = range(1, dictionary.lookup(0x1016, 0).value + 1)
+        self._entries = range(1, dictionary.value(0x1016, 0, default=0) + 1)
         self._periods: dict[int, float] = {}
         self._deadlines: dict[int, float] = {}
         self._watch: dict[int, Timer] = {}

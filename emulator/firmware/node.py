@@ -77,7 +77,7 @@ class Node:
         self.timers = timers
         objects = self.object_dictionary = Dictionary(eds, node_id)
         self.nmt = NmtSlave(node_id, self._initialise, self._send_boot_up, self._nmt_changed)
-        self.emergency = Emergency(objects, timers, self._send_emergency)
+        self.emergency = Emergency(objects, timers, node_id, self._send_emergency)
         self.sync = SyncService(objects, timers, bus.listen_to_sync, self._produce_sync)
         self._sdo = SdoServer(objects, timers, self._send_sdo)
         self._storage = ParameterStorage(objects, memory, node_id, lambda: self.nmt.state is not NmtState.OPERATIONAL)
@@ -185,7 +185,7 @@ class Node:
 
     def _connection_lost(self) -> None:
         self.application.connection_lost()
-        target = _ERROR_BEHAVIOUR[self.object_dictionary.value(0x1029, 1)]
+        target = _ERROR_BEHAVIOUR[self.object_dictionary.value(0x1029, 1, default=0)]
         if target is not None and self.nmt.state is NmtState.OPERATIONAL:
             self.nmt.enter(target)
 

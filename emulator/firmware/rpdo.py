@@ -59,18 +59,14 @@ class Rpdo(PdoParameters):
         self._deadline = 0.0
         self._watch: Timer | None = None
         self._missing = False
-        self._monitored = _EVENT_TIMER in dictionary[indices.communication]
-        if self._monitored:
-            dictionary.on_write(indices.communication, _EVENT_TIMER, self._write_event_timer)
+        dictionary.on_write(indices.communication, _EVENT_TIMER, self._write_event_timer)
 
     def load(self) -> None:
         """Take everything from the dictionary, as after a reset."""
         super().load()
         self._misfit = self._missing = False
         self.stop()
-        self._period = (
-            self._dictionary.value(self._indices.communication, _EVENT_TIMER) * 1e-3 if self._monitored else 0
-        )
+        self._period = self._dictionary.value(self._indices.communication, _EVENT_TIMER, default=0) * 1e-3
 
     def compile(self) -> None:
         """Bind the mapped objects; what waits for a SYNC is dropped."""

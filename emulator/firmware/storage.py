@@ -23,6 +23,9 @@ ON_COMMAND = 1
 GROUPS = {1: (0x1000, 0xFFFF), 2: (0x1000, 0x1FFF), 3: (0x6000, 0x9FFF)}
 """Sub-index of 1010h and 1011h -> first and last index: all, communication, device profile."""
 
+_IDENTITY = ((0x1000, 0), (0x1018, 1), (0x1018, 2))
+"""Device type, vendor and product: what stored parameters have to fit."""
+
 COMMANDS = frozenset((0x1010, 0x1011, 0x6003, 0x6040, 0x6060, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2, 0x60FF))
 """Objects that are commands or set points, not parameters: they are never stored."""
 
@@ -122,7 +125,7 @@ class ParameterStorage:
         self._memory = memory
         self._node_id = node_id
         self._may_store = may_store
-        self._device = ":".join(f"{dictionary.value(*key):08X}" for key in ((0x1000, 0), (0x1018, 1), (0x1018, 2)))
+        self._device = ":".join(f"{dictionary.value(*key, default=0):08X}" for key in _IDENTITY)
         for subindex, (first, last) in GROUPS.items():
             dictionary.on_write(0x1010, subindex, self._on_signature(_SAVE, self._save, first, last))
             dictionary.on_write(0x1011, subindex, self._on_signature(_LOAD, self._forget, first, last))

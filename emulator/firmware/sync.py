@@ -11,6 +11,9 @@ from emulator.firmware.timers import Timer, Timers
 PRODUCES = 1 << 30
 """Bit of 1005h: this node is the producer."""
 
+USUAL_COB_ID = 0x080
+"""Identifier of the SYNC in the pre-defined connection set."""
+
 _COUNTER_MAX = 240
 
 
@@ -57,7 +60,8 @@ class SyncService:
     def reset(self) -> None:
         """Take everything from the dictionary."""
         read = self._dictionary.value
-        self._cob_id, self._period, self._overflow = read(0x1005), read(0x1006), read(0x1019)
+        self._cob_id = read(0x1005, default=USUAL_COB_ID)
+        self._period, self._overflow = read(0x1006, default=0), read(0x1019, default=0)
         self.counter = 0
         self._misfit = False
         self._listen(self._cob_id & IDENTIFIER)

@@ -60,10 +60,11 @@ class Tpdo(PdoParameters):
     def load(self) -> None:
         """Take everything from the dictionary, as after a reset."""
         super().load()
-        read = self._dictionary.value
-        self.inhibit_time = read(self._indices.communication, _INHIBIT_TIME) * 1e-4
-        self.event_timer = read(self._indices.communication, _EVENT_TIMER) * 1e-3
-        self._sync_start = read(self._indices.communication, _SYNC_START)
+        inhibit_time, event_timer, self._sync_start = (
+            self._dictionary.value(self._indices.communication, subindex, default=0)
+            for subindex in (_INHIBIT_TIME, _EVENT_TIMER, _SYNC_START)
+        )
+        self.inhibit_time, self.event_timer = inhibit_time * 1e-4, event_timer * 1e-3
 
     def compile(self) -> None:
         """Bind the mapped objects and start counting SYNCs."""

@@ -20,6 +20,9 @@ def configured_values(node: Node, network: Network) -> dict[tuple[int, int], int
         (0x1016, 1): network.master_id << 16 | timeout,
         (0x1017, 0): round(quantities["heartbeat_period"].value * 1000.0),
     }
+    sync = node.object_dictionary.get_variable(0x1005)
+    if sync is not None and sync.default != network.sync_cob_id:
+        values[0x1005, 0] = network.sync_cob_id
     for pdo in node.pdos:
         present = node.object_dictionary.get_variable(pdo.communication_index, 1)
         default = 0 if present is None else present.default or 0

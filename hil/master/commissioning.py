@@ -15,6 +15,7 @@ _TORQUE_MODE_BIT = 1 << CYCLIC_SYNCHRONOUS_TORQUE - 1
 
 _NMT_RESET_NODE = 0x81
 _PDO_INVALID = 1 << 31
+_SYNC_COB_ID = 0x1005
 
 _IDENTITY_OBJECTS = {
     "device_type": (0x1000, 0),
@@ -103,7 +104,8 @@ def check_encoder(access: ObjectAccess) -> None:
 
 
 def configure(access: ObjectAccess, network: Network) -> None:
-    """Map the PDOs, set SYNC transmission, and arm heartbeats in both directions."""
+    """Name the SYNC, map the PDOs, set SYNC transmission, and arm heartbeats in both directions."""
+    _name_sync(access, network.sync_cob_id)
     for pdo in access.node.pdos:
         _configure_pdo(access, pdo)
     quantities = access.node.quantities
@@ -125,6 +127,12 @@ def select_mode(access: ObjectAccess) -> None:
             f"{access.node.label} stays in mode {mode} (6061h) instead of {CYCLIC_SYNCHRONOUS_TORQUE}.",
             "Look into the drive's manual for what keeps it there.",
         )
+
+
+def _name_sync(access: ObjectAccess, cob_id: int) -> None:
+    described = access.node.object_dictionary.get_variable(_SYNC_COB_ID)
+    if described is not None and described.default != cob_id:
+        access.write(_SYNC_COB_ID, 0, cob_id)
 
 
 def _configure_pdo(access: ObjectAccess, pdo: Pdo) -> None:

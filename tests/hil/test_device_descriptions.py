@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import configparser
+import shutil
 import warnings
 from pathlib import Path
 
@@ -25,9 +26,15 @@ DATA = DEFAULT_NETWORK.parent
 COMPACT = DATA / "compact.toml"
 
 
-@pytest.fixture(params=[DEFAULT_NETWORK, COMPACT], ids=["prototype", "compact"])
-def described(request: pytest.FixtureRequest) -> Network:
-    return load_network(request.param)
+@pytest.fixture(params=["prototype", "compact", "another SYNC"])
+def described(request: pytest.FixtureRequest, tmp_path: Path) -> Network:
+    if request.param != "another SYNC":
+        return load_network(DEFAULT_NETWORK if request.param == "prototype" else COMPACT)
+    for name in ("drive.eds", "encoder.eds"):
+        shutil.copy(DATA / name, tmp_path)
+    text = DEFAULT_NETWORK.read_text(encoding="utf-8")
+    (path := tmp_path / "network.toml").write_text(text.replace("sync_cob_id = 0x80", "sync_cob_id = 0xA0"))
+    return load_network(path)
 
 
 def reader(path: Path) -> configparser.ConfigParser:
