@@ -1,0 +1,88 @@
+"""`quasiomni can`: the bus from the command line."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from hil.faults import FaultKind
+
+PATIENCE = 60.0
+
+
+def quasiomni(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "quasiomni", *(str(argument) for argument in arguments)]
+
+
+def test_a_network_that_fits_is_listed_with_its_load(quasi: Callable) -> None:
+    answer = quasi("can", "load")
+    assert answer.code == 0
+    assert "49% to 59%" in answer.out
+    assert "Every frame is through" in answer.out
+
+
+def test_a_cycle_that_cannot_work_on_a_real_bus_is_said_to(quasi: Callable) -> None:
+    answer = quasi("can", "load", "--cycle", "0.001")
+    assert answer.code == 1
+    assert "Cannot work on a real bus" in answer.out
+
+
+def test_every_kind_of_fault_is_listed(quasi: Callable) -> None:
+    answer = quasi("can", "kinds")
+    assert answer.code == 0
+    assert all(kind[:8] in answer.out for kind in FaultKind)
+
+
+MISTAKES = {
+    "no emulator": (("can", "faults", "--bus", "unix:/nowhere/bus"), "No emulator takes commands"),
+    "no place for commands": (("can", "fault", "death", "--bus", "socketcan:can0"), "--control"),
+    "another bus": (("can", "exec", "--bus", "socketcan:can0", "--", "true"), "not on this machine"),
+    "no such program": (("can", "exec", "--", "no-such-program"), "no-such-program cannot be run"),
+    "a fault that is none": (("emulate", "--bus", "unix:/tmp/never", "--fault", "vanish@0x1"), "vanish"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "named"), MISTAKES.values(), ids=MISTAKES)
+def test_mistakes_are_two_lines_with_a_remedy(quasi: Callable, arguments: tuple[str, ...], named: str) -> None:
+    answer = quasi(*arguments)
+    assert answer.code == 2
+    assert named in answer.error
+    assert "remedy:" in answer.error
+
+
+def test_an_emulator_takes_faults_from_a_script_and_live_and_candump_sees_them(tmp_path: Path) -> None:
+    if shutil.which("candump") is None:
+        if os.environ.get("QUASIOMNI_CI"):
+            pytest.fail("candump is not installed (Debian: can-utils)")
+        pytest.skip("candump is not installed (Debian: can-utils)")
+    bus, script = f"unix:{tmp_path / 'bus'}", tmp_path / "faults.txt"
+    script.write_text("# nodes that come and go\npower@drive_fl:from=2s,to=2.5s\n")
+    serving = quasiomni("emulate", "--bus", bus, "--fault", script)
+    with subprocess.Popen(serving, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as server:
+        try:
+            deadline = time.monotonic() + PATIENCE
+            while not (tmp_path / "bus.control").exists():
+                assert server.poll() is None, server.communicate()[0]
+                assert time.monotonic() < deadline
+                time.sleep(0.05)
+            dump = quasiomni("can", "exec", "--bus", bus, "--", "candump", "-n", "1", "-L", "can0,703:7FF")
+            with subprocess.Popen(dump, stdout=subprocess.PIPE, text=True) as listener:
+                while listener.poll() is None:
+                    assert time.monotonic() < deadline
+                    told = subprocess.run(
+                        quasiomni("can", "fault", "--bus", bus, "power@drive_fr:to=0.1s"),
+                        capture_output=True,
+                        check=False,
+                    )
+                    assert told.returncode == 0, told.stderr
+                assert listener.stdout is not None
+                assert listener.stdout.read().endswith("can0 703#00\n")
+        finally:
+            server.kill()
