@@ -59,7 +59,11 @@ class Order:
 
 
 def build_fmu(
-    source: ModelSource, order: Order, compiler: Compiler, progress: Callable[[Platform], None] = lambda _: None
+    source: ModelSource,
+    order: Order,
+    compiler: Compiler,
+    progress: Callable[[Platform], None] = lambda _: None,
+    cache: Path | None = None,
 ) -> bytes:
     """The FMU, a zip archive.
 
@@ -68,6 +72,7 @@ def build_fmu(
         order: what to build.
         compiler: from `fmu.compiling.find_compiler`.
         progress: called with each platform that is done.
+        cache: folder for sources; None for the user's cache folder.
 
     Raises:
         UserError: a compiler is missing or fails.
@@ -76,7 +81,7 @@ def build_fmu(
     interface = _interface(source, model, order.inputs)
     token = _token(model, interface, order.version)
     sources = fmu_sources(model, interface, order.version, token)
-    libraries = compile_libraries(sources, order.platforms, compiler, progress)
+    libraries = compile_libraries(sources, order.platforms, compiler, progress, cache)
     units = [name for name in sorted(sources) if name.endswith(".c")]
     description = model_description(interface, order.version, token, units)
     files = {
