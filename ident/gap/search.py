@@ -44,8 +44,8 @@ class Settings:
 
     level: float = 0.05
     confirmation: float = 0.5
-    stretch: int = 15
-    stretches: int = 40
+    stretch: int = 30
+    stretches: int = 24
     surrogates: int = 600
     most: int = 4
     lead: float = 0.5

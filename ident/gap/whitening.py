@@ -12,8 +12,8 @@ from ident.gap.rows import Rows
 
 Array = NDArray[np.float64]
 
-ORDER: Final = 6
-"""Of the autoregression: two seconds of memory at the rate of the vehicle's rows are no more, residuals die sooner."""
+ORDER: Final = 20
+"""Of the autoregression: slow noise hides below fast noise, and shows only over many rows."""
 TOLERATED_MEMORY: Final = 0.5
 """Correlation time of what is tolerated [s]: it is model error, and as slow as the motion."""
 TAPER: Final = 1e-4

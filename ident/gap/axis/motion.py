@@ -134,7 +134,7 @@ def effort_bandwidth(effort: Array, duration: float, limit: float, sample_time: 
     """
     frequency, power = signal.periodogram(effort, 1 / sample_time, detrend="constant")
     share = np.cumsum(power) / max(float(power.sum()), np.finfo(float).tiny)
-    found = float(frequency[np.searchsorted(share, EFFORT_SHARE)])
+    found = float(frequency[min(int(np.searchsorted(share, EFFORT_SHARE)), len(frequency) - 1)])
     return min(2 * math.pi * max(found, LEAST_ROWS / (ROWS_PER_CUTOFF * duration)), limit)
 
 
