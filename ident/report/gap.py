@@ -1,0 +1,162 @@
+"""The HTML report of a diagnosis: gap map, ranked causes with evidence, before and after, what to do next."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import jinja2
+from markupsafe import Markup
+from plotly import offline
+
+from ident.gap.diagnosis import Diagnosis, Verdict, write_whole
+from ident.gap.judge import Cause, Findings
+from ident.report import digits
+from ident.report.gap_figures import Figure, map_figure, residual_figures
+from ident.report.gap_summary import gap_line, next_text, plain, verdict_line
+
+BIASED: Final = 2.0
+"""Shift of a parameter, in standard deviations, from which it is said to be biased."""
+
+
+@dataclass(frozen=True)
+class GapReport:
+    """What the page is made of.
+
+    Attributes:
+        findings: everything that was found.
+        diagnosis: the answer.
+        records, confirm: names of the records.
+    """
+
+    findings: Findings
+    diagnosis: Diagnosis
+    records: Sequence[str]
+    confirm: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A cause as a table row.
+
+    Attributes:
+        name, where: what and where.
+        probability: that the name is right.
+        numbers: parameters with standard deviations.
+        evidence, predictive: log Bayes factors of all records and of the confirming rows.
+        closed: share of the held-out gap.
+        rivals: what these records do not tell apart from it.
+        biased: parameters that shift by more than BIASED standard deviations when it is left out.
+    """
+
+    name: str
+    where: str
+    probability: float
+    numbers: str
+    evidence: float
+    predictive: float
+    closed: float
+    rivals: str
+    biased: str
+
+
+def render_gap_report(content: GapReport) -> str:
+    """The whole page as a string; scripts, styles and data inline, nothing is loaded from anywhere."""
+    findings, diagnosis = content.findings, content.diagnosis
+    figures: dict[str, Figure] = {"map": map_figure(diagnosis.where)} if _has_gap(diagnosis) else {}
+    residuals = residual_figures(findings)
+    figures |= {key: figure for key, _, figure in residuals}
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("ident.report", "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(
+        percent=digits.percent, significant=digits.significant, unit=digits.unit_text, plain=plain
+    )
+    return environment.get_template("gap.html.j2").render(
+        verdict=str(diagnosis.verdict),
+        headline=verdict_line(diagnosis),
+        gap=diagnosis.gap,
+        gap_text=gap_line(diagnosis),
+        next=next_text(diagnosis),
+        rows=[_row(cause, content) for cause in findings.causes],
+        believed=diagnosis.verdict is Verdict.EFFECT,
+        doubtful=_doubtful(findings),
+        residuals=[(key, title) for key, title, _ in residuals],
+        parameters=_parameters(findings),
+        remainder=findings.remainder,
+        repeated=_repeated(findings),
+        significance=findings.significance,
+        invisible=diagnosis.invisible,
+        records=content.records,
+        confirm=content.confirm,
+        has_map="map" in figures,
+        figures=_json(figures),
+        plotly=Markup(offline.get_plotlyjs()),
+    )
+
+
+def write_gap_report(content: GapReport, path: Path) -> None:
+    """Write the page whole or not at all.
+
+    Raises:
+        UserError: it cannot be written.
+    """
+    write_whole(render_gap_report(content), path)
+
+
+def _has_gap(diagnosis: Diagnosis) -> bool:
+    return any(share.share > 0 for share in diagnosis.where)
+
+
+def _row(cause: Cause, content: GapReport) -> Row:
+    name = str(cause.candidate.effect)
+    named = next((e for e in content.diagnosis.effects if (e.name, e.where) == (name, cause.candidate.where)), None)
+    rivals = [plain(other) for other in (named.ambiguity_set if named else ()) if other != name]
+    values = zip(cause.candidate.parameters, cause.part.values, cause.part.std, strict=True)
+    biased = [(symbol, shift) for symbol, shift in cause.biased.items() if abs(shift) > BIASED]
+    return Row(
+        name=name,
+        where=cause.candidate.where,
+        probability=cause.probability,
+        numbers=", ".join(f"{p.name} {digits.with_std(v, s)} {digits.unit_text(p.unit)}" for p, v, s in values),
+        evidence=cause.log_evidence,
+        predictive=cause.log_predictive,
+        closed=cause.closed,
+        rivals=", ".join(rivals) or "–",
+        biased=", ".join(f"{symbol} by {shift:+.1f} std" for symbol, shift in biased) or "–",
+    )
+
+
+def _doubtful(findings: Findings) -> Mapping[str, float]:
+    """The best that were not believed, at most six."""
+    return dict(list(findings.doubtful.items())[:6])
+
+
+def _parameters(findings: Findings) -> list[tuple[str, str, str, str]]:
+    before, after = findings.before, findings.after
+    return [
+        (
+            name,
+            digits.with_std(float(before.baseline[index]), float(before.baseline_std[index])),
+            digits.with_std(float(after.baseline[index]), float(after.baseline_std[index])),
+            digits.unit_text(unit),
+        )
+        for index, (name, unit) in enumerate(zip(findings.problem.names, findings.problem.units, strict=True))
+    ]
+
+
+def _repeated(findings: Findings) -> list[tuple[str, float, float]]:
+    after = findings.repeated_after
+    return [(label, before, after.get(label, 0.0)) for label, before in findings.repeated_before.items()]
+
+
+def _json(value: Any) -> Markup:
+    """JSON that cannot end the script element it stands in."""
+    return Markup(json.dumps(value, separators=(",", ":")).replace("<", "\\u003c"))

@@ -1,0 +1,90 @@
+"""A diagnosis in ten lines, for someone who has been at it all day."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from ident.gap.diagnosis import Diagnosis, NamedEffect, Share, Verdict
+from ident.gap.judge import Findings
+from ident.report.digits import percent, significant, unit_text, with_std
+
+MOST_CAUSES: Final = 4
+REGION_NAMES: Final = {"all": ""}
+
+_VERDICTS: Final = {
+    Verdict.EFFECT: "The model lacks {names}.",
+    Verdict.NONE: "Nothing is missing: what is left is noise, as far as these records can tell.",
+    Verdict.UNKNOWN: "Something is missing that the library has no name for.",
+}
+
+
+def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
+    """At most ten lines: verdict, causes, gap, where, what cannot be seen, what to do."""
+    lines = [verdict_line(diagnosis), *(cause_line(effect) for effect in diagnosis.effects[:MOST_CAUSES])]
+    lines.append(gap_line(diagnosis))
+    place = largest_share(diagnosis)
+    if place is not None and diagnosis.verdict is not Verdict.NONE:
+        lines.append(f"Where: {percent(place.share)} of it in {place_text(place)}.")
+    if diagnosis.verdict is Verdict.UNKNOWN and findings.causes:
+        named = ", ".join(cause.candidate.key for cause in findings.causes)
+        lines.append(f"Nearest, but not enough of it: {named}.")
+    if diagnosis.invisible:
+        lines.append(f"These records cannot show: {', '.join(diagnosis.invisible)}.")
+    lines.append(f"Next: {next_text(diagnosis)}")
+    return lines
+
+
+def verdict_line(diagnosis: Diagnosis) -> str:
+    """The verdict in one sentence."""
+    names = " and ".join(f"{plain(effect.name)} ({effect.where})" for effect in diagnosis.effects)
+    return _VERDICTS[diagnosis.verdict].format(names=names)
+
+
+def cause_line(effect: NamedEffect) -> str:
+    """A cause with its probability, its numbers and its rivals."""
+    numbers = ", ".join(
+        f"{name} {with_std(quantity.value, quantity.std)} {unit_text(quantity.unit)}".rstrip(" 1").rstrip()
+        if quantity.unit == "1"
+        else f"{name} {with_std(quantity.value, quantity.std)} {unit_text(quantity.unit)}"
+        for name, quantity in effect.parameters.items()
+    )
+    rivals = [plain(name) for name in effect.ambiguity_set if name != effect.name]
+    rival = f"; might as well be {' or '.join(rivals)}" if rivals else ""
+    closes = percent(effect.gap_closed_held_out)
+    return f"  {effect.probability:.0%} {effect.name}@{effect.where}: {numbers}; closes {closes} of the gap{rival}"
+
+
+def gap_line(diagnosis: Diagnosis) -> str:
+    """The held-out gap in units of the noise."""
+    gap = diagnosis.gap
+    before = f"Gap on held-out data: {significant(gap.before)} times the noise"
+    if diagnosis.verdict is Verdict.NONE:
+        return f"{before}."
+    return f"{before}, {significant(gap.after)} with the causes in the model: {percent(gap.closed)} of it closed."
+
+
+def largest_share(diagnosis: Diagnosis) -> Share | None:
+    """The step and coordinate in which most of the gap lies."""
+    whole = [share for share in diagnosis.where if share.region == "all" and share.share > 0]
+    return max(whole, key=lambda share: share.share) if whole else None
+
+
+def place_text(share: Share) -> str:
+    """Step and coordinate in words."""
+    return f"{share.step}, {share.coordinate} ({share.channel})"
+
+
+def next_text(diagnosis: Diagnosis) -> str:
+    """What to do now."""
+    if diagnosis.next_experiment:
+        return diagnosis.next_experiment
+    if diagnosis.verdict is Verdict.EFFECT:
+        return "put the causes into the model, and check it on another record."
+    if diagnosis.verdict is Verdict.UNKNOWN:
+        return "look at the map of the gap (--report), and drive other speeds and loads where it lies."
+    return "use the model."
+
+
+def plain(name: str) -> str:
+    """A canonical name for reading."""
+    return name.replace("_", " ")

@@ -1,0 +1,38 @@
+"""The command that says why model and machine disagree."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hil.diagnosis import DiagnosisOrder, diagnose_records
+from quasiomni.application import app, console
+
+
+@app.command()
+def diagnose(
+    records: Annotated[
+        list[Path], typer.Argument(help="Run folders, logs, or CSV, Parquet or MF4 records to look for causes in.")
+    ],
+    confirm: Annotated[
+        list[Path] | None,
+        typer.Option(help="Independent record that must confirm; repeat for more. Default: held-out repeats."),
+    ] = None,
+    vehicle: Annotated[
+        str | None, typer.Option(help="Vehicle file: `prototype`, `compact`, or the path of your own.")
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option(help="parameters.toml of the model that is judged. Default: refitted.")
+    ] = None,
+    axis: Annotated[
+        bool, typer.Option("--axis", help="The records are of servo axes: time, position, effort.")
+    ] = False,
+    json: Annotated[Path | None, typer.Option(help="Write diagnosis.json here.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write an HTML report here.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the surrogates.")] = 1,
+) -> None:
+    """Say why model and machine disagree: which effect, where, how sure, how much it closes, what to do next."""
+    given = tuple(records), tuple(confirm or ())
+    diagnose_records(DiagnosisOrder(*given, vehicle, model, axis, seed, json, report), console)
