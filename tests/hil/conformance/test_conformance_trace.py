@@ -21,9 +21,7 @@ from ident.errors import DataFileError
 ROOT = Path(__file__).parents[3]
 TRACE = os.environ.get("QUASIOMNI_CIA_TRACE", "")
 
-needs_trace = pytest.mark.skipif(
-    not TRACE and "QUASIOMNI_CI" not in os.environ, reason="QUASIOMNI_CIA_TRACE does not name the trace"
-)
+needs_trace = pytest.mark.skipif(not TRACE, reason="QUASIOMNI_CIA_TRACE does not name the trace")
 
 
 @pytest.fixture(scope="module")
