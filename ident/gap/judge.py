@@ -16,7 +16,7 @@ from ident.gap.problem import Candidate, Problem
 from ident.gap.refit import Part, Refit, refit
 from ident.gap.remainder import Floors, held_out_gap, noise_floors, repeated, shares
 from ident.gap.rows import make_rows
-from ident.gap.search import Found, Regression, Settings, Slot, least_squares, search
+from ident.gap.search import Found, Regression, Settings, Slot, concluded, least_squares, search
 from ident.gap.whitening import Predictor, Whitener
 from ident.vehicle.quantities import Quantity
 
@@ -31,11 +31,15 @@ class Limits:
         deviations: by which a smooth function must predict the confirming rows for there to be a remainder.
         size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
+        improvement: share of the held-out gap that one more effect must close, unless its log evidence is `certain`.
+        certain: log evidence of an effect that is there, however little it matters.
     """
 
     deviations: float = 3.0
     size: float = 0.25
     explained: float = 0.5
+    improvement: float = 0.01
+    certain: float = 5.0
 
 
 @dataclass(frozen=True)
@@ -122,7 +126,12 @@ def judge(
     # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
         regression = Regression(fit, make_rows(fit, confirm), settings or Settings(), seed)
-        return _Judgement((fit, confirm), regression, search(regression), limits or Limits(), seed).findings()
+        found, limits = search(regression), limits or Limits()
+        judgement = _Judgement((fit, confirm), regression, found, limits, seed)
+        while (kept := judgement.worthwhile()) != found.variants:
+            found = concluded(regression, kept)
+            judgement = _Judgement((fit, confirm), regression, found, limits, seed)
+        return judgement.findings()
 
 
 class _Judgement:
@@ -160,6 +169,16 @@ class _Judgement:
             repeated_after=repeated(self.rows, self.floors, self.after.blocks),
             problem=self.problems[0],
         )
+
+    def worthwhile(self) -> tuple[int, ...]:
+        """The effects without the least one, if the held-out gap is no larger without it."""
+        causes = self._causes()
+        if len(causes) < 2:
+            return self.found.variants
+        least = min(causes, key=lambda cause: cause.log_evidence)
+        if least.closed >= self.limits.improvement or least.log_evidence >= self.limits.certain:
+            return self.found.variants
+        return tuple(v for v in self.found.variants if self.regression.key(v) != least.candidate.key)
 
     def _doubtful(self) -> Mapping[str, float]:
         rest = self.found.rest

@@ -214,6 +214,11 @@ def search(regression: Regression) -> Found:
         if set(settled) <= set(taken):
             break
         taken = settled
+    return concluded(regression, taken)
+
+
+def concluded(regression: Regression, taken: tuple[int, ...]) -> Found:
+    """What can be said of effects that are taken."""
     whitener = regression.whitener(taken)
     slots = tuple(regression.slot(_without(taken, index), whitener) for index in range(len(taken)))
     return Found(taken, whitener, slots, regression.slot(taken, whitener))

@@ -31,8 +31,8 @@ LEAST_SHARE: Final = 0.1
 """Of the effort that must lie behind a play for it to be one."""
 SHORTEST_DELAY: Final = 0.55
 """Of a sample interval. Half of one is what holding the effort over the interval does."""
-RIPPLE_STEP: Final = 0.5
-MOST_RIPPLES: Final = 30.0
+RIPPLE_STEP: Final = 0.7
+MOST_RIPPLES: Final = 90.0
 """Periods over the range of the position that are tried, and their step."""
 
 

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.errors import RecordError
+from ident.errors import EstimationError, RecordError
 from ident.estimate.axis.identify import PARAMETER_UNITS
 from ident.estimate.axis.processing import PARAMETERS, smoothed
 from ident.estimate.filters import zero_phase
 from ident.gap.axis.candidates import AxisModel, axis_candidates
 from ident.gap.axis.motion import (
+    FEWEST_ROWS,
     LARGEST_CUTOFF,
     ROWS_CUTOFF,
     AxisMotion,
@@ -148,14 +149,11 @@ class _Signals:
         dt = self.record.sample_time
         return zero_phase(smoothed(values, self.cutoff, dt), self.bandwidth, dt)
 
-    @property
-    def moving(self) -> Mask:
-        return np.asarray(np.logical_and.reduce([motion.moving for motion in self.motions]))
-
     def equations(self, index: int) -> tuple[Array, Array]:
         """Own columns of an axis in its moving rows, and its effort there."""
         places, raw = _baseline(self.motions, index)
-        return self.filtered(raw[:, places])[self.moving], self.filtered(self.motions[index].effort)[self.moving]
+        moving = self.motions[index].moving
+        return self.filtered(raw[:, places])[moving], self.filtered(self.motions[index].effort)[moving]
 
 
 def _signals(record: AxisRecord, cutoff: float, bandwidth: float) -> _Signals:
@@ -166,6 +164,12 @@ def _scale(signals: Sequence[_Signals], index: int) -> Scale:
     motions = [one.motions[index] for one in signals]
     rows = [one.equations(index) for one in signals]
     left, right = np.vstack([row[0] for row in rows]), np.concatenate([row[1] for row in rows])
+    record = signals[0].record
+    if sum(int(motion.moving.sum()) for motion in motions) * record.sample_time * signals[0].bandwidth < FEWEST_ROWS:
+        raise EstimationError(
+            f"{record.source}: {record.axes[index].label} hardly moves without reversing.",
+            "Record longer strokes, or more of them.",
+        )
     speed = max(float(np.percentile(np.abs(motion.velocity), 95)) for motion in motions)
     reach = float(np.ptp(np.concatenate([motion.position for motion in motions])))
     return Scale(np.linalg.lstsq(left, right, rcond=None)[0], speed, reach)
@@ -215,7 +219,7 @@ def _block(signals: _Signals, model: AxisModel, period: NDArray[np.int64]) -> Bl
         bandwidth=signals.bandwidth,
         target=signals.filtered(model.motion.effort),
         baseline=signals.filtered(_baseline(signals.motions, model.block)[1]),
-        moving=signals.moving,
+        moving=model.motion.moving,
         period=period,
         regions=_regions(model.motion, model.speed),
         features=_features(signals.motions),
