@@ -1,5 +1,5 @@
 """`python -m quasiomni`."""
 
-from quasiomni.application import main
+from quasiomni import main
 
 main()

@@ -1,4 +1,7 @@
-"""The commands around the bus: SocketCAN programs on it, faults on it, how busy it is."""
+"""The commands around the bus: SocketCAN programs on it, faults on it, how busy it is.
+
+`can exec` stands before every call of a SocketCAN program, so nothing is loaded here that only one command needs.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,14 @@ from typing import Annotated
 
 import typer
 from rich import box
+from rich.markup import escape
 from rich.table import Table
 
 from hil import control
 from hil.socketcan import build_library, environment
 from ident.errors import BusError
 from quasiomni.application import app, console
+from quasiomni.options import NetworkOption, VehicleOption
 
 can_app = typer.Typer(help="The CAN bus: unmodified SocketCAN programs on it, faults, load.", no_args_is_help=True)
 app.add_typer(can_app, name="can")
@@ -78,9 +83,41 @@ def kinds() -> None:
     table = Table("fault", "where", "what", "numbers (default)", box=box.SIMPLE_HEAD)
     for kind, one in SPECIFICATIONS.items():
         numbers = "; ".join(f"{name} ({number.default:g}): {number.what}" for name, number in one.parameters.items())
-        table.add_row(kind, one.target, one.what, numbers)
+        table.add_row(kind, one.target, one.what, escape(numbers))
     console.print(table)
-    console.print("All take from and to [s], counted from the injection. Units: s, ms, us, %, /s.", highlight=False)
+    console.print("All take from and to, counted from the injection. Units: s, ms, us, %, /s.", highlight=False)
+
+
+@can_app.command()
+def load(
+    vehicle: VehicleOption = "prototype",
+    network: NetworkOption = None,
+    bit_rate: Annotated[float | None, typer.Option(min=1.0, help="Another bit rate [bit/s].")] = None,
+    cycle: Annotated[float | None, typer.Option(min=1e-5, help="Another cycle period [s].")] = None,
+) -> None:
+    """Whether a network file's frames fit on a real bus; exit code 1 where they do not."""
+    from hil.bus_schedule import schedule
+    from hil.campaign.folder import network_file_of
+    from hil.network import load_network
+
+    found = schedule(load_network(network or network_file_of(vehicle)), bit_rate, cycle)
+    table = Table("COB-ID", "sender", "bytes", "bits", "every", "longest wait", box=box.SIMPLE_HEAD)
+    for frame in found.frames:
+        colour = "" if frame.in_time else "[red]"
+        times = f"{frame.period * 1e3:g} ms", f"{colour}{frame.response * 1e3:.2f} ms"
+        table.add_row(
+            f"{frame.can_id:03X}h", frame.sender, str(frame.length), f"{frame.shortest}-{frame.longest}", *times
+        )
+    console.print(table)
+    least, most = found.load
+    console.print(
+        f"Load at {found.bit_rate / 1e3:g} kbit/s: {least:.0%} to {most:.0%}, by stuff bits.", highlight=False
+    )
+    if found.late:
+        names = ", ".join(f"{frame.can_id:03X}h" for frame in found.late)
+        console.print(f"[red]Cannot work on a real bus: {names} may not be through in time.[/red]", highlight=False)
+        raise typer.Exit(code=1)
+    console.print("Every frame is through before the next one of its kind.", highlight=False)
 
 
 def hub_path(bus: str) -> Path:
