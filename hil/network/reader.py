@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -111,11 +112,17 @@ def _read_node(entry: Mapping[str, Any], devices: Mapping[str, Any], path: Path)
 
 def _read_eds(path: Path, node_id: int) -> canopen.ObjectDictionary:
     try:
-        return canopen.import_od(str(path), node_id=node_id)
+        return _parse(path, path.read_bytes(), node_id)
     except OSError as error:
         raise DataFileError(f"{path} cannot be read: {error}.", "Name an existing EDS file.") from error
     except (ValueError, KeyError) as error:
         raise DataFileError(f"{path} is not an EDS file: {error}.", "Check it with an EDS editor.") from error
+
+
+@lru_cache(maxsize=64)
+def _parse(path: Path, _content: bytes, node_id: int) -> canopen.ObjectDictionary:
+    # Parsing takes longer than all the rest of a network file; the result is only read, and new content is parsed anew.
+    return canopen.import_od(str(path), node_id=node_id)
 
 
 def _read_identity(device: Mapping[str, Any], where: str) -> Identity:
