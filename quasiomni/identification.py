@@ -89,16 +89,16 @@ def campaign(
     the room it takes. A run that was stopped keeps its finished steps: go on with --resume.
     """
     steps, inertia = _steps(skip or (), lateral, b_w), _known_inertia(b_w, b_w_std)
-    effects = parse_effects(effect)
-    if bus is not None and (effects or plant):
+    effects, fmu = parse_effects(effect), parse_plant(plant)
+    if bus is not None and (effects or fmu):
         raise UserError(
             "--effect and --plant are of the emulator, and --bus names another vehicle.", "Leave one of them out."
         )
     prototype, where = (vehicle, LOCKSTEP) if bus is None and plant is None else ("", bus or plant or "")
     order = Order(out, vehicle, network, steps, periods, seed, inertia, log_format, where, prototype)
     run = _resumed(order, context) if resume else workflow.plan_run(order, console)
-    if plant is not None:
-        _drive_on_fmu(run, order, vehicle, plant)
+    if fmu is not None:
+        _drive_on_fmu(run, order, vehicle, fmu)
     elif bus is None:
         _drive_on_emulator(run, order, effects, gui)
     else:
@@ -157,8 +157,8 @@ def _drive_on_emulator(run: Run, order: Order, effects: Sequence[Effect], gui: b
         workflow.drive_run(run, order, bench.bus, bench.clock, bench.operator, console, lambda: True)
 
 
-def _drive_on_fmu(run: Run, order: Order, prototype: str, plant: str) -> None:
-    bench = load_emulation().bench(prototype, run.seed, False, run.network.path, fmu=parse_plant(plant))
+def _drive_on_fmu(run: Run, order: Order, prototype: str, fmu: Path) -> None:
+    bench = load_emulation().bench(prototype, run.seed, False, run.network.path, fmu=fmu)
     with bench as opened, _stop_is_no_error(order.out):
         workflow.drive_run(run, order, opened.bus, opened.clock, opened.operator, console, lambda: True)
 

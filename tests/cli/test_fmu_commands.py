@@ -1,0 +1,111 @@
+"""`quasiomni fmu` and `quasiomni cosim` as a user types them."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import fmpy.validation
+import numpy as np
+import pytest
+
+from hil.campaign.folder import Run, RunFolder, create_run
+from hil.network import load_network
+from ident.campaign.excitation import FourierSeries
+from ident.campaign.plan import make_plan
+from ident.campaign.reference import excitation_reference
+from ident.campaign.steps import EXCITATIONS
+from ident.records.files import write_record
+from ident.records.record import Record, Segment, Step, make_segment
+from ident.vehicle.description import find_data_file, load_vehicle
+from ident.vehicle.effect_text import effects_text
+from ident.vehicle.effects import EffectName, make_effect
+from ident.vehicle.parameters import PARAMETER_UNITS
+
+Quasi = Callable[..., Any]
+
+
+def perfect(step: Step) -> Segment:
+    """A step of a vehicle that is the prior model, driven by its feed-forward torques."""
+    vehicle, spec = load_vehicle(), EXCITATIONS[step]
+    series = FourierSeries(np.array([0.4, 0.0, -0.4]), np.array([0.0, 0.4, -0.8 / 3]), spec.period)
+    reference = excitation_reference(spec, series, 4, vehicle, vehicle.prior, 0.002)
+    wheels, steering = np.zeros((len(reference), 4)), np.zeros((len(reference), 2))
+    for name, track in reference.tracks.items():
+        wheels += track.wheels * (track.position - track.position[0])[:, None]
+        if name.startswith("alpha"):
+            steering[:, 0 if name == "alpha_l" else 1] = track.position
+    time = np.arange(len(reference)) * 0.002
+    return make_segment(Segment(step, 0.0, time, reference.feed_forward, wheels, steering, reference.period), "test")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run folder as `identify` leaves it, its result being the prior values and one effect."""
+    vehicle, network = load_vehicle(), load_network()
+    steps = (Step.STEERING_LEFT,)
+    plan = make_plan(vehicle, np.random.default_rng(1), steps=steps, periods=4, cycle=network.cycle_period)
+    folder = RunFolder(tmp_path_factory.mktemp("runs") / "monday")
+    create_run(Run(folder, plan, network, 1, "test", "", None), find_data_file("ident.vehicle", "prototype"))
+    lines = [
+        f'[parameters.{name}]\nvalue = {vehicle.prior[name]!r}\nunit = "{unit}"\nstd = 0.01\nsource = "test"\n'
+        for name, unit in PARAMETER_UNITS.items()
+    ]
+    effect = make_effect(EffectName.QUADRATIC_DRAG, "chassis", {"coefficient": 0.0})
+    folder.parameters.write_text("\n".join(lines) + effects_text([effect]))
+    return folder.path
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("records") / "record.csv"
+    write_record(Record([perfect(step) for step in (Step.ROTATION,)]), path)
+    return path
+
+
+def test_an_identified_run_becomes_an_fmu_whose_motion_is_that_of_the_record(
+    quasi: Quasi, run: Path, record: Path, tmp_path: Path
+) -> None:
+    fmu = tmp_path / "platform.fmu"
+    built = quasi("fmu", run, "-o", fmu, "--fmi", "3", "--platforms", "host")
+    assert built.code == 0, built
+    assert "Written" in built.out
+    assert fmpy.validation.validate_fmu(str(fmu)) == []
+    with zipfile.ZipFile(fmu) as archive:
+        assert b"monday" in archive.read("documentation/index.html")
+        assert archive.read("documentation/parameters.toml") == (run / "parameters.toml").read_bytes()
+    replayed = quasi("cosim", fmu, "--record", record, "--out", tmp_path / "gap.html")
+    assert replayed.code == 0, replayed
+    differences = [float(line.split()[-2]) for line in replayed.out.replace("│", " ").splitlines() if " % " in line]
+    assert len(differences) == 1
+    assert max(differences) < 5.0
+    assert (tmp_path / "gap.html").stat().st_size > 1e5
+
+
+def test_a_run_that_is_not_identified_is_refused(quasi: Quasi, run: Path, tmp_path: Path) -> None:
+    bare = tmp_path / "bare"
+    bare.mkdir()
+    answer = quasi("fmu", bare)
+    assert answer.code == 2
+    assert "no run folder" in answer.error
+    for entry in run.iterdir():
+        if entry.name != "parameters.toml":
+            (bare / entry.name).symlink_to(entry)
+    answer = quasi("fmu", bare)
+    assert answer.code == 2
+    assert "quasiomni identify" in answer.error
+
+
+def test_mistakes_are_told_with_a_remedy(quasi: Quasi, run: Path, record: Path, tmp_path: Path) -> None:
+    unknown = quasi("fmu", run, "--platforms", "amiga")
+    assert unknown.code == 2
+    assert "x86_64-linux" in unknown.error
+    (tmp_path / "broken.fmu").write_bytes(b"no archive")
+    broken = quasi("cosim", tmp_path / "broken.fmu", "--record", record)
+    assert broken.code == 2
+    assert "remedy" in broken.error
+    nonsense = quasi("campaign", "--plant", "bullet", "--out", tmp_path / "run", "--skip", "lane_change")
+    assert nonsense.code == 2
+    assert "fmu:FILE" in nonsense.error
