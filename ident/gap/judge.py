@@ -11,12 +11,12 @@ from threadpoolctl import threadpool_limits
 
 from ident.gap.diagnosis import Diagnosis, Gap, NamedEffect, Share, Verdict
 from ident.gap.generic import Generic, predict_generic
-from ident.gap.probability import Calibration, Ranked, calibration, rank
+from ident.gap.probability import Ranked, calibration, rank
 from ident.gap.problem import Candidate, Problem
 from ident.gap.refit import Part, Refit, refit
 from ident.gap.remainder import Floors, held_out_gap, noise_floors, repeated, shares
 from ident.gap.rows import make_rows
-from ident.gap.search import Found, Regression, Settings, Slot, concluded, least_squares, search
+from ident.gap.search import Found, Regression, Settings, concluded, least_squares, search
 from ident.gap.whitening import Predictor, Whitener
 from ident.vehicle.quantities import Quantity
 
@@ -152,7 +152,7 @@ class _Judgement:
         self.untouched = self._held_out_models(())
 
     def findings(self) -> Findings:
-        gap, causes = self._gap(self.found.variants), self._causes()
+        gap, causes = self._gap(self.found.variants, exact=True), self._causes()
         verdict = self._verdict()
         return Findings(
             verdict=verdict,
@@ -172,13 +172,16 @@ class _Judgement:
 
     def worthwhile(self) -> tuple[int, ...]:
         """The effects without the least one, if the held-out gap is no larger without it."""
-        causes = self._causes()
-        if len(causes) < 2:
-            return self.found.variants
-        least = min(causes, key=lambda cause: cause.log_evidence)
-        if least.closed >= self.limits.improvement or least.log_evidence >= self.limits.certain:
-            return self.found.variants
-        return tuple(v for v in self.found.variants if self.regression.key(v) != least.candidate.key)
+        variants = self.found.variants
+        if len(variants) < 2:
+            return variants
+        evidence = [self._log_evidence(index) for index in range(len(variants))]
+        least = int(np.argmin(evidence))
+        pays = evidence[least] >= self.limits.certain or self._closed(least) >= self.limits.improvement
+        return variants if pays else self._others(least)
+
+    def _log_evidence(self, index: int) -> float:
+        return float(self.found.slots[index].evidence.log_evidence[self.found.variants[index]])
 
     def _doubtful(self) -> Mapping[str, float]:
         rest = self.found.rest
@@ -191,14 +194,24 @@ class _Judgement:
             return self.before.blocks
         return [block.baseline @ nominal.values for block, _ in self.rows.blocks]
 
-    def _held_out_models(self, variants: Sequence[int]) -> Sequence[Array]:
+    def _held_out_models(self, variants: Sequence[int], *, exact: bool = False) -> Sequence[Array]:
         """Models of all blocks, fitted without the confirming rows, every coordinate in units of its residual."""
         if not variants and self.problems[0].nominal is not None:
             return self._judged()
-        return refit(self.problems, self.regression, variants, self.weights, ~self.rows.confirming).blocks
+        held_out = ~self.rows.confirming
+        return refit(self.problems, self.regression, variants, self.weights, held_out, exact=exact).blocks
 
-    def _gap(self, variants: Sequence[int]) -> Gap:
-        return held_out_gap(self.rows, self.floors, self.untouched, self._held_out_models(variants))
+    def _gap(self, variants: Sequence[int], *, exact: bool = False) -> Gap:
+        return held_out_gap(self.rows, self.floors, self.untouched, self._held_out_models(variants, exact=exact))
+
+    def _closed(self, index: int) -> float:
+        """Share of the removable held-out gap that one effect closes, the others given; all as their columns."""
+        whole, without = self._gap(self.found.variants), self._gap(self._others(index))
+        removable = whole.before**2 - whole.floor**2
+        return (without.after**2 - whole.after**2) / removable if removable > 0 else 0.0
+
+    def _others(self, index: int) -> tuple[int, ...]:
+        return tuple(other for place, other in enumerate(self.found.variants) if place != index)
 
     def _floors(self) -> Floors:
         stacked = self.rows.stack(list(self.after.blocks))
@@ -221,36 +234,31 @@ class _Judgement:
         return large and self.rest.deviations > self.limits.deviations and self.rest.gain > 0
 
     def _causes(self) -> tuple[Cause, ...]:
-        settings = calibration()
-        whole = self._gap(self.found.variants)
-        made = [
-            self._cause(index, variant, slot, whole, settings)
-            for index, (variant, slot) in enumerate(zip(self.found.variants, self.found.slots, strict=True))
-        ]
+        made = [self._cause(index, variant) for index, variant in enumerate(self.found.variants)]
         return tuple(sorted(made, key=lambda cause: (-round(cause.probability, 2), -round(cause.closed, 1))))
 
-    def _cause(self, index: int, variant: int, slot: Slot, whole: Gap, settings: Calibration) -> Cause:
-        others = tuple(other for place, other in enumerate(self.found.variants) if place != index)
+    def _cause(self, index: int, variant: int) -> Cause:
+        slot, settings = self.found.slots[index], calibration()
         ranked = rank(self.regression, slot, variant, settings)
         candidate = self.problems[0].candidates[self.regression.owners[variant]]
-        without = self._gap(others)
-        removable = whole.before**2 - whole.floor**2
-        closed = (without.after**2 - whole.after**2) / removable if removable > 0 else 0.0
         return Cause(
             candidate=candidate,
             part=self.after.parts[index],
             ranked=ranked,
             probability=min(ranked.names.get(str(candidate.effect), 0.0), settings.ceiling),
-            log_evidence=float(slot.evidence.log_evidence[variant]),
+            log_evidence=self._log_evidence(index),
             log_predictive=float(slot.evidence.log_predictive[variant]),
-            closed=closed,
-            biased=self._biased(others),
+            closed=self._closed(index),
+            biased=self._biased(self._others(index)),
         )
 
     def _biased(self, others: Sequence[int]) -> Mapping[str, float]:
-        everything = np.ones(len(self.rows), dtype=bool)
-        without = refit(self.problems, self.regression, others, self.found.whitener, everything)
-        shift = (without.baseline - self.after.baseline) / np.maximum(self.after.baseline_std, np.finfo(float).tiny)
+        everything, whitener = np.ones(len(self.rows), dtype=bool), self.found.whitener
+        without, whole = (
+            refit(self.problems, self.regression, variants, whitener, everything, exact=False)
+            for variants in (others, self.found.variants)
+        )
+        shift = (without.baseline - whole.baseline) / np.maximum(whole.baseline_std, np.finfo(float).tiny)
         return dict(zip(self.problems[0].names, shift.tolist(), strict=True))
 
 

@@ -22,7 +22,7 @@ MOST_STEPS: Final = 15
 HALVINGS: Final = 6
 DIFFERENCE: Final = 1e-4
 """Relative step of numerical derivatives."""
-SETTLED: Final = 1e-6
+SETTLED: Final = 1e-5
 """Relative decrease of the sum of squares at which the refit ends."""
 
 
@@ -74,7 +74,13 @@ class _Unknown:
 
 
 def refit(
-    problems: Sequence[Problem], regression: Regression, variants: Sequence[int], whitener: Whitener, rows: Mask
+    problems: Sequence[Problem],
+    regression: Regression,
+    variants: Sequence[int],
+    whitener: Whitener,
+    rows: Mask,
+    *,
+    exact: bool = True,
 ) -> Refit:
     """Gauss and Newton, damped, from the linear solution.
 
@@ -84,20 +90,27 @@ def refit(
         variants: effects.
         whitener: weights of the rows.
         rows: (n,) which rows are fitted.
+        exact: whether candidates with an exact form are refitted by it; if not, all are their columns.
     """
-    model = _Model(problems, regression, variants, whitener, rows)
-    found = model.start
-    cost = model.cost(found)
-    for _ in range(MOST_STEPS if model.nonlinear else 0):
-        step = least_squares(model.jacobian(found), model.residual(found))
-        tried = [found + 0.5**halving * step for halving in range(HALVINGS)]
-        better = next((one for one in tried if model.cost(one) < cost), None)
-        if better is None:
-            break
-        decrease, found, cost = cost - model.cost(better), better, model.cost(better)
-        if decrease < SETTLED * cost:
-            break
-    return model.result(found)
+    model = _Model(problems, regression, variants, whitener, rows, exact=exact)
+    return model.result(_descended(model) if model.nonlinear else model.start)
+
+
+def _descended(model: _Model) -> Array:
+    found, residual = model.start, model.residual(model.start)
+    for _ in range(MOST_STEPS):
+        step, cost = least_squares(model.jacobian(found), residual), float(residual @ residual)
+        for halving in range(HALVINGS):
+            tried = found + 0.5**halving * step
+            left = model.residual(tried)
+            if float(left @ left) < cost:
+                break
+        else:
+            return found
+        found, residual = tried, left
+        if cost - float(left @ left) < SETTLED * cost:
+            return found
+    return found
 
 
 class _Model:
@@ -110,6 +123,8 @@ class _Model:
         variants: Sequence[int],
         whitener: Whitener,
         chosen: Mask,
+        *,
+        exact: bool,
     ) -> None:
         self.regression, self.whitener, self.chosen = regression, whitener, chosen
         self.rows: Rows = regression.rows
@@ -120,7 +135,9 @@ class _Model:
         for variant in variants:
             column = self.rows.layout[variant]
             width = column.place.stop - column.place.start
-            unknown, start = _unknown(problems, column, linear[taken : taken + width], sum(len(p) for p in parts))
+            unknown, start = _unknown(
+                problems, column, linear[taken : taken + width], sum(len(p) for p in parts), exact
+            )
             self.unknowns.append(unknown)
             parts.append(start)
             taken += width
@@ -137,10 +154,6 @@ class _Model:
             model = model + self.rows.stack(unknown.series(values[unknown.place], values[: self.size]))
         white = self.whitener.apply(self.rows, self.rows.target - model)[self.chosen]
         return np.append(white, self.regression.prior_residual(values[: self.size]))
-
-    def cost(self, values: Array) -> float:
-        residual = self.residual(values)
-        return float(residual @ residual)
 
     def jacobian(self, values: Array) -> Array:
         """Derivative of the model of the same rows, (n + prior, all values)."""
@@ -198,12 +211,14 @@ class _Model:
         return np.asarray(robust * np.outer(lift, lift) / np.outer(scale, scale))
 
 
-def _unknown(problems: Sequence[Problem], column: Column, coefficients: Array, first: int) -> tuple[_Unknown, Array]:
+def _unknown(
+    problems: Sequence[Problem], column: Column, coefficients: Array, first: int, by_form: bool
+) -> tuple[_Unknown, Array]:
     candidates = [problem.candidates[column.candidate] for problem in problems]
     variant = candidates[0].variants[column.variant]
     finish = variant.start or _same
     columns = tuple(part for candidate in candidates for part in candidate.variants[column.variant].columns)
-    if candidates[0].contribution is None:
+    if candidates[0].contribution is None or not by_form:
         place = slice(first, first + len(coefficients))
         return _Unknown(candidates[0].key, place, None, columns, finish), coefficients
 

@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 from ident.gap.axis.motion import AxisMotion, derivative
 from ident.gap.problem import Candidate, Variant
@@ -23,6 +24,8 @@ from ident.vehicle.effects import EffectName, EffectParameter
 Array = NDArray[np.float64]
 Filter = Callable[[Array], Array]
 
+LED_BACK: Final = 1000
+"""Samples at least over which a series is led back to its start before its spectrum is turned."""
 STRIBECK_SPEEDS: Final = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Tried first, over the 95th percentile of the speed."""
 BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
@@ -91,10 +94,11 @@ def axis_candidates(axis: AxisModel) -> list[Candidate]:
 
 
 def delayed(series: Array, delay: float, sample_time: float) -> Array:
-    """A series (N,) as it was `delay` seconds before, by its spectrum; the ends are mirrored."""
-    mirrored = np.concatenate([series, series[::-1]])
-    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(len(mirrored), sample_time) * delay)
-    return np.asarray(np.fft.irfft(np.fft.rfft(mirrored) * turn, len(mirrored))[: len(series)])
+    """A series (N,) as it was `delay` seconds before, by its spectrum; its end is led back to its start."""
+    length = fft.next_fast_len(len(series) + LED_BACK, real=True)
+    closed = np.pad(series, (0, length - len(series)), mode="linear_ramp", end_values=series[0])
+    turn = np.exp(-2j * np.pi * fft.rfftfreq(length, sample_time) * delay)
+    return np.asarray(fft.irfft(fft.rfft(closed) * turn, length)[: len(series)])
 
 
 def _linear(
