@@ -133,34 +133,41 @@ static int may_set(const qo_instance *me, const qo_variable *variable)
     return 0;
 }
 
-/* The mode k of (9) follows what is set before the simulation; later it changes at events only. */
-static qo_status settle(qo_instance *me)
+/* Whether the model can be as it is now; `last` was set last. The mode k of (9) follows what is set before the
+ * simulation; later it changes at events only. */
+static qo_answer settle(qo_instance *me, const qo_variable *last)
 {
     int changed;
-    qo_status status = qo_check(&me->now.model);
-    if (status == QO_OK && me->now.mode == QO_INITIALIZATION) {
-        status = qo_update_discrete(&me->now.model, &changed);
+    const qo_answer answer = qo_pass(me, qo_check(&me->now.model));
+    if (answer == QO_ANSWER_OK && me->now.mode == QO_INITIALIZATION &&
+        qo_update_discrete(&me->now.model, &changed) != QO_OK) {
+        return qo_tell(me, QO_ANSWER_ERROR, "%s cannot be %g: %s", last->name, *place(&me->now, last),
+                       me->now.model.message);
     }
-    return status;
+    return answer;
 }
 
 qo_answer qo_set(qo_instance *me, const unsigned references[], size_t n, const double values[], size_t n_values)
 {
     const qo_model before = me->now.model;
+    const qo_variable *variable = NULL;
     qo_answer answer;
     size_t i;
     if (!fits(me, references, n, values, n_values)) {
         return QO_ANSWER_ERROR;
     }
+    if (n == 0) {
+        return QO_ANSWER_OK;
+    }
     for (i = 0; i < n; i++) {
-        const qo_variable *variable = qo_find(me, references[i]);
+        variable = qo_find(me, references[i]);
         if (variable == NULL || !may_set(me, variable)) {
             me->now.model = before;
             return QO_ANSWER_ERROR;
         }
         *place(&me->now, variable) = values[i];
     }
-    answer = qo_pass(me, settle(me));
+    answer = settle(me, variable);
     if (answer == QO_ANSWER_OK) {
         me->now.known = 0;
     } else {
