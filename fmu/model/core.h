@@ -28,7 +28,7 @@ typedef struct {
     double u[QO_NU];
     double p[QO_NP];
     double y[QO_NY];
-    double tolerance; /* of a step, relative, and absolute in units of each state's nominal value */
+    double tolerance; /* of a step, in units of the nominal values of the states */
     double step;      /* length that the next internal step tries [s] */
     int mode;         /* k of (9) */
     char message[QO_MESSAGE_SIZE];

@@ -21,6 +21,9 @@
 #define LONGEST_STEP 1e3
 #define SHORTEST_STEP 1e-15
 #define NEGLIGIBLE 1e-30
+/* Part of a state's size in the bound of its error. Small: the slip of a wheel is a small difference of large rates,
+   and an error of it beyond what a contact sticks in makes steps bounce between its two sides. */
+#define RELATIVE_PART 0.01
 
 static const double GAMMA = 0.5;
 static const double A[STAGES][STAGES] = {{0.0}, {0.0}, {2.0}, {2.0, 0.0, 1.0}};
@@ -121,7 +124,7 @@ static double error_ratio(const qo_model *model, const double *next, const doubl
     int index;
     for (index = 0; index < QO_NX; ++index) {
         double size = fmax(fabs(model->x[index]), fabs(next[index]));
-        double ratio = fabs(error[index]) / (model->tolerance * (qo_states[index].nominal + size));
+        double ratio = fabs(error[index]) / (model->tolerance * (qo_states[index].nominal + RELATIVE_PART * size));
         if (!(ratio <= largest)) {
             largest = ratio;
             *worst = index;

@@ -6,6 +6,7 @@ import ctypes
 import shutil
 import subprocess
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +22,19 @@ from ident.vehicle.parameters import Parameters
 
 Array = NDArray[np.float64]
 
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-shared")
+FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-shared")
 
 
 class CoreError(Exception):
     def __init__(self, status: int, message: str) -> None:
         super().__init__(message)
         self.status = status
+
+
+@dataclass(frozen=True)
+class Outcome:
+    status: int
+    message: str
 
 
 class Core:
@@ -110,6 +117,10 @@ class Instance:
 
     def step(self, h: float) -> None:
         self._call("qo_step", h)
+
+    def attempt(self, h: float) -> Outcome:
+        status = self.core.library.qo_step(ctypes.byref(self.raw), h)
+        return Outcome(status, self.raw.message.decode())
 
     def advance(self, h: float) -> float:
         taken = ctypes.c_double()
