@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
@@ -11,13 +11,19 @@ import typer
 
 from quasiomni import application
 
-__all__ = ["GROUPS", "app", "main"]
+__all__ = ["COMMANDS", "app", "main"]
 
-GROUPS: Final = ("can", "descriptions", "exam", "fmu", "gap", "identification", "safety", "serving")
-"""Modules of commands, each of which adds its own to `app`."""
-
-_ALONE: Final = frozenset({"can"})
-"""Groups whose commands begin with the module's own name: only it is loaded, not the mathematics of the others."""
+COMMANDS: Final[Mapping[str, Sequence[str]]] = {
+    "can": ["can"],
+    "descriptions": ["eds", "dbc", "conformance"],
+    "exam": ["exam"],
+    "fmu": ["fmu", "cosim"],
+    "gap": ["diagnose"],
+    "identification": ["demo", "campaign", "identify", "report"],
+    "safety": ["safety"],
+    "serving": ["emulate"],
+}
+"""Module -> the commands and groups of commands that it adds to `app`."""
 
 
 def main() -> None:
@@ -27,9 +33,13 @@ def main() -> None:
 
 
 def load_commands(words: Sequence[str]) -> None:
-    """Load the commands that a command line may need."""
-    for name in words[:1] if words and words[0] in _ALONE else GROUPS:
-        import_module(f"quasiomni.{name}")
+    """Load what a command line needs: the module of its command, or all where it names none.
+
+    On a vehicle's computer there is no emulator, and a command that looks after the bus waits for no mathematics.
+    """
+    asked = [module for module, commands in COMMANDS.items() if words and words[0] in commands]
+    for module in asked or COMMANDS:
+        import_module(f"quasiomni.{module}")
 
 
 if TYPE_CHECKING:
