@@ -141,10 +141,6 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
             name=item.name,
         )
 
-    def set(self, index: int, subindex: int, value: int) -> None:
-        """Change a value from inside the device: no access check, no reaction."""
-        self._data[index, subindex] = value
-
     def value(self, index: int, subindex: int = 0, default: int | None = None) -> int:
         """The value that an SDO read would give.
 

@@ -72,7 +72,7 @@ class Emergency:
         self._timers = timers
         self._send = send
         self._device: dict[int, ErrorRegister] = {}
-        self._communication: set[int] = set()
+        self._communication: dict[int, set[int]] = {}
         self._history: deque[int] = deque(maxlen=_HISTORY)
         self._waiting: deque[bytes] = deque(maxlen=_QUEUE)
         self._inhibited = False
@@ -107,7 +107,7 @@ class Emergency:
             register: bits of 1001h that it sets, beside the generic one.
             information: 16 bits for the upper half of 1003h and bytes 3 and 4 of the message.
         """
-        known = self._is_known(code)
+        known = code in self._device or code in self._communication
         self._device[code] = self._device.get(code, ErrorRegister.NONE) | register
         self._announce(known, code, information)
 
@@ -117,20 +117,23 @@ class Emergency:
         self._transmit(ErrorCode.NONE, 0)
 
     def report_communication(self, code: int, information: int = 0) -> None:
-        """Enter an error of the communication likewise."""
-        known = self._is_known(code)
-        self._communication.add(code)
+        """Enter an error of the communication likewise; every `information` (a node, a PDO) is an error of its own."""
+        sources = self._communication.setdefault(code, set())
+        known = code in self._device or information in sources
+        sources.add(information)
         self._announce(known, code, information)
 
-    def end_communication(self, code: int) -> None:
-        """An error of the communication is over; where the device still has it as its own, it stays."""
-        if code in self._communication:
-            self._communication.discard(code)
-            if code not in self._device:
-                self._transmit(ErrorCode.NONE, 0)
+    def end_communication(self, code: int, information: int | None = None) -> None:
+        """An error of the communication is over, for one source or for all; what the device has as its own stays."""
+        sources = self._communication.get(code, set())
+        if information is not None and sources - {information}:
+            sources.discard(information)
+        elif information is None or information in sources:
+            self._forget_communication(code)
 
-    def _is_known(self, code: int) -> bool:
-        return code in self._device or code in self._communication
+    def _forget_communication(self, code: int) -> None:
+        if self._communication.pop(code, None) is not None and code not in self._device:
+            self._transmit(ErrorCode.NONE, 0)
 
     def _announce(self, known: bool, code: int, information: int) -> None:
         if not known:

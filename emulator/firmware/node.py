@@ -78,7 +78,7 @@ class Node:
         objects = self.object_dictionary = Dictionary(eds, node_id)
         self.nmt = NmtSlave(node_id, self._initialise, self._send_boot_up, self._nmt_changed)
         self.emergency = Emergency(objects, timers, node_id, self._send_emergency)
-        self.sync = SyncService(objects, timers, bus.listen_to_sync, self._produce_sync)
+        self.sync = SyncService(objects, timers, bus.listen_to_sync, bus.produce_sync)
         self._sdo = SdoServer(objects, timers, self._send_sdo)
         self._storage = ParameterStorage(objects, memory, node_id, lambda: self.nmt.state is not NmtState.OPERATIONAL)
         self._producer = HeartbeatProducer(objects, timers, self._send_heartbeat)
@@ -188,9 +188,6 @@ class Node:
         target = _ERROR_BEHAVIOUR[self.object_dictionary.value(0x1029, 1, default=0)]
         if target is not None and self.nmt.state is NmtState.OPERATIONAL:
             self.nmt.enter(target)
-
-    def _produce_sync(self, can_id: int, data: bytes) -> None:
-        self.network.produce_sync(can_id, data)
 
     def _send_boot_up(self) -> None:
         self.network.send(ERROR_CONTROL + self.node_id, b"\x00")

@@ -14,8 +14,8 @@ from emulator.firmware.rpdo import Rpdo, RpdoEvents
 from emulator.firmware.timers import Timers
 from emulator.firmware.tpdo import SAMPLED_FOR_REMOTE, Tpdo
 
-_MOST = 4
-"""PDOs of one direction that the pre-defined connection set knows (CiA 301, 7.3.5)."""
+_MOST = 512
+"""PDOs of one direction that an object dictionary has room for (CiA 301, table 35)."""
 
 
 class PdoReactions(Protocol):
@@ -58,11 +58,7 @@ class Pdos:
         self._node = node
         objects = node.object_dictionary
         self._rpdos = [self._make_rpdo(k) for k in range(_MOST) if 0x1400 + k in objects]
-        self._tpdos = [
-            Tpdo(objects, PdoIndices(0x1800 + k, 0x1A00 + k), self._changed)
-            for k in range(_MOST)
-            if 0x1800 + k in objects
-        ]
+        self._tpdos = [self._make_tpdo(k) for k in range(_MOST) if 0x1800 + k in objects]
         self._senders = [EventSender(tpdo, node.timers, node.network.send) for tpdo in self._tpdos]
         self._operational = False
         self._heard: list[tuple[int, Callable[[int, bytes], None]]] = []
@@ -89,9 +85,6 @@ class Pdos:
             pdo.stale = True
         for rpdo in self._rpdos:
             rpdo.stop()
-        self._wire()
-
-    def _changed(self) -> None:
         self._wire()
 
     def _wire(self) -> None:
@@ -122,6 +115,9 @@ class Pdos:
     def _make_answer(self, tpdo: Tpdo) -> Callable[[], None]:
         return lambda: self._node.network.send(tpdo.can_id, tpdo.remote_data())
 
+    def _make_tpdo(self, k: int) -> Tpdo:
+        return Tpdo(self._node.object_dictionary, PdoIndices(0x1800 + k, 0x1A00 + k), self._wire)
+
     def _make_rpdo(self, k: int) -> Rpdo:
         emergency = self._node.emergency
 
@@ -129,19 +125,19 @@ class Pdos:
             emergency.report_communication(ErrorCode.PDO_TOO_LONG if too_long else ErrorCode.PDO_LENGTH, k + 1)
 
         def right_length() -> None:
-            emergency.end_communication(ErrorCode.PDO_TOO_LONG)
-            emergency.end_communication(ErrorCode.PDO_LENGTH)
+            emergency.end_communication(ErrorCode.PDO_TOO_LONG, k + 1)
+            emergency.end_communication(ErrorCode.PDO_LENGTH, k + 1)
 
         def missing() -> None:
             emergency.report_communication(ErrorCode.RPDO_TIMEOUT, k + 1)
             self._node.application.rpdo_missing()
 
         events = RpdoEvents(
-            changed=self._changed,
+            changed=self._wire,
             applied=lambda: self._node.application.rpdo_applied(),
             wrong_length=wrong_length,
             right_length=right_length,
             missing=missing,
-            back=lambda: emergency.end_communication(ErrorCode.RPDO_TIMEOUT),
+            back=lambda: emergency.end_communication(ErrorCode.RPDO_TIMEOUT, k + 1),
         )
         return Rpdo(self._node.object_dictionary, PdoIndices(0x1400 + k, 0x1600 + k), self._node.timers, events)

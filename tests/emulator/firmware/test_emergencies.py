@@ -23,6 +23,17 @@ def test_an_error_is_sent_once_while_it_lasts_and_again_when_it_comes_back(wire)
     assert messages(wire.send(0x201, SHORT)) == [(0x8210, 0x11, 1)]
 
 
+def test_an_error_lasts_until_its_last_source_is_gone(wire) -> None:
+    wire.write(1, 0x1401, 1, struct.pack("<I", 0x301))
+    wire.nmt(0x01, 1)
+    assert messages(wire.send(0x201, SHORT)) == [(0x8210, 0x11, 1)]
+    assert messages(wire.send(0x301, b"")) == [(0x8210, 0x11, 2)]
+    assert messages(wire.send(0x201, RIGHT)) == []
+    assert wire.read(1, 0x1001) == 0x11
+    assert (0, 0, 0) in messages(wire.send(0x301, RIGHT[: len(RIGHT) // 2]))
+    assert wire.read(1, 0x1001) == 0
+
+
 def test_the_history_has_the_newest_error_first_and_holds_eight(wire) -> None:
     wire.nmt(0x01, 1)
     codes = []
