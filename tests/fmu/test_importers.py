@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -118,6 +120,16 @@ def run_together(made: list[Any], torques: list[float]) -> list[list[float]]:
     return results
 
 
+def test_instances_in_threads_do_what_they_do_one_after_the_other(torque_fmu: Path) -> None:
+    """ctypes lets go of the interpreter's lock, so the steps really overlap."""
+    torques = [0.2 * count for count in range(8)]
+    expected = run_together(instances(torque_fmu, 8), torques)
+    made = instances(torque_fmu, 8)
+    with ThreadPoolExecutor(max_workers=8) as pool:
+        found = list(pool.map(lambda pair: run_together([pair[0]], [pair[1]])[0], zip(made, torques, strict=True)))
+    assert found == expected
+
+
 @pytest.mark.parametrize("serialized", [False, True])
 def test_a_state_saved_and_restored_in_mid_run_continues_bit_by_bit(torque_fmu: Path, serialized: bool) -> None:
     instance, other = instances(torque_fmu, 2)
@@ -214,3 +226,19 @@ def test_fmutool_finds_nothing_to_complain_about(variant: Path) -> None:
     text = done.stdout + done.stderr
     assert done.returncode == 0, text
     assert not [line for line in text.splitlines() if line.startswith(("ERROR", "WARNING"))], text
+
+
+@pytest.mark.slow
+def test_fmutool_builds_the_sources_into_the_same_model(torque_fmu: Path, tmp_path: Path) -> None:
+    """Binaries taken out, sources compiled by somebody else with the system's compiler."""
+    bare, built = tmp_path / "bare.fmu", tmp_path / "built.fmu"
+    with zipfile.ZipFile(torque_fmu) as old, zipfile.ZipFile(bare, "w") as new:
+        for name in old.namelist():
+            if not name.startswith("binaries/"):
+                new.writestr(name, old.read(name))
+    command = [Path(sys.executable).with_name("fmutool"), "-input", bare, "-compile-sources", "-output", built]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    theirs, ours = drive(built), drive(torque_fmu)
+    for name in WATCHED:
+        np.testing.assert_allclose(theirs[name], ours[name], rtol=1e-9, atol=1e-12, err_msg=name)

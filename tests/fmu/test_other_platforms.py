@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import subprocess
 import sys
 import zipfile
@@ -37,12 +38,12 @@ def unpacked(source: ModelSource, tmp_path_factory: pytest.TempPathFactory) -> P
     return folder
 
 
-def compile_driver(unpacked: Path, target: str, name: str, extra: Sequence[str] = ()) -> Path:
-    """The driver with the flags that the libraries are built with, static."""
+def compile_driver(unpacked: Path, target: str, name: str, *, loads: bool = False, flags: Sequence[str] = ()) -> Path:
+    """The driver with the flags that the libraries are built with; with the model in it, or to load a library."""
     output, sources = unpacked / name, unpacked / "sources"
-    units = [path for path in sorted(sources.glob("*.c")) if not extra or path.name == "variables.c"]
-    flags = [flag for flag in FLAGS if flag not in ("-shared", "-fvisibility=hidden")]
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *flags, "-I", HEADERS, "-I", sources]
+    units = [path for path in sorted(sources.glob("*.c")) if not loads or path.name == "variables.c"]
+    ours = [flag for flag in (*FLAGS, *flags) if flag not in ("-shared", "-fvisibility=hidden")]
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *ours, "-I", HEADERS, "-I", sources]
     subprocess.run([*command, "-o", output, *units, DRIVER, "-lm"], check=True, capture_output=True)
     return output
 
@@ -57,7 +58,7 @@ def trajectory(command: Sequence[str | Path], environment: dict[str, str] | None
 @pytest.fixture(scope="module")
 def ours(unpacked: Path) -> NDArray[np.float64]:
     """On x86-64 Linux."""
-    found = trajectory([compile_driver(unpacked, "x86_64-linux-musl", "ours")])
+    found = trajectory([compile_driver(unpacked, "x86_64-linux-gnu.2.17", "ours")])
     assert found.shape == (15, 7)
     assert np.all(np.ptp(found, axis=0) > 1e-3)
     return found
@@ -72,10 +73,18 @@ def test_the_windows_library_computes_the_same_under_wine(
     unpacked: Path, ours: NDArray[np.float64], need: Callable[[str], str], tmp_path: Path
 ) -> None:
     wine = need("wine")
-    driver = compile_driver(unpacked, "x86_64-windows-gnu", "driver.exe", extra=["library"])
+    driver = compile_driver(unpacked, "x86_64-windows-gnu", "driver.exe", loads=True)
     library = unpacked / "binaries" / "win64" / "quasiomni.dll"
     environment = os.environ | {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all", "DISPLAY": ""}
     assert_same(trajectory([wine, driver, f"Z:{library}"], environment), ours)
+
+
+def test_thirty_two_bits_compute_the_same(unpacked: Path, ours: NDArray[np.float64]) -> None:
+    """Linux on x86-64 runs programs for x86; in SSE registers, not in 80 bits."""
+    if platform.machine() != "x86_64":
+        pytest.skip("runs on x86-64 alone")
+    (entry,) = parse_platforms("x86-linux")
+    assert_same(trajectory([compile_driver(unpacked, "x86-linux-musl", "small", flags=entry.flags)]), ours)
 
 
 def test_arm_computes_the_same_under_qemu(
