@@ -19,8 +19,22 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode="markdown",
 )
+
+
+@app.callback()
+def _commands() -> None:
+    # Without a callback typer takes an application of one command for that command, and its name for an argument.
+    pass
+
+
 console = Console()
 errors = Console(stderr=True)
+
+
+@app.callback()
+def _always_a_group() -> None:
+    # Without this, an application of which one command has been loaded is that command, and does not know its name.
+    pass
 
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> None:
