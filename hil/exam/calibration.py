@@ -9,7 +9,7 @@ from typing import Final
 from hil.exam.driving import drive
 from hil.exam.noise_units import Noise, SizeInNoise, noise_of, size_in_noise
 from hil.exam.plans import plan_exam
-from hil.exam.probes import DRIFTS, KINEMATIC, SHARES, SIGNED, Probe, all_probes
+from hil.exam.probes import CURVED, DRIFTS, KINEMATIC, SHARE, SIGNED, Probe, all_probes
 from hil.exam.quiet import drive_quietly
 from hil.exam.sealing import effect_of
 from hil.exam.sizes import EffectSize
@@ -18,6 +18,7 @@ from ident.campaign.plan import Plan
 from ident.errors import UserError
 from ident.records.record import Record
 from ident.vehicle.description import load_vehicle
+from ident.vehicle.effects import EffectName
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import Parameters
 
@@ -79,7 +80,7 @@ def _bench(prototype: str, cycle: float) -> Bench:
 def _measure(probe: Probe, bench: Bench) -> list[tuple[float, SizeInNoise]]:
     """Size of the probe at some shares of its largest; those that the vehicle cannot drive with are left out."""
     found = []
-    for share in SHARES:
+    for share in CURVED.get(EffectName(probe.name), (SHARE,)) if probe.known else (SHARE,):
         size = _of_share(probe, share)
         try:
             record = drive_quietly(bench.plan, bench.prototype, [effect_of(probe.injected(size))])

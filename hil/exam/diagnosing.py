@@ -10,7 +10,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any, Final
 
 from hil.exam.folder import RECORDS, ExamFolder, read_exam, write_atomically
@@ -24,6 +24,10 @@ from ident.vehicle.parameters import read_parameters
 
 FORBIDDEN: Final = ("emulator", "pybullet")
 """Packages that would know the answers."""
+
+_FAILED: Final[Mapping[str, Any]] = MappingProxyType(
+    {"verdict": "failed", "effects": [], "invisible": [], "gap": {"closed": None}}
+)
 
 Progress = Callable[[int, int], None]
 
@@ -108,14 +112,14 @@ def diagnose_case(
             file.write_text(text, encoding="utf-8")
         described, parameters = load_vehicle(files[0]), read_parameters(files[1])
     started = time.process_time()
-    answer = diagnose_vehicle(
-        [record_from_bytes(fit, "fit")],
-        [record_from_bytes(confirm, "confirm")],
-        described,
-        parameters,
-        effects=[name for name in EffectName if name != removed],
-    )
-    content: dict[str, Any] = answer.diagnosis.as_json()
+    records = [record_from_bytes(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
+    effects = [name for name in EffectName if name != removed]
+    try:
+        found = diagnose_vehicle(records[:1], records[1:], described, parameters, effects=effects)
+        content = found.diagnosis.as_json()
+    except (ArithmeticError, ValueError, UserError) as error:
+        # One case that fails must not end an exam of hours; it counts as a wrong answer.
+        content = {**_FAILED, "error": repr(error)}
     return identifier, json.dumps({**content, "seconds": time.process_time() - started}).encode()
 
 

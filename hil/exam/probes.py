@@ -81,8 +81,13 @@ UNKNOWN_PRACTICAL: Final[Mapping[UnlibrariedName, float]] = MappingProxyType(
 )
 """The same of effects that have no candidate."""
 
-SHARES: Final = (0.25, 0.5, 1.0)
-"""Of the largest size, at which an effect is driven."""
+SHARE: Final = 0.6
+"""Of the largest size, at which an effect is driven that is proportional to its size, or nearly so."""
+
+CURVED: Final[Mapping[EffectName, tuple[float, ...]]] = MappingProxyType(
+    {EffectName.SLIP: (0.4, 0.6, 1.0), EffectName.BACKLASH: (0.2, 0.6)}
+)
+"""Shares of the effects that are not: a threshold, a play that is smaller than a stroke."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -33,16 +34,18 @@ from hil.exam.record_bytes import record_bytes
 from hil.exam.sizes import SizeTable
 from hil.exam.workers import run_all
 from hil.network import load_network
-from hil.truth import truth_of
 from ident.errors import UserError
 from ident.vehicle.description import find_data_file, load_vehicle
 from ident.vehicle.effects import EffectName, make_effect
-from ident.vehicle.parameters import PARAMETER_UNITS, Parameters
 
 Progress = Callable[[int, int], None]
 """Called with cases done and cases in all."""
 
-_EPOCH = (0, 0)
+MODEL_FILE: Final = Path(__file__).parent / "data" / "model.toml"
+"""The model that is judged, as identified from a campaign of the prototype without effects: `quasiomni campaign
+--seed 400001 --periods 8 --skip lane_change`, then `quasiomni identify`."""
+
+_EPOCH: Final = (0, 0)
 
 
 @dataclass(frozen=True)
@@ -134,18 +137,9 @@ def _draw(folder: ExamFolder, order: SealingOrder, table: SizeTable) -> None:
     answer = sealed(cases, secrets.token_bytes(16))
     write_atomically(folder.answer, answer)
     shutil.copyfile(find_data_file("ident.vehicle", order.prototype), folder.vehicle)
-    write_atomically(folder.model, _model_text(truth_of(order.prototype)).encode())
+    shutil.copyfile(MODEL_FILE, folder.model)
     identifiers = tuple(case.identifier for case in cases)
     write_exam(folder, Exam(order.prototype, cycle, plans_text(plans), identifiers, answer_hash(answer)))
-
-
-def _model_text(truth: Parameters) -> str:
-    """The vehicle without effects, as a model file."""
-    lines = ['schema = "quasiomni.parameters/1"']
-    for name, unit in PARAMETER_UNITS.items():
-        lines += ["", f"[parameters.{name}]", f"value = {truth[name]:.9g}", f'unit = "{unit}"']
-        lines += ["std = 0.0", 'source = "the vehicle without effects"']
-    return "\n".join(lines) + "\n"
 
 
 def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
