@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from emulator.firmware.flywheels import Flywheels
 from emulator.ground import Ground
@@ -15,6 +17,7 @@ from hil.faults import FaultKind
 from hil.faults.fault import SPECIFICATIONS, FaultError, Target
 from hil.master import Master
 from hil.network import load_network
+from ident.errors import BusError
 
 
 def test_a_node_without_supply_is_silent_and_boots_when_it_is_back(sight) -> None:
@@ -159,6 +162,35 @@ def test_ground_under_one_wheel_is_that_wheels_alone() -> None:
             master.exchange((1.0,) * 4)
         rates = vehicle.ground_truth().wheel_rates
     assert rates[3] > 2 * max(rates[:3])
+
+
+@given(instant=st.floats(0.0, 0.02), lost=st.integers(0, 11))
+@settings(max_examples=12, deadline=None)
+def test_at_whatever_moment_the_master_dies_every_drive_lets_go(instant: float, lost: int) -> None:
+    """In any cycle, and within a cycle after any of its frames: some drives may have a command that others lack."""
+    wheels, network = Flywheels(), load_network()
+    with LockstepBench(wheels, seed=lost) as bench:
+        seen: set[int] = set()
+        bench.listen(lambda frame: seen.add(frame.arbitration_id))
+        master = Master(bench.bus, bench.clock, network)
+        master.boot()
+        master.enable()
+        for _ in range(20):
+            master.exchange((0.3,) * 4)
+        bench.faults.add(f"drop@0x201-0x204:count={max(lost, 1)}")
+        bench.faults.add(f"death:from={instant}")
+        with pytest.raises(BusError):
+            drive_on(master)
+        seen.clear()
+        bench.clock.wait_until(bench.clock.now() + 3.0)
+        assert not any(drive.enabled for drive in wheels.drives)
+        assert {drive.torque for drive in wheels.drives} == {0.0}
+    assert {0x080 + node.node_id for node in network.drives} <= seen
+
+
+def drive_on(master: Master) -> None:
+    for _ in range(200):
+        master.exchange((0.3,) * 4)
 
 
 PLACES = {
