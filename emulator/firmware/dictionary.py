@@ -63,6 +63,10 @@ STRUCT_CODES = {
     DatatypeEnum.UNSIGNED16: "H",
     DatatypeEnum.INTEGER32: "i",
     DatatypeEnum.UNSIGNED32: "I",
+    DatatypeEnum.INTEGER64: "q",
+    DatatypeEnum.UNSIGNED64: "Q",
+    DatatypeEnum.REAL32: "f",
+    DatatypeEnum.REAL64: "d",
 }
 """Data types that a PDO can carry -> `struct` code."""
 
@@ -105,6 +109,7 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
 
     Raises:
         OSError: the file cannot be read.
+        DataFileError: an object has a data type, access type or limits that cannot be emulated.
     """
 
     def __init__(self, eds: Path, node_id: int) -> None:
@@ -132,14 +137,21 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
         if item.pdo_mappable:
             self.mappable.add((item.index, item.subindex))
         default = item.default
-        return Variable(
-            DatatypeEnum(item.data_type),
-            _ACCESS.get(item.access_type, item.access_type),
-            value=default.encode() if isinstance(default, str) else default,
-            minimum=item.min,
-            maximum=item.max,
-            name=item.name,
-        )
+        try:
+            return Variable(
+                DatatypeEnum(item.data_type),
+                _ACCESS.get(item.access_type, item.access_type),
+                value=default.encode() if isinstance(default, str) else default,
+                minimum=item.min,
+                maximum=item.max,
+                name=item.name,
+            )
+        except ValueError as error:
+            raise DataFileError(
+                f"{self._source}: object {item.index:04X}h:{item.subindex} cannot be emulated, "
+                f"data type {item.data_type:04X}h: {error}.",
+                "Correct data type, access type and limits in a copy of the EDS, or take the object out.",
+            ) from error
 
     def value(self, index: int, subindex: int = 0, default: int | None = None) -> int:
         """The value that an SDO read would give.

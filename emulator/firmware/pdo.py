@@ -166,6 +166,7 @@ class PdoParameters(ABC):
         except KeyError as error:
             raise AbortError(AbortCode.OBJECT_MISSING) from error
         allowed = variable.writable if self.receives else variable.readable
-        if (index, subindex) not in self._dictionary.mappable or not allowed:
+        known = variable.datatype in STRUCT_CODES
+        if (index, subindex) not in self._dictionary.mappable or not allowed or not known:
             raise AbortError(AbortCode.NOT_MAPPABLE)
         return STRUCT_CODES[variable.datatype]

@@ -73,6 +73,68 @@ def test_an_object_that_the_device_needs_is_named(folder: Path, name: str, index
         quick_stop(folder)
 
 
+def retype(eds: Path, index: int, data_type: int, mappable: bool = False) -> None:
+    """Give an object another data type."""
+    head, section, rest = re.split(
+        rf"(^\[{index:04X}\]\n(?:.+\n)*)", eds.read_text(encoding="utf-8"), flags=re.MULTILINE
+    )
+    section = re.sub(r"DataType=.*", f"DataType=0x{data_type:04X}", section)
+    section = re.sub(r"PDOMapping=.*", f"PDOMapping={int(mappable)}", section)
+    eds.write_text(head + section + rest, encoding="utf-8")
+
+
+TYPES = {"REAL32": (0x08, 32, struct.pack("<f", 1.5)), "UNSIGNED64": (0x1B, 64, struct.pack("<Q", 2**63 + 1))}
+
+
+@pytest.mark.parametrize(("data_type", "bits", "value"), TYPES.values(), ids=TYPES)
+def test_wider_types_are_written_and_mapped(folder: Path, data_type: int, bits: int, value: bytes) -> None:
+    retype(folder / "encoder.eds", 0x2000, data_type, mappable=True)
+    sent: list[tuple[int, bytes]] = []
+    nodes = devices(folder, sent)
+    nodes.receive(0x605, struct.pack("<BHBI", 0x21, 0x2000, 0, len(value)))
+    padded = value + bytes(14 - len(value))
+    nodes.receive(0x605, bytes((0x00 | (7 - min(7, len(value))) << 1 | (len(value) <= 7),)) + padded[:7])
+    if len(value) > 7:
+        nodes.receive(0x605, bytes((0x10 | (14 - len(value)) << 1 | 1,)) + padded[7:])
+    for index, subindex, size, number in (
+        (0x1800, 1, 4, 0xC0000185),
+        (0x1800, 2, 1, 1),
+        (0x1A00, 0, 1, 0),
+        (0x1A00, 1, 4, 0x20000000 | bits),
+        (0x1A00, 0, 1, 1),
+        (0x1800, 1, 4, 0x40000185),
+    ):
+        nodes.receive(0x605, struct.pack("<BHBI", 0x23 | (4 - size) << 2, index, subindex, number))
+        assert sent[-1][1][0] == 0x60, sent[-1][1].hex()
+    nodes.receive(0x000, b"\x01\x05")
+    sent.clear()
+    nodes.receive(0x080, b"")
+    assert sent == [(0x185, value)]
+
+
+def test_a_bit_is_not_mapped(folder: Path) -> None:
+    """Frames of these nodes are made of whole bytes (granularity 8 in the EDS)."""
+    retype(folder / "encoder.eds", 0x2000, 0x01, mappable=True)
+    sent: list[tuple[int, bytes]] = []
+    nodes = devices(folder, sent)
+    for frame in ("23001801850100c0", "2f001a0000000000", "23001a0101000020"):
+        nodes.receive(0x605, bytes.fromhex(frame))
+    assert sent[-1][1] == bytes.fromhex("80001a0141000406")
+
+
+def test_a_limit_that_the_type_does_not_reach_is_named(folder: Path) -> None:
+    path = folder / "encoder.eds"
+    path.write_text(path.read_text(encoding="utf-8").replace("[1019]\n", "[1019]\nHighLimit=999\n"), encoding="utf-8")
+    with pytest.raises(DataFileError, match=r"encoder\.eds.*1019h"):
+        devices(folder, [])
+
+
+def test_an_unknown_data_type_is_named(folder: Path) -> None:
+    retype(folder / "encoder.eds", 0x2000, 0x0C)
+    with pytest.raises(DataFileError, match=r"encoder\.eds.*2000h.*000Ch"):
+        devices(folder, [])
+
+
 def quick_stop(folder: Path) -> None:
     """As much of a drive's life as it takes to need its option codes."""
     nodes = devices(folder, [])
