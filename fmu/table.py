@@ -273,11 +273,11 @@ def _output(name: str, text: str, unit: str) -> Variable:
 
 
 _GENERALIZED_TORQUES: Final = {
-    "Q_alpha_l": ("Generalized torque of the motors on the left steering, mode 1", "Nm"),
-    "Q_alpha_r": ("Generalized torque of the motors on the right steering, mode 1", "Nm"),
-    "Q_x": ("Generalized force of the motors on steered motion, mode 2", "N"),
-    "Q_y": ("Generalized force of the motors on lateral motion, mode 3", "N"),
-    "Q_gamma": ("Generalized torque of the motors on rotation, mode 4", "Nm"),
+    "Q_alpha_l": ("Torque of the motors on the left steering, through wheels that roll", "Nm"),
+    "Q_alpha_r": ("Torque of the motors on the right steering, through wheels that roll", "Nm"),
+    "Q_x": ("Force of the motors on the chassis along x, through wheels that roll", "N"),
+    "Q_y": ("Force of the motors on the chassis along y, through wheels that roll", "N"),
+    "Q_gamma": ("Torque of the motors on the chassis about z, through wheels that roll", "Nm"),
 }
 
 _PER_WHEEL: Final = {
