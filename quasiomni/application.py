@@ -19,14 +19,6 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode="markdown",
 )
-
-
-@app.callback()
-def _commands() -> None:
-    # Without a callback typer takes an application of one command for that command, and its name for an argument.
-    pass
-
-
 console = Console()
 errors = Console(stderr=True)
 
