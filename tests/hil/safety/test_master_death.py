@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from hil.network import DEFAULT_NETWORK
-from hil.safety import MasterDeathReport, StopSettings
+from hil.buses import open_bus
+from hil.clock import WallClock
+from hil.network import DEFAULT_NETWORK, Network
+from hil.safety import DeathOfMaster, MasterDeathReport, StopSettings, evaluate
 from hil.safety.emulated import let_master_die
 from hil.safety.trial import TrialError
+from ident.vehicle.description import load_vehicle
 from quasiomni import app
 
 FULL_SPEED = 1.5
@@ -107,3 +113,31 @@ def test_the_command_prints_the_numbers_and_writes_them(tmp_path: Path) -> None:
     written = json.loads((tmp_path / "report.json").read_text())
     assert written["passed"]
     assert f"{written['stopping_distance']['measured']:.3f}" in result.output
+
+
+@pytest.mark.slow
+def test_the_trial_runs_on_any_bus_in_real_time(tmp_path: Path, rewritten_network: Callable[..., Network]) -> None:
+    """The emulator in a process of its own: nothing but frames, and the wall clock, between it and the trial."""
+    # The machine that runs this may be busy with other things.
+    network = rewritten_network(
+        ("sample_timeout = { value = 0.1,", "sample_timeout = { value = 5.0,"),
+        ("heartbeat_timeout = { value = 0.25,", "heartbeat_timeout = { value = 1.5,"),
+    )
+    name, settings = f"unix:{tmp_path}/can0", StopSettings(1.0, abort=3, quick_stop=2, deceleration=1.0)
+    command = [sys.executable, "-m", "quasiomni", "emulate", "--bus", name]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            while "is up on" not in process.stdout.readline():
+                assert process.poll() is None
+            radius = load_vehicle("prototype").geometry.wheel_radius
+            with open_bus(name) as bus:
+                record = DeathOfMaster(bus, WallClock(), network, radius).run(settings)
+        finally:
+            process.terminate()
+    report = evaluate(record, settings, network)
+    assert report.at_rest
+    assert set(report.states.values()) == {"switch on disabled"}
+    assert report.detection.measured == pytest.approx(1.5, abs=0.1)
+    assert report.stopping_distance.measured == pytest.approx(report.speed**2 / 2.0, rel=0.1)
+    assert report.stopping_distance.true is None
