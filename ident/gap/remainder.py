@@ -65,7 +65,8 @@ def held_out_gap(rows: Rows, floors: Floors, before: Series, after: Series) -> G
         samples = kept.samples.ravel()
         floor = floors.values[index]
         for place, model in enumerate((before[index], after[index])):
-            sums[place] += float(np.sum(((block.target - model)[samples] / floor) ** 2))
+            power = float(np.sum(((block.target - model)[samples] / floor) ** 2))
+            sums[place] += max(power, len(samples)) if block.tolerance > 0 else power
         sums[2] += len(samples)
         count += len(samples)
     mean = np.sqrt(sums / count) if count else np.zeros(3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -15,7 +15,7 @@ from ident.estimate.equations import ROWS, RowsOfStep
 from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.gap.problem import Block, Candidate, Channel, Nominal, Problem, Variant
 from ident.gap.vehicle import rows
-from ident.gap.vehicle.library import DRIFTS, TermCause, placed_parameters, term_causes
+from ident.gap.vehicle.library import DRIFTS, SHAPES, TermCause, placed_parameters, term_causes
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
 from ident.gap.vehicle.transforms import Setting, TransformCause, transform_cause, transform_causes
@@ -88,6 +88,7 @@ class Context:
         parameters: p (11,) at which columns are taken.
         formulas: the equations, effects that are given in them.
         given: effects with a memory that are part of the model too.
+        kept: rows of every source for the parameters asked for last.
     """
 
     geometry: Geometry
@@ -95,6 +96,7 @@ class Context:
     parameters: Array
     formulas: rows.Formulas
     given: tuple[tuple[TransformCause, float], ...] = ()
+    kept: dict[int, tuple[bytes, Array]] = field(default_factory=dict)
 
     @property
     def constants(self) -> tuple[Array, Array, Array]:
@@ -107,6 +109,16 @@ class Context:
         for cause, size in self.given:
             inputs = cause.transform(inputs, cause.place, size, setting)
         return inputs
+
+    def plain(self, source: Source) -> Array:
+        """The rows of a source without any further effect (M, rows, 1); the last ones are kept."""
+        asked, kept = self.parameters.tobytes(), self.kept.get(id(source))
+        if kept is not None and kept[0] == asked:
+            return kept[1]
+        exact = self.formulas.exact(source.channel, source.spec)
+        rows_now = exact(self.inputs(source), *self.constants, np.zeros(0))
+        self.kept[id(source)] = (asked, rows_now)
+        return rows_now
 
     def filtered(self, values: Array, source: Source) -> Array:
         """Columns (M, ...) through the filter, thinned to the rows of the source's blocks."""
@@ -294,11 +306,11 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
             period=source.period[:: source.factor],
             regions=regions_of(position, rate, acceleration, load),
             features=features_of(position, rate, acceleration, load),
-            tolerance=_creep(source, context.geometry) if source.channel is Channel.KINEMATIC else 0.0,
+            tolerance=creep(source, context.geometry) if source.channel is Channel.KINEMATIC else 0.0,
         )
 
 
-def _creep(source: Source, geometry: Geometry) -> float:
+def creep(source: Source, geometry: Geometry) -> float:
     """Speed of the contacts (rms) that creep may take from rolling [m/s]."""
     speed = geometry.wheel_radius * source.inputs[:, rows.SLICES["beta_rate"]]
     return CREEP * float(np.sqrt(np.mean(speed[source.moving[0]] ** 2)))
@@ -325,14 +337,25 @@ def _candidate(
             Variant(_picked([next(columns) for _ in variant.units], tables), variant.start)
             for variant in cause.variants
         )
+    linear = isinstance(cause, TermCause) and SHAPES[cause.name].is_linear
     return Candidate(
         effect=cause.name,
         where=cause.where,
         parameters=placed_parameters(cause.name, cause.where),
         variants=variants,
-        contribution=_contribution(cause, sources, context),
+        contribution=None if linear else _contribution(cause, _acting(variants, sources), sources, context),
         drift=cause.name in DRIFTS,
     )
+
+
+def _acting(variants: Sequence[Variant], sources: Sequence[Source]) -> list[bool]:
+    """Whether any column of a cause acts in any row of each source."""
+    acting, end = [], 0
+    for source in sources:
+        blocks = slice(end, end + len(source.coordinates))
+        acting.append(any(column is not None for variant in variants for column in variant.columns[blocks]))
+        end = blocks.stop
+    return acting
 
 
 def _picked(columns: list[int], tables: Sequence[Array]) -> tuple[Array | None, ...]:
@@ -342,32 +365,34 @@ def _picked(columns: list[int], tables: Sequence[Array]) -> tuple[Array | None, 
 
 
 def _probed(cause: TransformCause, sources: Sequence[Source], context: Context) -> tuple[Array | None, ...]:
-    changes = _changes(cause, sources, context, np.array([cause.probe]), context.parameters)
+    probe, everywhere = np.array([cause.probe]), [True] * len(sources)
+    changes = _contribution(cause, everywhere, sources, context)(probe, context.parameters)
     return tuple(None if change is None else change[:, None] / cause.probe for change in changes)
 
 
 def _contribution(
-    cause: Cause, sources: Sequence[Source], context: Context
+    cause: Cause, acting: Sequence[bool], sources: Sequence[Source], context: Context
 ) -> Callable[[Array, Array], Sequence[Array | None]]:
-    return lambda values, parameters: _changes(cause, sources, context, values, parameters)
+    """What the cause adds to every block, exactly, for numbers of its own and of the model."""
 
+    def contribution(values: Array, parameters: Array) -> list[Array | None]:
+        found: list[Array | None] = []
+        for source, acts in zip(sources, acting, strict=True):
+            if not acts:
+                found += [None] * len(source.coordinates)
+                continue
+            change = context.filtered(_change(cause, source, context, values, parameters), source)
+            found += [column if np.any(column) else None for column in change.T]
+        return found
 
-def _changes(
-    cause: Cause, sources: Sequence[Source], context: Context, values: Array, parameters: Array
-) -> list[Array | None]:
-    """What a cause of given numbers adds to every block, exactly."""
-    found: list[Array | None] = []
-    for source in sources:
-        change = context.filtered(_change(cause, source, context, values, parameters), source)
-        found += [column if np.any(column) else None for column in change.T]
-    return found
+    return contribution
 
 
 def _change(cause: Cause, source: Source, context: Context, values: Array, parameters: Array) -> Array:
     """The same for one source before the filter (M, rows)."""
     context = replace(context, parameters=parameters)
     inputs, plain = context.inputs(source), context.formulas.exact(source.channel, source.spec)
-    before = plain(inputs, *context.constants, np.zeros(0))
+    before = context.plain(source)
     if isinstance(cause, TermCause):
         exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)
         after = exact(inputs, *context.constants, values)

@@ -34,10 +34,15 @@ class Shape:
     angle: str | None = None
     tried: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
+    @property
+    def is_linear(self) -> bool:
+        """Whether the columns are all there is."""
+        return self.angle is None and not self.tried
+
 
 SHAPES: Final[Mapping[EffectName, Shape]] = MappingProxyType(
     {
-        EffectName.STRIBECK: Shape(("amplitude",), tried={"velocity": (0.1, 0.2, 0.3, 0.5, 0.8)}),
+        EffectName.STRIBECK: Shape(("amplitude",), tried={"velocity": (0.2, 0.3, 0.5, 0.8)}),
         EffectName.ASYMMETRIC_COULOMB: Shape(("imbalance",)),
         EffectName.ASYMMETRIC_VISCOUS: Shape(("imbalance",)),
         EffectName.QUADRATIC_DRAG: Shape(("coefficient",)),

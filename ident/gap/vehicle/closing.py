@@ -1,0 +1,150 @@
+"""How far the gap shrinks on records that took no part: the model with its effects, in all three channels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.estimate.equations import ROWS
+from ident.estimate.filters import Processing
+from ident.gap.diagnosis import Gap
+from ident.gap.judge import Findings
+from ident.gap.problem import Channel
+from ident.gap.vehicle.build import Source, creep, make_context, sources_of
+from ident.gap.vehicle.outcome import outcomes
+from ident.records.record import Record
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effects import EffectName, make_effect
+from ident.vehicle.extended import ExtendedModel
+from ident.vehicle.parameters import Parameters
+
+Array = NDArray[np.float64]
+
+_STEERING_ROWS: Final = ("alpha_l", "alpha_r")
+
+
+@dataclass(frozen=True)
+class Series:
+    """What a model leaves of one coordinate of one segment.
+
+    Attributes:
+        channel, step, coordinate: which.
+        folded: (P, N) by repeats of the excitation; P = 1 where nothing repeats.
+        least: floor that noise does not go below.
+    """
+
+    channel: Channel
+    step: str
+    coordinate: str
+    folded: Array
+    least: float = 0.0
+
+
+def extended_model(findings: Findings) -> ExtendedModel:
+    """The parameters refitted jointly with the effects that were found, and these effects."""
+    refit = findings.after
+    effects = []
+    for cause in findings.causes:
+        names = [entry.name for entry in cause.candidate.parameters]
+        values = dict(zip(names, cause.part.values.tolist(), strict=True))
+        std = dict(zip(names, cause.part.std.tolist(), strict=True))
+        effects.append(make_effect(EffectName(cause.candidate.effect), cause.candidate.where, values, std))
+    return ExtendedModel(Parameters(refit.baseline, refit.baseline_std), tuple(effects))
+
+
+def plain_model(findings: Findings) -> ExtendedModel:
+    """The model that is judged: as given, or refitted without any effect."""
+    nominal = findings.problem.nominal
+    if nominal is not None:
+        return ExtendedModel(Parameters(nominal.values, nominal.std))
+    return ExtendedModel(Parameters(findings.before.baseline, findings.before.baseline_std))
+
+
+def channel_gaps(
+    records: Sequence[Record], vehicle: VehicleDescription, before: ExtendedModel, after: ExtendedModel
+) -> Mapping[Channel, Gap]:
+    """Gap of two models on records, by channel, in units of the noise between repeats of each coordinate.
+
+    Args:
+        records: that neither model was fitted to; a lane change counts too.
+        vehicle: its geometry.
+        before, after: the models.
+
+    Raises:
+        RecordError: a record has no step that the model describes.
+    """
+    processing = Processing()
+    sources = [s for record in records for s in sources_of(record, vehicle.geometry, tuple(ROWS), processing)]
+    first, second = (list(_series(sources, vehicle, model, processing)) for model in (before, after))
+    floors = _floors(second)
+    return {channel: _gap(channel, first, second, floors) for channel in Channel}
+
+
+def _series(
+    sources: Sequence[Source], vehicle: VehicleDescription, model: ExtendedModel, processing: Processing
+) -> Iterable[Series]:
+    context = make_context(sources, vehicle, model.parameters, model.effects, processing)
+    for source in sources:
+        exact = context.formulas.exact(source.channel, source.spec)
+        residual = context.filtered(exact(context.inputs(source), *context.constants, np.zeros(0))[..., 0], source)
+        least = creep(source, vehicle.geometry) if source.channel is Channel.KINEMATIC else 0.0
+        for row, name in enumerate(source.coordinates):
+            rows = _folded(residual[:, row], source.moving[row][:: source.factor], source.period[:: source.factor])
+            yield Series(source.channel, source.step, name, rows, least)
+        for outcome in outcomes(source, model, vehicle.geometry):
+            rows = _folded_runs(outcome.differences, outcome.repeat, outcome.place)
+            yield Series(Channel.OUTCOME, outcome.step, outcome.coordinate, rows)
+
+
+def _folded(values: Array, moving: NDArray[np.bool_], period: NDArray[np.int64]) -> Array:
+    """Moving rows (P, N), those that move in every repeat."""
+    numbers = [number for number in np.unique(period) if number >= 0]
+    if len(numbers) < 2:
+        return values[moving][None]
+    length = min(int(np.sum(period == number)) for number in numbers)
+    kept = np.stack([moving[period == number][:length] for number in numbers]).all(axis=0)
+    return np.stack([values[period == number][:length][kept] for number in numbers])
+
+
+def _folded_runs(differences: Array, repeat: NDArray[np.int64], place: NDArray[np.int64]) -> Array:
+    numbers = [number for number in np.unique(repeat) if number >= 0]
+    if len(numbers) < 2:
+        return differences.reshape(1, -1)
+    shared = set.intersection(*(set(place[repeat == number].tolist()) for number in numbers))
+    return np.stack([differences[(repeat == number) & np.isin(place, list(shared))].ravel() for number in numbers])
+
+
+def _floors(series: Sequence[Series]) -> Mapping[tuple[Channel, str], float]:
+    """Rms of the noise by channel and coordinate, pooled over segments with repeats."""
+    pooled: dict[tuple[Channel, str], list[tuple[float, float]]] = {}
+    for one in series:
+        if len(one.folded) > 1 and one.folded.size:
+            entry = (float(one.folded.var(axis=0, ddof=1).mean()), one.least)
+            pooled.setdefault((one.channel, one.coordinate), []).append(entry)
+    floors = {
+        key: max(float(np.sqrt(np.mean([variance for variance, _ in entries]))), max(least for _, least in entries))
+        for key, entries in pooled.items()
+    }
+    for channel in Channel:
+        sides = [floors[channel, name] for name in _STEERING_ROWS if (channel, name) in floors]
+        if sides:
+            floors.setdefault((channel, "alpha_v"), float(np.hypot.reduce(sides)))
+    return floors
+
+
+def _gap(
+    channel: Channel, before: Sequence[Series], after: Sequence[Series], floors: Mapping[tuple[Channel, str], float]
+) -> Gap:
+    sums, count = np.zeros(2), 0
+    for first, second in zip(before, after, strict=True):
+        floor = floors.get((channel, first.coordinate), 0.0)
+        if first.channel is channel and floor > 0:
+            sums += [float(np.sum((one.folded / floor) ** 2)) for one in (first, second)]
+            count += first.folded.size
+    if not count:
+        return Gap(float("nan"), float("nan"), float("nan"))
+    return Gap(float(np.sqrt(sums[0] / count)), float(np.sqrt(sums[1] / count)), floor=1.0)

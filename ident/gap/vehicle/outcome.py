@@ -1,0 +1,90 @@
+"""The outcome channel: the model simulated forward with the recorded torques, set back to the recorded state often."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.gap.problem import Channel
+from ident.gap.vehicle.build import Source
+from ident.gap.vehicle.rows import SLICES
+from ident.vehicle import kinematics
+from ident.vehicle.extended import ExtendedModel
+from ident.vehicle.geometry import Geometry
+from ident.vehicle.kinematics import GENERALIZED_VELOCITIES
+from ident.vehicle.simulation import Motion, Simulation
+
+Array = NDArray[np.float64]
+
+HORIZON: Final = 0.4
+"""Time that the simulation runs before it is set back to what was recorded [s]."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Simulated minus recorded velocity of one coordinate of one segment.
+
+    Attributes:
+        step, coordinate: which.
+        differences: (W, T) of W runs [m/s or rad/s].
+        repeat: (W,) number of the repeat of the excitation, -1 outside of any.
+        place: (W,) number of the run within its repeat.
+    """
+
+    step: str
+    coordinate: str
+    differences: Array
+    repeat: NDArray[np.int64]
+    place: NDArray[np.int64]
+
+
+def outcomes(source: Source, model: ExtendedModel, geometry: Geometry) -> list[Outcome]:
+    """Differences of the coordinates that a segment moves; none for wheels in the air, or where nothing moves long."""
+    mode = source.spec.mode
+    if source.channel is not Channel.DYNAMIC or mode is None:
+        return []
+    length = round(HORIZON / source.sample_time) + 1
+    starts, repeat, place = _starts(source, length)
+    if not len(starts):
+        return []
+    inputs = source.inputs[starts[:, None] + np.arange(length)]
+    recorded = _velocities(source, inputs, geometry)
+    start = Motion(
+        inputs[:, 0, SLICES["heading"].start],
+        inputs[:, 0, SLICES["alpha"]],
+        inputs[:, 0, SLICES["beta"]],
+        recorded[:, 0],
+    )
+    run = Simulation(model, mode, geometry).run(start, inputs[:, :, SLICES["torques"]], source.sample_time)
+    names = GENERALIZED_VELOCITIES[mode]
+    return [
+        Outcome(source.step, name, (run - recorded)[:, 1:, names.index(name)], repeat, place)
+        for name in source.spec.coordinates
+    ]
+
+
+def _starts(source: Source, length: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """First samples of runs in which everything moves throughout, with their repeat and place in it."""
+    moving, found = np.all(source.moving, axis=0), []
+    for number in np.unique(source.period):
+        samples = np.flatnonzero(source.period == number)
+        for place, first in enumerate(range(int(samples[0]), int(samples[-1]) + 2 - length, length)):
+            window = slice(first, first + length)
+            if moving[window].all() and (source.period[window] == number).all():
+                found.append((first, int(number), place))
+    table = np.array(found, dtype=np.int64).reshape(-1, 3)
+    return table[:, 0], table[:, 1], table[:, 2]
+
+
+def _velocities(source: Source, inputs: Array, geometry: Geometry) -> Array:
+    """ṡ_k (W, T, n_k) that the recorded joint rates stand for."""
+    mode = source.spec.mode
+    assert mode is not None
+    flat = inputs.reshape(-1, inputs.shape[-1])
+    H = kinematics.complement(mode, flat[:, SLICES["alpha"]], geometry)[:, 3:]
+    rates = np.hstack([flat[:, SLICES["alpha_rate"]], flat[:, SLICES["beta_rate"]]])
+    solved = np.einsum("nij,nj->ni", np.linalg.pinv(H), rates)
+    return np.asarray(solved.reshape(*inputs.shape[:2], -1))
