@@ -31,15 +31,13 @@ class Limits:
         deviations: by which a smooth function must predict the confirming rows for there to be a remainder.
         size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
-        improvement: share of the held-out gap that one more effect must close, unless its log evidence is `certain`.
-        certain: log evidence of an effect that is there, however little it matters.
+        improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
     """
 
     deviations: float = 3.0
     size: float = 0.25
     explained: float = 0.5
     improvement: float = 0.01
-    certain: float = 5.0
 
 
 @dataclass(frozen=True)
@@ -175,10 +173,9 @@ class _Judgement:
         variants = self.found.variants
         if len(variants) < 2:
             return variants
-        evidence = [self._log_evidence(index) for index in range(len(variants))]
-        least = int(np.argmin(evidence))
-        pays = evidence[least] >= self.limits.certain or self._closed(least) >= self.limits.improvement
-        return variants if pays else self._others(least)
+        closed = [self._closed(index) for index in range(len(variants))]
+        least = int(np.argmin(closed))
+        return variants if closed[least] >= self.limits.improvement else self._others(least)
 
     def _log_evidence(self, index: int) -> float:
         return float(self.found.slots[index].evidence.log_evidence[self.found.variants[index]])

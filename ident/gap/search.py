@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 ROWS_PER_CONTENDER: Final = 40
+CONTENDING: Final = 12.0
+"""Likelihood ratio from which a candidate is taken off: what chance alone seldom reaches is not taken for noise."""
 CONTENDERS: Final = 12
 """Candidates that are taken off before the colour of the noise is found."""
 
@@ -34,6 +36,7 @@ class Settings:
 
     Attributes:
         level: largest probability by chance, over all candidates at once, at which an effect is believed.
+        pair_level: the same over all pairs.
         confirmation: smallest log Bayes factor of the confirming rows.
         stretch: rows of the stretches whose sign a surrogate flips, well beyond the memory of whitened rows.
         stretches: that there shall be at least; short records have shorter ones.
@@ -42,8 +45,9 @@ class Settings:
         lead: log evidence by which another candidate must beat one already taken to replace it.
     """
 
-    level: float = 0.05
-    confirmation: float = 0.5
+    level: float = 0.02
+    pair_level: float = 0.01
+    confirmation: float = 1.0
     stretch: int = 30
     stretches: int = 24
     surrogates: int = 600
@@ -135,7 +139,7 @@ class Regression:
         taken = {self.owners[variant] for variant in given}
         best: dict[int, int] = {}
         for variant in np.argsort(ratios)[::-1].tolist():
-            if self.owners[variant] not in taken and ratios[variant] > 0:
+            if self.owners[variant] not in taken and ratios[variant] > CONTENDING:
                 best.setdefault(self.owners[variant], variant)
         return list(best.values())
 
@@ -235,7 +239,7 @@ def _grown(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     if len(taken) + 2 > settings.most:
         return taken
     pair = best_pair(evidence, regression.owners, len(regression.rows))
-    if pair is None or pair.significance > settings.level or pair.log_evidence < evidence.log_evidence[best]:
+    if pair is None or pair.significance > settings.pair_level or pair.log_evidence < evidence.log_evidence[best]:
         return taken
     return (*taken, pair.first, pair.second)
 
