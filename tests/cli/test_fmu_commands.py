@@ -43,7 +43,7 @@ def perfect(step: Step) -> Segment:
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run folder as `identify` leaves it, its result being the prior values and one effect."""
+    """A run folder as `identify` leaves it, its result the prior values and two effects, one without equations."""
     vehicle, network = load_vehicle(), load_network()
     steps = (Step.STEERING_LEFT,)
     plan = make_plan(vehicle, np.random.default_rng(1), steps=steps, periods=4, cycle=network.cycle_period)
@@ -53,8 +53,11 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         f'[parameters.{name}]\nvalue = {vehicle.prior[name]!r}\nunit = "{unit}"\nstd = 0.01\nsource = "test"\n'
         for name, unit in PARAMETER_UNITS.items()
     ]
-    effect = make_effect(EffectName.QUADRATIC_DRAG, "chassis", {"coefficient": 0.0})
-    folder.parameters.write_text("\n".join(lines) + effects_text([effect]))
+    effects = [
+        make_effect(EffectName.QUADRATIC_DRAG, "chassis", {"coefficient": 0.0}),
+        make_effect(EffectName.BACKLASH, "drive_fl", {"gap": 0.002}),
+    ]
+    folder.parameters.write_text("\n".join(lines) + effects_text(effects))
     return folder.path
 
 
@@ -72,6 +75,7 @@ def test_an_identified_run_becomes_an_fmu_whose_motion_is_that_of_the_record(
     built = quasi("fmu", run, "-o", fmu, "--fmi", "3", "--platforms", "host")
     assert built.code == 0, built
     assert "Written" in built.out
+    assert "backlash@drive_fl is not part of the model" in built.out
     assert fmpy.validation.validate_fmu(str(fmu)) == []
     with zipfile.ZipFile(fmu) as archive:
         assert b"monday" in archive.read("documentation/index.html")

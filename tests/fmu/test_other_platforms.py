@@ -69,7 +69,7 @@ def assert_same(found: NDArray[np.float64], ours: NDArray[np.float64]) -> None:
     assert np.max(np.abs(found - ours) / np.max(np.abs(ours), axis=0)) < 1e-12
 
 
-def test_the_windows_library_computes_the_same_under_wine(
+def test_the_windows_library_computes_the_same_under_wine_sample(
     unpacked: Path, ours: NDArray[np.float64], need: Callable[[str], str], tmp_path: Path
 ) -> None:
     wine = need("wine")
@@ -79,7 +79,7 @@ def test_the_windows_library_computes_the_same_under_wine(
     assert_same(trajectory([wine, driver, f"Z:{library}"], environment), ours)
 
 
-def test_thirty_two_bits_compute_the_same(unpacked: Path, ours: NDArray[np.float64]) -> None:
+def test_thirty_two_bits_compute_the_same_sample(unpacked: Path, ours: NDArray[np.float64]) -> None:
     """Linux on x86-64 runs programs for x86; in SSE registers, not in 80 bits."""
     if platform.machine() != "x86_64":
         pytest.skip("runs on x86-64 alone")
@@ -87,7 +87,7 @@ def test_thirty_two_bits_compute_the_same(unpacked: Path, ours: NDArray[np.float
     assert_same(trajectory([compile_driver(unpacked, "x86-linux-musl", "small", flags=entry.flags)]), ours)
 
 
-def test_arm_computes_the_same_under_qemu(
+def test_arm_computes_the_same_under_qemu_sample(
     unpacked: Path, ours: NDArray[np.float64], need: Callable[[str], str]
 ) -> None:
     qemu = need("qemu-aarch64")
