@@ -43,7 +43,7 @@ def compile_driver(unpacked: Path, target: str, name: str, *, loads: bool = Fals
     output, sources = unpacked / name, unpacked / "sources"
     units = [path for path in sorted(sources.glob("*.c")) if not loads or path.name == "variables.c"]
     ours = [flag for flag in (*FLAGS, *flags) if flag not in ("-shared", "-fvisibility=hidden")]
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *ours, "-I", HEADERS, "-I", sources]
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-s", *ours, "-I", HEADERS, "-I", sources]
     subprocess.run([*command, "-o", output, *units, DRIVER, "-lm"], check=True, capture_output=True)
     return output
 
