@@ -81,15 +81,19 @@ class Engine:
         built: AsBuilt | None = None,
     ) -> None:
         self.step_size = step_size
-        self._built = built or AsBuilt.of(prototype)
-        self._prototype = self._built.prototype
         self._settings = settings
-        self._urdf = generate_urdf(self._built)
+        self.build(built or AsBuilt.of(prototype))
         truth = self._prototype.truth
         self.coulomb = [truth[symbol] / 2 for symbol in ("d_cl", "d_cl", "d_cr", "d_cr")]
         self.coulomb += [truth["d_cw"]] * 4
         self.client = _open_window() if gui else pybullet.connect(pybullet.DIRECT)
         self.place(on_stand=False, angles=[0.0] * 8)
+
+    def build(self, built: AsBuilt) -> None:
+        """Build the vehicle so the next time that it is placed."""
+        self._built = built
+        self._prototype = built.prototype
+        self._urdf = generate_urdf(built)
 
     def place(self, *, on_stand: bool, angles: Sequence[float]) -> None:
         """Put the vehicle at rest at the origin, on the floor or on the jack-stand.

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Final, Self
 
 from emulator.drive import Drive
 from emulator.effects.assembly import Mechanics
+from emulator.effects.bodies import load_payload
 from emulator.effects.injection import AnyEffect, inject
 from emulator.encoder import Encoder
 from emulator.engine import DEFAULT_SOLVER, Engine, SolverSettings
@@ -83,6 +84,7 @@ class EmulatedVehicle:
         effects: Sequence[AnyEffect] = (),
     ) -> None:
         injection = inject(prototype, effects, engine_step)
+        self._built = injection.built
         prototype = injection.built.prototype
         self.engine = Engine(prototype, step_size=engine_step, gui=gui, settings=solver, built=injection.built)
         self._mechanics = Mechanics(injection, self.engine)
@@ -133,6 +135,14 @@ class EmulatedVehicle:
         """
         self.engine.place(on_stand=False, angles=self.engine.angles())
         self._settle()
+
+    def load(self, mass: float) -> None:
+        """Put a load [kg] on the chassis, over its centre, instead of any load before; at rest at the origin.
+
+        Angles and the state of the drives stay.
+        """
+        self.engine.build(replace(self._built, prototype=load_payload(self._built.prototype, mass, 0.0)))
+        self.lower()
 
     def ground_truth(self) -> GroundTruth:
         """The true state now."""

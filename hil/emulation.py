@@ -41,6 +41,14 @@ class BenchOperator:
         """On the floor."""
         self.vehicle.lower()
 
+    def load(self, mass: float) -> None:
+        """A load over the centre [kg]."""
+        self.vehicle.load(mass)
+
+    def unload(self) -> None:
+        """Without it."""
+        self.vehicle.load(0.0)
+
 
 @dataclass(frozen=True)
 class Bench:

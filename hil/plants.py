@@ -113,6 +113,7 @@ class FmuVehicle:
         self._floor = self.instance.read(self._friction)
         self._grip = list(self._floor)
         self._lifted = False
+        self._payload = self.instance.port(["payload"])
         self._sensed = self.instance.port(_SENSED)
         self._steps = 0
         self._owed = 0.0
@@ -139,6 +140,10 @@ class FmuVehicle:
         """Back on the floor."""
         self._lifted = False
         self._ground()
+
+    def load(self, mass: float) -> None:
+        """A load over the centre [kg]; none at zero."""
+        self.instance.write(self._payload, [mass])
 
     def wet(self, wheel: int, coefficient: float) -> None:
         """Let a wheel (fl, rl, fr, rr: 0 to 3) roll on ground with another coefficient of friction [-]."""

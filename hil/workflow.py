@@ -21,10 +21,11 @@ from hil.clock import Clock
 from hil.network import load_network
 from hil.recorder import LogFormat, Recorder
 from ident.campaign.plan import Plan, make_plan
+from ident.campaign.steps import DIAGNOSTIC
 from ident.errors import CampaignError, UserError
 from ident.estimate.identify import Identification, KnownInertia, identify
 from ident.estimate.result_file import write_parameters
-from ident.records.record import Record, Step
+from ident.records.record import Record
 from ident.report.html import ReportContent, write_report
 from ident.report.tables import (
     condition_line,
@@ -55,18 +56,20 @@ class Order:
         log_format: of the logs.
         bus: what it is driven on, for people.
         prototype: emulated prototype, empty on a real vehicle.
+        payload: mass of the load of the loaded steps [kg].
     """
 
     out: Path
     vehicle: str
     network: Path | None
-    steps: tuple[Step, ...]
+    steps: tuple[str, ...]
     periods: int
     seed: int
     known_inertia: KnownInertia | None
     log_format: LogFormat
     bus: str
     prototype: str
+    payload: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,14 @@ class HumanOperator:
     def lower(self) -> None:
         """Ask for the floor."""
         self._ask("Put the vehicle on the floor, wheels about straight ahead")
+
+    def load(self, mass: float) -> None:
+        """Ask for a load."""
+        self._ask(f"Fix a load of {mass:g} kg on the vehicle, over its centre")
+
+    def unload(self) -> None:
+        """Ask to take it off."""
+        self._ask("Take the load off the vehicle")
 
     def _ask(self, what: str) -> None:
         if not sys.stdin.isatty():
@@ -101,7 +112,7 @@ def plan_run(order: Order, console: Console) -> Run:
     vehicle = load_vehicle(order.vehicle)
     network = load_network(order.network or network_file_of(order.vehicle))
     with progress(console) as bars:
-        excitations = sum(step is not Step.LANE_CHANGE for step in order.steps)
+        excitations = sum(step in DIAGNOSTIC and DIAGNOSTIC[step].optimised for step in order.steps)
         task = bars.add_task("optimising the excitation", total=excitations)
         plan = make_plan(
             vehicle,
@@ -111,7 +122,16 @@ def plan_run(order: Order, console: Console) -> Run:
             cycle=network.cycle_period,
             progress=lambda _: bars.advance(task),
         )
-    return Run(RunFolder(order.out), plan, network, order.seed, order.bus, order.prototype, order.known_inertia)
+    return Run(
+        RunFolder(order.out),
+        plan,
+        network,
+        order.seed,
+        order.bus,
+        order.prototype,
+        order.known_inertia,
+        order.payload,
+    )
 
 
 def refuse_changed(run: Run, order: Order, given: Collection[str]) -> None:
@@ -130,6 +150,8 @@ def refuse_changed(run: Run, order: Order, given: Collection[str]) -> None:
         "network": lambda: _differ(order.network or network_file_of(order.vehicle), run.folder.network),
         "skip": lambda: order.steps != run.plan.steps,
         "lateral": lambda: order.steps != run.plan.steps,
+        "diagnostic": lambda: order.steps != run.plan.steps,
+        "payload": lambda: order.payload != run.payload,
         "b_w": lambda: order.known_inertia != run.known_inertia,
         "b_w_std": lambda: order.known_inertia != run.known_inertia,
         "periods": lambda: order.periods != run.plan.periods,

@@ -17,10 +17,10 @@ from hil.campaign.folder import Run, RunFolder, open_run
 from hil.clock import FreeRunningClock, WallClock
 from hil.recorder import LogFormat
 from hil.workflow import HumanOperator, Order
-from ident.campaign.steps import ORDER, PERIODS
+from ident.campaign.steps import DRIVING_ORDER, LOADED, ORDER, PERIODS
 from ident.errors import UserError
 from ident.estimate.identify import KnownInertia
-from ident.records.record import Step
+from ident.records.record import Step, base_step
 from ident.vehicle.effects import Effect
 from ident.vehicle.parameters import Parameters
 from quasiomni.application import app, console, errors
@@ -69,6 +69,12 @@ def campaign(
     network: NetworkOption = None,
     skip: Annotated[list[Step] | None, typer.Option(help="Leave out a step; repeat the option for more.")] = None,
     lateral: Annotated[bool, typer.Option("--lateral", help="Drive the optional lateral step too.")] = False,
+    diagnostic: Annotated[
+        bool, typer.Option("--diagnostic", help="Drive the steps that show what the four steps cannot; see the docs.")
+    ] = False,
+    payload: Annotated[
+        float, typer.Option(min=0.0, help="With --diagnostic: a known load [kg] that the operator puts on.")
+    ] = 0.0,
     periods: Annotated[int, typer.Option(help="Repeats of every excitation, at least 4.")] = PERIODS,
     seed: SeedOption = 1,
     b_w: InertiaOption = None,
@@ -88,14 +94,19 @@ def campaign(
     Nothing moves before all six nodes have answered with the expected identity, mode and units, and you have seen
     the room it takes. A run that was stopped keeps its finished steps: go on with --resume.
     """
-    steps, inertia = _steps(skip or (), lateral, b_w), _known_inertia(b_w, b_w_std)
+    if payload and not diagnostic:
+        raise UserError("--payload is of the diagnostic steps.", "Add --diagnostic, or leave it out.")
+    steps: tuple[str, ...] = _steps(skip or (), lateral, b_w)
+    if diagnostic:
+        steps = _diagnostic_steps(skip or (), payload)
+    inertia = _known_inertia(b_w, b_w_std)
     effects, fmu = parse_effects(effect), parse_plant(plant)
     if bus is not None and (effects or fmu):
         raise UserError(
             "--effect and --plant are of the emulator, and --bus names another vehicle.", "Leave one of them out."
         )
     prototype, where = (vehicle, LOCKSTEP) if bus is None and plant is None else ("", bus or plant or "")
-    order = Order(out, vehicle, network, steps, periods, seed, inertia, log_format, where, prototype)
+    order = Order(out, vehicle, network, steps, periods, seed, inertia, log_format, where, prototype, payload)
     run = _resumed(order, context) if resume else workflow.plan_run(order, console)
     if fmu is not None:
         _drive_on_fmu(run, order, vehicle, fmu)
@@ -212,6 +223,11 @@ def _truth(prototype: str) -> Parameters:
 def _steps(skip: Sequence[Step], lateral: bool, b_w: float | None) -> tuple[Step, ...]:
     left_out = {*skip, *([] if lateral else [Step.LATERAL]), *([] if b_w is None else [Step.WHEEL_LIFTED])}
     return tuple(step for step in ORDER if step not in left_out)
+
+
+def _diagnostic_steps(skip: Sequence[Step], payload: float) -> tuple[str, ...]:
+    """All steps but those skipped, their variants with them; wheels lifted even where B_w is given."""
+    return tuple(step for step in DRIVING_ORDER if base_step(step) not in skip and (payload > 0 or step not in LOADED))
 
 
 def _known_inertia(value: float | None, std: float | None) -> KnownInertia | None:

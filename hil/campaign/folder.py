@@ -24,9 +24,9 @@ from hil.network import DEFAULT_NETWORK, Network, load_network
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.optimise import Excitation
 from ident.campaign.plan import Plan, assemble_plan
+from ident.campaign.steps import DRIVING_ORDER
 from ident.errors import CampaignError, DataFileError
 from ident.estimate.identify import KnownInertia
-from ident.records.record import Step
 from ident.vehicle.description import VehicleDescription, load_vehicle
 
 SCHEMA: Final = "quasiomni.run/1"
@@ -87,6 +87,7 @@ class Run:
         bus: what it was driven on, for people.
         prototype: emulated prototype, empty on a real vehicle.
         known_inertia: B_w where it was given.
+        payload: mass of the load of the loaded steps [kg].
     """
 
     folder: RunFolder
@@ -96,6 +97,7 @@ class Run:
     bus: str
     prototype: str
     known_inertia: KnownInertia | None
+    payload: float = 0.0
 
 
 def refuse_used(folder: RunFolder) -> None:
@@ -168,9 +170,16 @@ def _manifest(run: Run) -> dict[str, Any]:
         "known_inertia": None if inertia is None else [inertia.value, inertia.std, inertia.source],
         "periods": plan.periods,
         "cycle": plan.cycle,
+        **({"payload": run.payload} if run.payload else {}),
         "steps": list(plan.steps),
         "excitations": {step: excitation_entry(excitation) for step, excitation in plan.excitations.items()},
     }
+
+
+def _known_step(name: str) -> str:
+    if name not in DRIVING_ORDER:
+        raise ValueError(f"step {name!r}, which is none of a campaign")
+    return name
 
 
 def excitation_entry(excitation: Excitation) -> dict[str, Any]:
@@ -189,13 +198,11 @@ def _restore(folder: RunFolder, manifest: Mapping[str, Any], vehicle: VehicleDes
         raise ValueError(f"schema {manifest['schema']!r}, not {SCHEMA!r}")
     if manifest["cycle"] != network.cycle_period:
         raise ValueError(f"a cycle of {manifest['cycle']!r} s, not that of {network.path}")
-    excitations: dict[str, Excitation] = {
-        Step(step): excitation_of(entry) for step, entry in manifest["excitations"].items()
-    }
+    excitations = {_known_step(step): excitation_of(entry) for step, entry in manifest["excitations"].items()}
     plan = assemble_plan(
         vehicle,
         excitations,
-        steps=[Step(step) for step in manifest["steps"]],
+        steps=[_known_step(step) for step in manifest["steps"]],
         periods=int(manifest["periods"]),
         cycle=float(manifest["cycle"]),
     )
@@ -208,6 +215,7 @@ def _restore(folder: RunFolder, manifest: Mapping[str, Any], vehicle: VehicleDes
         bus=str(manifest["bus"]),
         prototype=str(manifest["prototype"]),
         known_inertia=None if inertia is None else KnownInertia(*inertia),
+        payload=float(manifest.get("payload", 0.0)),
     )
 
 

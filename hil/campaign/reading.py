@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +15,13 @@ from hil.frames import DecodedLog, decode_log
 from hil.network import Network
 from hil.recorder import INTERLUDE, LogFormat, finished_steps, step_of
 from ident.campaign.plan import Plan
+from ident.campaign.steps import LOADED
 from ident.errors import RecordError
 from ident.records.files import read_record
 from ident.records.record import Record, Segment, make_segment
+
+PAYLOAD: Final = "payload"
+"""Channel that holds the mass of a known load [kg], of the steps driven with it."""
 
 
 def read_run(path: Path) -> Record:
@@ -37,7 +43,18 @@ def read_driven(run: Run) -> Record:
     logs = finished_steps(run.folder.frames)
     if not logs:
         raise RecordError(f"{path} holds no finished step.", "Drive the campaign, or go on with it (--resume).")
-    return _record(logs, run.network, run.plan, str(path))
+    return _with_payload(_record(logs, run.network, run.plan, str(path)), run.payload)
+
+
+def _with_payload(record: Record, payload: float) -> Record:
+    """The load as a channel of the steps that were driven with it [kg]."""
+    segments = [
+        replace(segment, extra={**segment.extra, PAYLOAD: np.full(len(segment), payload)})
+        if segment.step in LOADED
+        else segment
+        for segment in record.segments
+    ]
+    return replace(record, segments=segments)
 
 
 def read_logs(paths: Sequence[Path], network: Network) -> Record:
@@ -130,7 +147,7 @@ def segment_of(step: str, path: Path, log: DecodedLog, network: Network, plan: P
 
 
 def _periods(step: str, samples: int, plan: Plan | None) -> NDArray[np.int64]:
-    if plan is None or step not in plan.excitations:
+    if plan is None or step not in plan.specs:
         return np.full(samples, -1, dtype=np.int64)
     planned = plan.reference(step, plan.vehicle.prior).period
     return np.asarray(planned[:samples], dtype=np.int64)

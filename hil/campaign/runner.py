@@ -5,6 +5,7 @@ The same code drives the emulator and a real vehicle: it sees a bus, a clock and
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from typing import Final, Protocol
@@ -21,6 +22,7 @@ from hil.realtime import steady_memory
 from hil.recorder import finished_steps
 from ident.campaign.controller import Controller
 from ident.campaign.reference import Reference
+from ident.campaign.steps import LOADED
 from ident.errors import CampaignError
 from ident.estimate.identify import FIT_STEPS, identify
 from ident.records.record import Step, base_step
@@ -36,12 +38,17 @@ ALIGNMENTS: Final = 3
 MISALIGNED: Final = 0.01
 """Steering error after the last attempt with which no step is begun [rad]."""
 
-_SESSIONS: Final = (
-    {Step.WHEEL_LIFTED},
-    {Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION, Step.LATERAL},
-    {Step.LANE_CHANGE},
-)
-"""Steps between which the drives lose their power: to move the vehicle by hand, and to identify before validating."""
+
+class _Session(enum.IntEnum):
+    """Steps between which the drives lose their power: to move or load the vehicle by hand, and to identify before
+    validating.
+    """
+
+    LIFTED = 0
+    FLOOR = 1
+    LOADED = 2
+    VALIDATION = 3
+
 
 PROGRESS_CYCLES: Final = 100
 _STANDSTILL: Final = (0.0, 0.0, 0.0, 0.0)
@@ -69,6 +76,12 @@ class Operator(Protocol):
     def lower(self) -> None:
         """Put the vehicle on the floor, wheels about straight ahead, and return when it is there."""
 
+    def load(self, mass: float) -> None:
+        """Put a load [kg] on the vehicle, over its centre, and return when it is fixed."""
+
+    def unload(self) -> None:
+        """Take the load off, and return when that is done."""
+
 
 def check_network(bus: can.BusABC, clock: Clock, network: Network) -> None:
     """See that all nodes are the ones described; nothing moves.
@@ -77,6 +90,14 @@ def check_network(bus: can.BusABC, clock: Clock, network: Network) -> None:
         BusError: a node is missing, another device, in other units, or without the mode.
     """
     Master(bus, clock, network).check()
+
+
+def _session_of(step: str) -> _Session:
+    if base_step(step) is Step.WHEEL_LIFTED:
+        return _Session.LIFTED
+    if step in LOADED:
+        return _Session.LOADED
+    return _Session.VALIDATION if step == Step.LANE_CHANGE else _Session.FLOOR
 
 
 class CampaignRunner:
@@ -121,17 +142,24 @@ class CampaignRunner:
             CampaignError: a coordinate leaves its reference or cannot be aligned; the drives are stopped.
         """
         finished = {step for step, _ in finished_steps(self._run.folder.frames)}
-        # A killed run may have left the vehicle on its stand, so a resumed one asks for the floor as well.
+        # A killed run may have left the vehicle on its stand or loaded, so a resumed one asks for floor and unloading.
         maybe_lifted = Step.WHEEL_LIFTED in self._plan.steps
-        for session in _SESSIONS:
-            steps = [step for step in self._plan.steps if step in session and step not in finished]
-            if Step.WHEEL_LIFTED in steps:
+        maybe_loaded = any(step in LOADED and step in finished for step in self._plan.steps)
+        for session in _Session:
+            steps = [step for step in self._plan.steps if _session_of(step) is session and step not in finished]
+            if not steps:
+                continue
+            if session is _Session.LIFTED:
                 self._operator.lift()
-            elif steps and maybe_lifted:
+            elif maybe_lifted:
                 self._operator.lower()
                 maybe_lifted = False
-            if steps:
-                self._drive_session(steps)
+            if session is _Session.LOADED:
+                self._operator.load(self._run.payload)
+                maybe_loaded = True
+            elif maybe_loaded and session is _Session.VALIDATION:
+                self._operator.unload()
+            self._drive_session(steps)
 
     def _master(self) -> Master:
         return Master(self._bus, self._clock, self._run.network, self._recorder)
@@ -143,7 +171,7 @@ class CampaignRunner:
             master.boot()
             master.enable()
             for reference in references:
-                if base_step(reference.step) is not Step.WHEEL_LIFTED:
+                if _session_of(reference.step) is not _Session.LIFTED:
                     self._align(master, reference.step)
                 self._drive(master, reference)
         self.overruns += master.overruns

@@ -16,6 +16,7 @@ from hil.bench import LockstepBench
 from hil.campaign.folder import Run, RunFolder, network_file_of
 from hil.campaign.reading import segment_of
 from hil.campaign.runner import CampaignRunner
+from hil.emulation import BenchOperator
 from hil.frames import FrameTable, decode_frames
 from hil.network import load_network
 from ident.campaign.plan import Plan
@@ -51,18 +52,6 @@ class FramesInMemory:
             self._frames = None
 
 
-class NobodyThere:
-    """Hands that are not needed: no step of an exam lifts the vehicle."""
-
-    def lift(self) -> None:
-        """Not asked for."""
-        raise AssertionError("an exam has no lifted step")
-
-    def lower(self) -> None:
-        """Not asked for."""
-        raise AssertionError("an exam has no lifted step")
-
-
 def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[AnyEffect]) -> Record:
     """Record of a plan driven by a vehicle with effects.
 
@@ -85,7 +74,7 @@ def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[AnyEffect]) -
         LockstepBench(vehicle, network.path) as bench,
     ):
         CampaignRunner(
-            run, bench.bus, bench.clock, frames, NobodyThere(), lambda *_: None, spare_alignments=True
+            run, bench.bus, bench.clock, frames, BenchOperator(vehicle), lambda *_: None, spare_alignments=True
         ).drive()
     return Record(
         [

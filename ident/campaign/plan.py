@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ident.campaign.axis import Axis, axis_of
 from ident.campaign.controller import LoopLimits
+from ident.campaign.dither import add_dither
 from ident.campaign.loops import STEERING_RATE_CYCLES, LoopDesign, design_loop
 from ident.campaign.optimise import Excitation, Problem, optimise
 from ident.campaign.reference import (
@@ -22,8 +23,9 @@ from ident.campaign.reference import (
     alignment_reference,
     excitation_reference,
     lane_change_reference,
+    turn_reference,
 )
-from ident.campaign.steps import EXCITATIONS, ORDER, PERIODS, Posture, StepSpec
+from ident.campaign.steps import DIAGNOSTIC, DRIVING_ORDER, EXCITATIONS, ORDER, PERIODS, Posture, StepSpec
 from ident.errors import CampaignError
 from ident.estimate.filters import Processing
 from ident.records.record import Step
@@ -92,15 +94,18 @@ class Plan:
     periods: int
     cycle: float
     manoeuvre: LaneChange
-    specs: Mapping[str, StepSpec] = field(default_factory=lambda: EXCITATIONS)
+    specs: Mapping[str, StepSpec] = field(default_factory=lambda: DIAGNOSTIC)
 
     def reference(self, step: str, parameters: Parameters) -> Reference:
         """The reference of a step, feed-forward by `parameters`."""
         if step == Step.LANE_CHANGE:
             return lane_change_reference(self.manoeuvre, self.vehicle, parameters, self.cycle)
-        spec, series = self.specs[step], self.excitations[step].series
-        periods = math.ceil(self.periods * spec.repeats)
-        return excitation_reference(spec, series, periods, self.vehicle, parameters, self.cycle)
+        spec = self.specs[step]
+        if spec.turn:
+            return turn_reference(spec, self.vehicle, parameters, self.cycle)
+        series, periods = self.excitations[spec.like or step].series, math.ceil(self.periods * spec.repeats)
+        reference = excitation_reference(spec, series, periods, self.vehicle, parameters, self.cycle)
+        return add_dither(reference, spec, self.vehicle) if spec.dithers else reference
 
     def alignment(self, start: Array, step: str, parameters: Parameters) -> Reference:
         """Reference that takes the steering from `start` (2,) to where `step` begins."""
@@ -128,7 +133,7 @@ def make_plan(
     cycle: float,
     processing: Processing | None = None,
     progress: Callable[[str], None] | None = None,
-    specs: Mapping[str, StepSpec] = EXCITATIONS,
+    specs: Mapping[str, StepSpec] = DIAGNOSTIC,
 ) -> Plan:
     """Optimise the excitations of the steps, then assemble the plan.
 
@@ -146,8 +151,8 @@ def make_plan(
         CampaignError: there is no step, or the steps need more floor than the vehicle file allows.
     """
     excitations: dict[str, Excitation] = {}
-    for step in ORDER:
-        if step in steps and step in specs:
+    for step in DRIVING_ORDER:
+        if step in steps and step in specs and specs[step].optimised:
             excitations[step] = _excitation(specs[step], vehicle, processing or Processing(), generator)
             if progress is not None:
                 progress(step)
@@ -161,7 +166,7 @@ def assemble_plan(
     steps: Sequence[str],
     periods: int,
     cycle: float,
-    specs: Mapping[str, StepSpec] = EXCITATIONS,
+    specs: Mapping[str, StepSpec] = DIAGNOSTIC,
 ) -> Plan:
     """A plan from excitations that are given; designs the loops and checks the room.
 
@@ -176,10 +181,11 @@ def assemble_plan(
         )
     if periods > MOST_PERIODS:
         raise CampaignError(f"{periods} periods a step would take hours.", f"Drive at most {MOST_PERIODS}.")
+    _refuse_unlike(steps, excitations, specs)
     axes = {step: axis_of(spec, vehicle) for step, spec in EXCITATIONS.items()}
     plan = Plan(
         vehicle=vehicle,
-        steps=tuple(step for step in ORDER if step in steps),
+        steps=tuple(step for step in DRIVING_ORDER if step in steps),
         excitations=excitations,
         designs=_by_loop({step: _design(step, axis, cycle) for step, axis in axes.items()}),
         limits=_by_loop({step: _limits(step, axis) for step, axis in axes.items()}),
@@ -190,6 +196,13 @@ def assemble_plan(
     )
     _check_room(plan)
     return plan
+
+
+def _refuse_unlike(steps: Sequence[str], excitations: Mapping[str, Excitation], specs: Mapping[str, StepSpec]) -> None:
+    for step in steps:
+        like = specs[step].like if step in specs else ""
+        if like and like not in excitations:
+            raise CampaignError(f"{step} is driven like {like}, which is left out.", f"Drive {like} too.")
 
 
 def _excitation(

@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 SETTLING: Final = 1.0
 """Standstill before and after every motion [s]."""
 
+TURN_SPEED: Final = 0.5
+"""Mean rate at which a vehicle is turned round [rad/s]."""
+
 LIFTED_LOOPS: Final = tuple(f"beta_{wheel}" for wheel in WHEELS)
 STEERING_LOOPS: Final = ("alpha_l", "alpha_r")
 
@@ -88,6 +91,30 @@ def excitation_reference(
     rest = round(SETTLING / sample_time)
     position, velocity, acceleration = (_padded(np.tile(values, periods), rest) for values in motion)
     period = np.concatenate([np.full(rest, -1), np.repeat(np.arange(periods), per_period), np.full(rest, -1)])
+    return _single_motion(spec, (position, velocity, acceleration), period, vehicle, parameters, sample_time)
+
+
+def turn_reference(
+    spec: StepSpec, vehicle: VehicleDescription, parameters: Parameters, sample_time: float
+) -> Reference:
+    """Turn the vehicle on the spot by `spec.turn`: standstill, a quintic move, standstill."""
+    duration = abs(spec.turn) / TURN_SPEED
+    samples = round((duration + 2 * SETTLING) / sample_time)
+    shape, rate, curvature = smooth_step((sample_times(samples, sample_time) - SETTLING) / duration)
+    motion = spec.turn * shape, spec.turn * rate / duration, spec.turn * curvature / duration**2
+    return _single_motion(spec, motion, np.full(samples, -1), vehicle, parameters, sample_time)
+
+
+def _single_motion(
+    spec: StepSpec,
+    motion: tuple[Array, Array, Array],
+    period: NDArray[np.int64],
+    vehicle: VehicleDescription,
+    parameters: Parameters,
+    sample_time: float,
+) -> Reference:
+    """Reference of one coordinate at fixed steering angles, from its position, velocity and acceleration (N,)."""
+    position, velocity, acceleration = motion
     alpha = np.tile(spec.steering(vehicle.geometry), (len(position), 1))
     if spec.mode is None:
         tracks, torques = _lifted(position, velocity, acceleration, vehicle.geometry, parameters)
@@ -96,7 +123,7 @@ def excitation_reference(
         torques = _feed_forward(spec, alpha, velocity, acceleration, vehicle.geometry, parameters)
     path = np.zeros((len(position), 3))
     if spec.coordinate in ("x", "y", "gamma"):
-        path[:, ("x", "y", "gamma").index(spec.coordinate)] = position
+        path[:, ("x", "y", "gamma").index(spec.coordinate)] = -position if spec.reversed else position
     return Reference(spec.step, spec.coordinate, sample_time, tracks, torques, period, path)
 
 

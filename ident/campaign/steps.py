@@ -5,9 +5,9 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,11 @@ class StepSpec:
         speed: largest speed of the coordinate [rad/s or m/s].
         acceleration: largest acceleration of the coordinate.
         repeats: periods of this step per period asked of a campaign: steering friction is the noisiest.
+        like: step whose excitation it takes over; its own where empty.
+        turn: angle by which it turns the vehicle on the spot, instead of an excitation [rad].
+        dithers: torques that move nothing are added, see `ident.campaign.dither`.
+        loaded: driven with a known payload.
+        reversed: driven when the vehicle has been turned round.
     """
 
     step: str
@@ -59,6 +64,16 @@ class StepSpec:
     speed: float
     acceleration: float
     repeats: float = 1.0
+    like: str = ""
+    turn: float = 0.0
+    dithers: bool = False
+    loaded: bool = False
+    reversed: bool = False
+
+    @property
+    def optimised(self) -> bool:
+        """Whether it has an excitation of its own."""
+        return not self.like and not self.turn
 
     def steering(self, geometry: Geometry) -> Array:
         """Steering angles at the start of the step (2,) [rad]."""
@@ -76,16 +91,59 @@ _SPECS: Final = (
 EXCITATIONS: Final[Mapping[str, StepSpec]] = MappingProxyType({spec.step: spec for spec in _SPECS})
 """Excitation steps in the order in which they are driven."""
 
-ORDER: Final = (
+
+def _variant(base: Step, name: str, **changes: Any) -> StepSpec:
+    return replace(EXCITATIONS[base], step=f"{base}_{name}", **changes)
+
+
+def _again(base: Step, name: str, **changes: Any) -> StepSpec:
+    """A variant with the very motion of its base, so that what differs is not the motion."""
+    return _variant(base, name, like=str(base), **changes)
+
+
+_DIAGNOSTIC: Final = (
+    _variant(Step.STEERING_LEFT, "slow", period=8.0, speed=0.6, repeats=1.0),
+    _variant(Step.STEERING_RIGHT, "slow", period=8.0, speed=0.6, repeats=1.0),
+    _variant(Step.STRAIGHT, "slow", period=10.0, speed=0.2),
+    _again(Step.STRAIGHT, "dither", dithers=True),
+    _variant(Step.ROTATION, "wide", period=12.0, stroke=2.8),
+    _variant(Step.ROTATION, "turn", turn=math.pi),
+    _again(Step.STRAIGHT, "turned", reversed=True),
+    _variant(Step.ROTATION, "turn_back", turn=-math.pi),
+    _again(Step.STRAIGHT, "loaded", loaded=True),
+    _again(Step.ROTATION, "loaded", loaded=True),
+)
+DIAGNOSTIC: Final[Mapping[str, StepSpec]] = MappingProxyType(
+    {**EXCITATIONS, **{spec.step: spec for spec in _DIAGNOSTIC}}
+)
+"""All excitation steps, those of a diagnosis among them; each is a variant of the step that it is named after."""
+
+DRIVING_ORDER: Final[tuple[str, ...]] = (
     Step.WHEEL_LIFTED,
     Step.STEERING_LEFT,
+    "steering_left_slow",
     Step.STEERING_RIGHT,
+    "steering_right_slow",
     Step.STRAIGHT,
+    "straight_slow",
+    "straight_dither",
     Step.ROTATION,
+    "rotation_wide",
+    "rotation_turn",
+    "straight_turned",
+    "rotation_turn_back",
     Step.LATERAL,
+    "straight_loaded",
+    "rotation_loaded",
     Step.LANE_CHANGE,
 )
-"""Order of a campaign; an alignment is driven wherever the next step needs other steering angles."""
+"""Order of all steps; an alignment is driven wherever the next step needs other steering angles."""
+
+ORDER: Final = tuple(Step(step) for step in DRIVING_ORDER if step in tuple(Step))
+"""The steps of a campaign that is not asked for those of a diagnosis."""
+
+LOADED: Final = tuple(spec.step for spec in _DIAGNOSTIC if spec.loaded)
+"""The steps that need a payload."""
 
 PERIODS: Final = 4
 """Repeats of an excitation, at least."""
