@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from emulator.firmware.drive.axis import TICK, Axis
 from emulator.firmware.drive.homing import Homing
 from emulator.firmware.drive.modes import (
-    CyclicPosition,
     CyclicTorque,
     CyclicVelocity,
     Mode,
@@ -16,6 +15,7 @@ from emulator.firmware.drive.modes import (
     ProfileTorque,
     ProfileVelocity,
 )
+from emulator.firmware.drive.positioning import CyclicPosition, ProfilePosition
 from emulator.firmware.timers import Timer, Timers
 
 
@@ -23,6 +23,7 @@ def make_motions(axis: Axis) -> Mapping[Mode, Motion]:
     """What the axis does in each mode of operation."""
     return {
         Mode.NONE: NoMotion(axis),
+        Mode.PROFILE_POSITION: ProfilePosition(axis),
         Mode.PROFILE_VELOCITY: ProfileVelocity(axis),
         Mode.PROFILE_TORQUE: ProfileTorque(axis),
         Mode.HOMING: Homing(axis),

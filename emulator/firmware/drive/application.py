@@ -155,6 +155,7 @@ class DriveApplication:
         """Change the mode of operation, at once where operation is enabled."""
         if mode is not self.mode:
             self.mode = mode
+            self.axis.goal = None
             if self.state is State.OPERATION_ENABLED and self._after_stop is None:
                 self._operate()
             self._update_status()
@@ -214,6 +215,7 @@ class DriveApplication:
     def _enable_operation(self) -> None:
         self._hardware.enable()
         self._after_stop = None
+        self.axis.goal = None
         self._halted = bool(self._points.controlword & _HALT)
         self._operate()
 

@@ -66,6 +66,7 @@ class Axis:
         torque_demand: [per mille of rated torque].
         velocity_demand: [rad/s].
         position_demand: [increments], counted without end.
+        goal: where profile position is on its way to [increments], None where it is not.
         limited: torque, speed or position is not what was asked for.
         count, read_at: last reading of the encoder [increments], and its instant [s].
     """
@@ -81,6 +82,7 @@ class Axis:
         self.torque_demand = 0
         self.velocity_demand = 0.0
         self.position_demand = 0.0
+        self.goal: float | None = None
         self.limited = False
         self.home = 0
         self._integral = 0.0
@@ -96,6 +98,7 @@ class Axis:
         self.torque_demand = 0
         self.velocity_demand = 0.0
         self.position_demand = float(self.position())
+        self.goal = None
         self.limited = False
         self._integral = 0.0
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Final, Protocol
 
-from emulator.firmware.drive.axis import TICK, Axis, approach, shorter_way
+from emulator.firmware.drive.axis import TICK, Axis, approach
 
 
 class Mode(IntEnum):
     """Values of 6060h that this drive knows."""
 
     NONE = 0
+    PROFILE_POSITION = 1
     PROFILE_VELOCITY = 3
     PROFILE_TORQUE = 4
     HOMING = 6
@@ -23,7 +24,7 @@ class Mode(IntEnum):
 TORQUE_MODES: Final = (Mode.NONE, Mode.PROFILE_TORQUE, Mode.CYCLIC_TORQUE)
 """Where the slow-down ramp is one of torque (6087h)."""
 
-HALTING_MODES: Final = (Mode.PROFILE_VELOCITY, Mode.PROFILE_TORQUE, Mode.HOMING)
+HALTING_MODES: Final = (Mode.PROFILE_POSITION, Mode.PROFILE_VELOCITY, Mode.PROFILE_TORQUE, Mode.HOMING)
 """Where bit 8 of the controlword means halt; the cyclic modes have no such bit."""
 
 TARGET_REACHED: Final = 1 << 10
@@ -39,8 +40,9 @@ class Motion(Protocol):
     ticks: bool
     """Whether it needs the drive's own loops; a torque set-point of the bus needs none."""
 
-    failed: bool
-    """The following error has lasted too long."""
+    @property
+    def failed(self) -> bool:
+        """The following error has lasted too long."""
 
     def start(self) -> None:
         """From now on."""
@@ -241,47 +243,3 @@ class CyclicVelocity:
     def status(self) -> int:
         """The drive follows its command value."""
         return FOLLOWS_COMMAND
-
-
-class CyclicPosition:
-    """Cyclic synchronous position: 607Ah + 60B0h, interpolated, velocity and torque offsets fed forward."""
-
-    ticks = True
-
-    def __init__(self, axis: Axis) -> None:
-        self._axis = axis
-        self._line = Interpolation()
-        self._late = Steady()
-        self.failed = False
-
-    def start(self) -> None:
-        """From the present position."""
-        axis = self._axis
-        axis.take_over()
-        axis.position_demand = float(axis.position())
-        self._late.reset()
-        self.failed = False
-        self.take()
-
-    def take(self) -> None:
-        """A new set-point to go to."""
-        self._line.begin(self._axis.parameters.interpolation_time)
-
-    def tick(self) -> None:
-        """One step along the line, and of the position and velocity loops."""
-        axis, parameters = self._axis, self._axis.parameters
-        points, speed = axis.points, parameters.max_motor_speed * axis.increments
-        distance = shorter_way(points.target_position + points.position_offset - axis.position_demand)
-        asked = self._line.step(distance) / TICK
-        slope = min(max(asked, -speed), speed)
-        axis.position_demand += slope * TICK
-        error = axis.following_error()
-        demand = (slope + points.velocity_offset + parameters.position_gain * error) / axis.increments
-        axis.velocity_demand = min(max(demand, -parameters.max_motor_speed), parameters.max_motor_speed)
-        axis.control_velocity(0.0, points.torque_offset * axis.permille)
-        axis.limited = axis.limited or slope != asked
-        self.failed = self._late.update(abs(error) > parameters.following_window, parameters.following_time)
-
-    def status(self) -> int:
-        """Bits 12, and 13 where the following error has lasted too long (6065h, 6066h)."""
-        return FOLLOWS_COMMAND | (POSITION_ERROR if self.failed else 0)

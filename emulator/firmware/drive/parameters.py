@@ -19,12 +19,15 @@ def _of_objects(counts: float) -> Mapping[str, tuple[int, int, _Scale]]:
     return {
         "following_window": (0x6065, 0, float),
         "following_time": (0x6066, 0, lambda ms: ms * 1e-3),
+        "position_window": (0x6067, 0, float),
+        "position_window_time": (0x6068, 0, lambda ms: ms * 1e-3),
         "velocity_window": (0x606D, 0, lambda raw: raw * angle),
         "velocity_window_time": (0x606E, 0, lambda ms: ms * 1e-3),
         "velocity_threshold": (0x606F, 0, lambda raw: raw * angle),
         "velocity_threshold_time": (0x6070, 0, lambda ms: ms * 1e-3),
         "max_profile_velocity": (0x607F, 0, lambda raw: raw * angle),
         "max_motor_speed": (0x6080, 0, lambda rpm: rpm * _RPM),
+        "profile_velocity": (0x6081, 0, lambda raw: raw * angle),
         "acceleration": (0x6083, 0, lambda raw: raw * angle),
         "deceleration": (0x6084, 0, lambda raw: raw * angle),
         "quick_stop_deceleration": (0x6085, 0, lambda raw: raw * angle),
@@ -55,6 +58,7 @@ class Parameters:
 
     Attributes:
         following_window: 6065h [increments]; the largest value switches the monitoring off.
+        position_window: 6067h [increments].
         torque_slope: 6087h [per mille / s].
         home_offset: 607Ch [increments].
         highest_torque, lowest_torque: what 6072h, 6073h, 60E0h and 60E1h leave [per mille].
@@ -66,12 +70,15 @@ class Parameters:
 
     following_window: float
     following_time: float
+    position_window: float
+    position_window_time: float
     velocity_window: float
     velocity_window_time: float
     velocity_threshold: float
     velocity_threshold_time: float
     max_profile_velocity: float
     max_motor_speed: float
+    profile_velocity: float
     acceleration: float
     deceleration: float
     quick_stop_deceleration: float

@@ -44,6 +44,7 @@ PATTERN = {
 
 MODE_BITS = {
     Mode.NONE: 0x0000,
+    Mode.PROFILE_POSITION: 0x0400,
     Mode.PROFILE_VELOCITY: 0x1400,
     Mode.PROFILE_TORQUE: 0x0400,
     Mode.HOMING: 0x0400,
@@ -51,8 +52,8 @@ MODE_BITS = {
     Mode.CYCLIC_VELOCITY: 0x1000,
     Mode.CYCLIC_TORQUE: 0x1000,
 }
-"""Operation enabled at rest, targets zero: PV target reached and speed 0, TQ target reached, HM not started,
-cyclic modes following."""
+"""Operation enabled at rest, targets zero: PP nothing to do, PV target reached and speed 0, TQ target reached,
+HM not started, cyclic modes following."""
 
 
 def command_of(controlword: int) -> str:
@@ -128,20 +129,28 @@ def test_every_controlword_leads_where_the_diagram_says_and_shows_it(cell: Cell,
         assert bits & 0x7F == PATTERN[after]
         assert bits & 0x200, "bit 9: the node is operational"
         assert not bits & 0x8880, "no warning, no limit, no manufacturer's bit"
-        assert bits & 0x3400 == expected_mode_bits(after, mode, controlword)
+        assert bits & 0x3400 == expected_mode_bits(state, after, mode, controlword)
         assert cell.drive.axis.hardware.enabled is (after in ("OPERATION_ENABLED", "QUICK_STOP_ACTIVE"))
 
 
-def expected_mode_bits(state: str, mode: Mode, controlword: int) -> int:
+def expected_mode_bits(before: str, state: str, mode: Mode, controlword: int) -> int:
     if state == "QUICK_STOP_ACTIVE":
         return 0x0400
     if state != "OPERATION_ENABLED":
         return 0
-    homes = mode is Mode.HOMING and controlword & 0x10
-    return 0x1400 if homes else MODE_BITS[mode]
+    if not controlword & 0x10:
+        return MODE_BITS[mode]
+    # Bit 4 starts homing whenever it is high; a new set-point needs its edge while operation is enabled.
+    edge = before == "OPERATION_ENABLED"
+    return {Mode.HOMING: 0x1400, Mode.PROFILE_POSITION: 0x1400 if edge else 0x0400}.get(mode, MODE_BITS[mode])
 
 
-HALTS = {Mode.PROFILE_VELOCITY: 0x0400, Mode.PROFILE_TORQUE: 0x0400, Mode.HOMING: 0x0400}
+HALTS = {
+    Mode.PROFILE_POSITION: 0x0400,
+    Mode.PROFILE_VELOCITY: 0x0400,
+    Mode.PROFILE_TORQUE: 0x0400,
+    Mode.HOMING: 0x0400,
+}
 
 
 @pytest.mark.parametrize("mode", Mode, ids=lambda mode: mode.name)
@@ -171,7 +180,7 @@ def test_no_mode_leaves_a_torque_behind_when_the_power_goes_off(cell: Cell, mode
     points.target_torque, points.target_velocity, points.target_position = 300, 10**6, 10**6
     cell.control(0x0F)
     cell.settle()
-    assert (cell.drive.axis.torque_demand != 0) is (mode not in (Mode.NONE, Mode.HOMING))
+    assert (cell.drive.axis.torque_demand != 0) is (mode not in (Mode.NONE, Mode.HOMING, Mode.PROFILE_POSITION))
     cell.control(0x00)
     assert cell.drive.axis.torque_demand == 0
     assert cell._wire.vehicle.drives[0].torque == 0.0

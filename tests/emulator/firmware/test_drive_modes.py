@@ -256,6 +256,113 @@ def test_no_following_error_is_monitored_with_the_largest_window(drive: Drive) -
     assert drive.status & 0x6F == 0x27
 
 
+NEW, NOW, RELATIVE = 0x1F, 0x3F, 0x5F
+"""Operation enabled with a new set-point; at once; relative."""
+
+
+def position(drive: Drive) -> float:
+    """6064h [rad]."""
+    return drive.read(0x6064) / COUNTS * math.tau
+
+
+def positioning(drive: Drive, speed: float = 50.0, acceleration: float = 500.0, deceleration: float = 250.0) -> None:
+    drive.write(0x6081, 0, counts(speed), "<I")
+    drive.write(0x6083, 0, counts(acceleration), "<I")
+    drive.write(0x6084, 0, counts(deceleration), "<I")
+    drive.enable(Mode.PROFILE_POSITION)
+
+
+def go(drive: Drive, target: float, controlword: int = NEW) -> None:
+    """The handshake of the standard: set-point, bit 4, acknowledge, bit 4 back."""
+    drive.write(0x607A, 0, counts(target), "<i")
+    drive.write(0x6040, 0, controlword, "<H")
+    assert drive.status & BIT_12, "acknowledged"
+    drive.write(0x6040, 0, 0x0F, "<H")
+
+
+@pytest.mark.parametrize(("way", "top"), [(40.0, 50.0), (-40.0, 50.0), (3.0, None)], ids=["there", "back", "short"])
+def test_a_profile_is_a_trapezoid_or_a_triangle(drive: Drive, way: float, top: float | None) -> None:
+    positioning(drive)
+    go(drive, way)
+    assert not drive.status & (TARGET_REACHED | BIT_12)
+    # Time of a move by v, a, d: the way is v^2/2a + v t + v^2/2d.
+    both = 1 / 500.0 + 1 / 250.0
+    top = top if top is not None else math.sqrt(2 * abs(way) / both)
+    expected = top * both + (abs(way) - top**2 / 2 * both) / top
+    fastest, time = 0.0, 0.0
+    while not drive.status & TARGET_REACHED:
+        drive.wait(0.002)
+        time += 0.002
+        fastest = max(fastest, abs(drive.read(0x606B) / COUNTS * math.tau))
+        assert time < 2 * expected + 1.0
+    assert time == pytest.approx(expected + 0.010, abs=0.08)
+    assert fastest == pytest.approx(top, rel=0.1)
+    assert position(drive) == pytest.approx(way, abs=0.06)
+    drive.wait(1.0)
+    assert position(drive) == pytest.approx(way, abs=2e-3)
+    assert drive.read(0x6062) == counts(way)
+
+
+def test_a_second_set_point_waits_and_a_third_is_not_acknowledged(drive: Drive) -> None:
+    positioning(drive)
+    go(drive, 10.0)
+    drive.write(0x607A, 0, counts(20.0), "<i")
+    drive.write(0x6040, 0, NEW, "<H")
+    drive.write(0x6040, 0, 0x0F, "<H")
+    assert drive.status & BIT_12, "the buffer is full"
+    drive.write(0x607A, 0, counts(-99.0), "<i")
+    drive.write(0x6040, 0, NEW, "<H")
+    drive.write(0x6040, 0, 0x0F, "<H")
+    seen = []
+    for _ in range(300):
+        drive.wait(0.01)
+        seen.append(position(drive))
+    assert not drive.status & BIT_12
+    assert drive.status & TARGET_REACHED
+    assert seen[-1] == pytest.approx(20.0, abs=1e-2)
+    assert min(abs(angle - 10.0) for angle in seen) < 0.05
+    assert max(seen) < 20.1
+
+
+def test_a_set_point_that_takes_over_at_once_turns_round_on_the_way(drive: Drive) -> None:
+    positioning(drive)
+    go(drive, 40.0)
+    drive.wait(0.3)
+    go(drive, -5.0, NOW)
+    drive.wait(3.0)
+    assert position(drive) == pytest.approx(-5.0, abs=1e-2)
+
+
+def test_relative_set_points_count_from_the_target_before(drive: Drive) -> None:
+    positioning(drive)
+    for _ in range(3):
+        go(drive, 5.0, RELATIVE)
+        drive.wait(1.5)
+    assert position(drive) == pytest.approx(15.0, abs=1e-2)
+
+
+def test_a_motion_goes_on_after_a_halt_and_is_forgotten_after_a_quick_stop(drive: Drive) -> None:
+    positioning(drive)
+    drive.write(0x605A, 0, 6, "<h")
+    go(drive, 40.0)
+    drive.wait(0.3)
+    drive.write(0x6040, 0, 0x10F, "<H")
+    drive.wait(1.0)
+    assert position(drive) < 39.0
+    assert abs(drive.speed) < 0.01
+    drive.write(0x6040, 0, 0x0F, "<H")
+    drive.wait(3.0)
+    assert position(drive) == pytest.approx(40.0, abs=1e-2)
+    go(drive, 0.0)
+    drive.wait(0.3)
+    drive.write(0x6040, 0, 0x02, "<H")
+    drive.wait(1.0)
+    stopped = position(drive)
+    drive.write(0x6040, 0, 0x0F, "<H")
+    drive.wait(1.0)
+    assert position(drive) == pytest.approx(stopped, abs=1e-2)
+
+
 @pytest.mark.parametrize("method", [35, 37])
 def test_homing_on_the_spot_gives_the_position_its_offset(drive: Drive, method: int) -> None:
     drive.shaft.angle = 12.345

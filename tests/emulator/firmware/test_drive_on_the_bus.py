@@ -86,7 +86,7 @@ def test_no_mode_no_torque(wire) -> None:
     assert wire.vehicle.drives[0].torque == 0.0
 
 
-@pytest.mark.parametrize("mode", [1, 2, 5, 7, 11, -1])
+@pytest.mark.parametrize("mode", [2, 5, 7, 11, -1])
 def test_a_mode_that_6502h_does_not_list_is_refused(wire, mode: int) -> None:
     assert wire.write(1, 0x6060, 0, struct.pack("<b", mode)) == 0x06090030
     assert wire.read(1, 0x6061) == 0
@@ -96,7 +96,7 @@ def test_ratings_are_those_of_the_hardware(wire) -> None:
     assert wire.read(1, 0x6076) == 1270
     assert wire.read(1, 0x6075) == 2600
     assert wire.read(1, 0x608F, 1) == COUNTS
-    assert wire.read(1, 0x6502) == sum(1 << mode - 1 for mode in (3, 4, 6, 8, 9, 10))
+    assert wire.read(1, 0x6502) == sum(1 << mode - 1 for mode in (1, 3, 4, 6, 8, 9, 10))
 
 
 def test_the_slow_down_ramp_of_a_torque_mode_takes_the_torque_down_at_6087h_and_then_switches_off(wire) -> None:
