@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NoReturn
+
 from hil.pytest_plugin.conditions import Condition
 from hil.pytest_plugin.world import World
 
@@ -29,10 +31,11 @@ class Expectation:
         Raises:
             AssertionError: it does not.
         """
-        if not self._world.run_until(self._holds, duration):
+        reached = self._world.run_until(self._holds, duration)
+        if reached is None:
             self._fail(f"{self._condition.text} within {duration:g} s")
-        took = self._world.now - self._begin
-        self._world.note(f"{self._condition.text}: after {took * 1e3:.0f} ms")
+        took = reached - self._begin
+        self._world.note(reached, f"{self._condition.text}: after {took * 1e3:.0f} ms")
         return took
 
     def now(self) -> None:
@@ -50,7 +53,7 @@ class Expectation:
         Raises:
             AssertionError: it ceases to.
         """
-        if self._world.run_until(lambda: not self._holds(), duration):
+        if self._world.run_until(lambda: not self._holds(), duration) is not None:
             self._fail(f"{self._condition.text} throughout {duration:g} s")
 
     def never_within(self, duration: float) -> None:
@@ -59,7 +62,7 @@ class Expectation:
         Raises:
             AssertionError: it does.
         """
-        if self._world.run_until(self._holds, duration):
+        if self._world.run_until(self._holds, duration) is not None:
             self._fail(f"never {self._condition.text} within {duration:g} s")
 
     def _holds(self) -> bool:
@@ -67,9 +70,9 @@ class Expectation:
         seen, self._seen = self._seen, len(self._world.frames)
         return self._condition.holds(self._world, seen)
 
-    def _fail(self, sentence: str) -> None:
+    def _fail(self, sentence: str) -> NoReturn:
         world = self._world
-        world.note(f"FAILED: {sentence}")
+        world.note(world.now, f"FAILED: {sentence}")
         passed = world.now - self._begin
         raise AssertionError(
             f"Expected {sentence}; at t = {world.now:.3f} s, {passed:.3f} s later, "

@@ -72,6 +72,8 @@ class World:
         self.notes: list[Note] = []
         self._step: Callable[[], object] | None = None
         self._next_sample = -math.inf
+        self._done: Callable[[], bool] | None = None
+        self._reached: float | None = None
         bench.listen(self._hear)
 
     @property
@@ -115,26 +117,33 @@ class World:
         """Go on for `duration` [s] of simulated time."""
         self.run_until(lambda: False, duration)
 
-    def run_until(self, done: Callable[[], bool], timeout: float) -> bool:
-        """Go on until `done()`, at most for `timeout` [s] of simulated time; what `done` says at the end.
+    def run_until(self, done: Callable[[], bool], timeout: float) -> float | None:
+        """Go on until `done()`, at most for `timeout` [s] of simulated time.
+
+        It is asked before every step, and every 10 ms within a step that takes long.
+
+        Returns:
+            The instant at which `done` held [s], None if it did not in time.
 
         Raises:
             UserError: the step of `every_cycle` lets no time pass.
         """
         end = round(self.now + timeout, 9)
+        self._watch_for(done)
         idle = 0
-        while not done():
-            before = self.now
-            if before >= end:
-                return False
-            self._go_on(end)
-            idle = idle + 1 if self.now == before else 0
-            if idle > _STUCK:
-                raise UserError(
-                    "The step given to every_cycle lets no simulated time pass.",
-                    "Let it send SYNC, or wait on the bus.",
-                )
-        return True
+        try:
+            while not self._look() and self.now < end:
+                before = self.now
+                self._go_on(end)
+                idle = idle + 1 if self.now == before else 0
+                if idle > _STUCK:
+                    raise UserError(
+                        "The step given to every_cycle lets no simulated time pass.",
+                        "Let it send SYNC, or wait on the bus.",
+                    )
+        finally:
+            self._watch_for(None)
+        return self._reached if self._reached is not None and self._reached <= end else None
 
     def statusword(self, role: Role) -> int:
         """6041h of a drive, from its object dictionary: whatever is mapped into its PDOs."""
@@ -158,9 +167,9 @@ class World:
         vx, vy, _ = self.truth().twist
         return math.hypot(vx, vy)
 
-    def note(self, text: str) -> None:
-        """Mark this instant in the timeline."""
-        self.notes.append(Note(self.now, text))
+    def note(self, instant: float, text: str) -> None:
+        """Mark an instant [s] in the timeline."""
+        self.notes.append(Note(instant, text))
 
     def _go_on(self, end: float) -> None:
         if self._step is not None:
@@ -175,6 +184,18 @@ class World:
         if message.timestamp >= self._next_sample:
             self._sample()
 
+    def _watch_for(self, done: Callable[[], bool] | None) -> None:
+        self._done = done
+        if done is not None:
+            self._reached = None
+
+    def _look(self) -> bool:
+        """Whether what is waited for has come, now or before; the first instant counts."""
+        if self._reached is None and self._done is not None and self._done():
+            self._reached = self.now
+        return self._reached is not None
+
     def _sample(self) -> None:
         self._next_sample = self.now + _SAMPLE_PERIOD
         self.samples.append(Sample(self.now, self.speed(), tuple(self.drive_state(role) for role in DRIVES)))
+        self._look()

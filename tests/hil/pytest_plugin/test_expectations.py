@@ -130,3 +130,19 @@ def test_samples_follow_the_vehicle_every_ten_milliseconds(world: World, master:
     steps = [later - earlier for earlier, later in pairwise(times)]
     assert max(steps[5:]) == pytest.approx(0.01, abs=0.0021)
     assert world.samples[-1].speed == pytest.approx(world.speed(), abs=0.02)
+
+
+def test_what_comes_true_within_a_step_that_takes_long_is_dated_and_not_missed(world: World, master: Master) -> None:
+    """A controller that stops a vehicle in one call: the wheels come to rest long before the call returns."""
+
+    def long_step() -> None:
+        for _ in range(250):
+            master._exchange((0.0,) * 4)
+
+    world.every_cycle(long_step)
+    begin = world.now
+    took = Expect(world)(after(world, begin + 0.2)).within(0.3)
+    assert took == pytest.approx(0.2, abs=0.015)
+    assert world.now - begin == pytest.approx(0.5, abs=0.01)
+    with pytest.raises(AssertionError):
+        Expect(world)(after(world, world.now + 0.4)).within(0.3)
