@@ -108,6 +108,21 @@ def test_a_wheel_on_ice_spins(vehicle: FmuVehicle) -> None:
     assert speeds[0] == pytest.approx(speeds[2], rel=0.05)
 
 
+def test_a_load_slows_it_down_by_its_mass(fmu: Path) -> None:
+    """Speeds after the same push: (1 - exp(-t D/M)) / (1 - exp(-t D/M')), M with the wheels' inertia, D = 4 d_vw/r²."""
+    parameters, seconds = load_vehicle().prior, 0.4
+
+    def speed(load: float) -> float:
+        with FmuVehicle(fmu, load_prototype(), seed=1) as vehicle:
+            vehicle.load(load)
+            drive_all(vehicle, 1.2, seconds)
+            return float(vehicle.instance.read(vehicle.instance.port(["x_dot"]))[0])
+
+    inertia, drag = parameters["m_ch"] + 4 * parameters["B_w"] / 0.1**2, 4 * parameters["d_vw"] / 0.1**2
+    light, heavy = (1 - np.exp(-seconds * drag / mass) for mass in (inertia, inertia + 800.0))
+    assert speed(0.0) / speed(800.0) == pytest.approx(light / heavy, rel=2e-3)
+
+
 def test_equal_seeds_give_equal_readings(fmu: Path) -> None:
     readings = []
     for _ in range(2):
