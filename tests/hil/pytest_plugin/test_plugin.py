@@ -9,6 +9,11 @@ from pathlib import Path
 import can
 import pytest
 
+# Each run in this process forgets what it has loaded; what is heavy and loaded here stays.
+import hil.master
+import hil.pytest_plugin.recording
+import hil.testing  # noqa: F401
+
 pytest_plugins = ["pytester"]
 
 
