@@ -3,7 +3,8 @@
 Two runs differ by the effect alone. What the eleven columns of the model can absorb of the difference is no gap; the
 rest, rms over moving samples, is taken in the coordinate where it is largest against its noise, and divided by the
 period-to-period rms of that coordinate. Effects that move no torque but break the rolling constraints have the same
-measure there.
+measure there, over the rms of what odometry leaves of the constraints without any effect: the last bits of an
+alignment repeat in every period, but not in the next campaign.
 
 The two runs are driven without noise, so that they differ by nothing else: with it, an alignment more or less shifts
 all noise that follows. The noise is that of a third run.
@@ -31,11 +32,11 @@ _PROCESSING = Processing()
 
 @dataclass(frozen=True)
 class Noise:
-    """Period-to-period rms of a vehicle without effects.
+    """Of a vehicle without effects.
 
     Attributes:
-        torques: of each generalized torque, by step and coordinate [Nm or N].
-        slips: of what odometry leaves of the eight constraints, by step (8,) [m/s].
+        torques: period-to-period rms of each generalized torque, by step and coordinate [Nm or N].
+        slips: rms of what odometry leaves of the eight constraints, by step (8,) [m/s].
     """
 
     torques: Mapping[tuple[str, str], float]
@@ -133,6 +134,4 @@ def _slip_size(plain: Segment, changed: Segment, noise: Array, geometry: Geometr
 
 def _slip_noise(segment: Segment, geometry: Geometry) -> Array:
     slips, moving = _slips(segment, geometry)
-    folded = np.stack([slips[segment.period == number] for number in segment.periods])
-    moved = np.stack([moving[segment.period == number] for number in segment.periods]).all(axis=0)
-    return np.asarray(np.sqrt(folded[:, moved].var(axis=0, ddof=1).mean(axis=0)))
+    return np.asarray(np.sqrt(np.mean(slips[moving] ** 2, axis=0)))

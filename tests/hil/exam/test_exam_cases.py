@@ -1,0 +1,88 @@
+"""What an exam asks: balanced over effects and sizes, in an order that tells nothing."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from emulator.effects.injection import inject
+from emulator.prototype import load_prototype
+from hil.exam.cases import SIZES, Case, Composition, Kind, case_from_json, draw_cases
+from hil.exam.sealing import effect_of
+from hil.exam.sizes import EffectSize, SizeTable
+from ident.errors import UserError
+from ident.vehicle.effects import EFFECTS
+
+
+def test_there_are_as_many_of_each_kind_as_asked_for(cases: list[Case]) -> None:
+    counts = Counter(case.kind for case in cases)
+    assert counts == {Kind.EFFECT: 240, Kind.PAIR: 24, Kind.NONE: 60, Kind.UNKNOWN: 40, Kind.INVISIBLE: 24}
+
+
+def test_effects_and_sizes_are_balanced(cases: list[Case], table: SizeTable) -> None:
+    singles = [case for case in cases if case.kind is Kind.EFFECT]
+    names = Counter(case.effects[0].name for case in singles)
+    assert set(names) == {row.name for row in table.visible}
+    assert max(names.values()) - min(names.values()) <= 1
+    sizes = Counter(case.noise_units for case in singles)
+    assert set(sizes) == set(SIZES)
+    assert max(sizes.values()) - min(sizes.values()) <= 2
+    for name in names:
+        held = Counter(case.noise_units for case in singles if case.effects[0].name == name)
+        assert max(held.values()) - min(held.values()) <= 1
+
+
+def test_every_effect_of_the_library_is_in_the_table_at_every_place(table: SizeTable) -> None:
+    listed = {(row.name, row.where) for row in (*table.visible, *table.invisible)}
+    assert listed == {(str(spec.name), where) for spec in EFFECTS.values() for where in spec.places}
+
+
+def test_at_least_four_effects_have_no_candidate(table: SizeTable) -> None:
+    assert len({row.name for row in table.unknown}) >= 4
+    assert not {row.name for row in table.unknown} & {str(name) for name in EFFECTS}
+
+
+def test_the_emulator_can_have_every_effect_that_is_drawn(cases: list[Case]) -> None:
+    prototype = load_prototype()
+    for case in cases:
+        inject(prototype, [effect_of(injected) for injected in case.effects], 1e-3)
+
+
+def test_identifiers_are_unique_and_seeds_are_not_shared(cases: list[Case]) -> None:
+    assert len({case.identifier for case in cases}) == len(cases)
+    seeds = [seed for case in cases for seed in (case.seed, case.seed + 1)]
+    assert len(set(seeds)) == len(seeds)
+    assert min(seeds) == 500_001
+
+
+def test_the_order_tells_nothing_of_the_kind(cases: list[Case]) -> None:
+    """Runs test: the number of changes between `none` and others is that of a shuffled sequence."""
+    is_none = np.array([case.kind is Kind.NONE for case in cases])
+    runs = 1 + int(np.sum(is_none[1:] != is_none[:-1]))
+    n, m = int(is_none.sum()), int((~is_none).sum())
+    mean = 1 + 2 * n * m / (n + m)
+    deviation = np.sqrt((mean - 1) * (mean - 2) / (n + m - 1))
+    assert abs(runs - mean) < 4 * deviation
+
+
+def test_two_effects_of_a_pair_have_different_names(cases: list[Case]) -> None:
+    pairs = [case for case in cases if case.kind is Kind.PAIR]
+    assert all(len({effect.name for effect in case.effects}) == 2 for case in pairs)
+
+
+def test_a_case_survives_being_written(cases: list[Case]) -> None:
+    assert [case_from_json(case.as_json()) for case in cases] == cases
+
+
+def test_a_size_goes_through_the_points_measured() -> None:
+    row = EffectSize("x", "y", "z", "1", "torque", ((0.1, 1.0), (0.4, 4.0), (0.5, 8.0)), 1.0, False, True)
+    assert row.physical(4.0) == pytest.approx(0.4)
+    assert row.physical(2.0) == pytest.approx(0.2)
+    assert row.physical(0.5) == pytest.approx(0.05)
+
+
+def test_a_kind_without_effects_is_refused(table: SizeTable) -> None:
+    with pytest.raises(UserError, match="no effect of a kind"):
+        draw_cases(SizeTable((), (), ()), Composition(4, 0, 0, 0, 0), 1, np.random.default_rng(0))
