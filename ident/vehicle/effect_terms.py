@@ -7,7 +7,7 @@ With effects, (14) reads
 | symbol | here | what of the effects is in it |
 |---|---|---|
 | p′ | `changed_parameters` | `parameter_change` |
-| f | `added_forces` | friction, drag, slope, centre of mass, payload, steering units, scrub |
+| f | `added_forces` | friction, drag, slope, centre of mass, payload, steering units, scrub, weight on a wheel |
 | u′ | `shaft_torques` | gain, bias and ripple of the drives; u is what they report |
 | A′ | `rolling_radii` | radius and eccentricity of the wheels |
 | α′ | `true_steering` | zero errors of the steering encoders; α is what they report |
@@ -265,6 +265,14 @@ def _steering_unit_mass(term: EffectTerm, state: State, mass: Expression) -> Exp
     return term["mass"] * rows
 
 
+def _eccentricity(term: EffectTerm, state: State, mass: Expression) -> Expression:
+    """A quarter of the weight goes up and down with the axle: ∂/∂β of (m g/4) amplitude cos(β + phase)."""
+    wheel = WHEEL_PLACES.index(term.where)
+    rows = ca.SX.zeros(9)
+    rows[_FIRST_WHEEL + wheel] = -mass * GRAVITY / 4 * term["amplitude"] * ca.sin(state.beta[wheel] + term["phase"])
+    return rows
+
+
 def _tilted_centre(terms: Sequence[EffectTerm], state: State, mass: Expression) -> Expression:
     """Weight along the floor, acting at the centre of mass."""
     rows = ca.SX.zeros(9)
@@ -302,5 +310,6 @@ _FORCES: Final[Mapping[EffectName, Callable[[EffectTerm, State, Any], Expression
         EffectName.PAYLOAD: _payload,
         EffectName.SCRUB: _scrub,
         EffectName.STEERING_UNIT_MASS: _steering_unit_mass,
+        EffectName.WHEEL_ECCENTRICITY: _eccentricity,
     }
 )

@@ -116,9 +116,11 @@ def dynamic_rows(mode: Mode | None, z: _Inputs, parameters: Expression, terms: S
     state = State(z.heading, alpha, z.beta, rates, accelerations)
     inertial = symbolic.regressor(rates, accelerations) @ changed_parameters(terms, parameters)
     driving = symbolic.input_matrix() @ shaft_torques(terms, z.torques, z.beta)
-    total = inertial + added_forces(terms, state, parameters) - driving
     if mode is None:
-        return total[5:]
+        # No weight rests on a wheel in the air.
+        weightless = [term for term in terms if term.name is not EffectName.WHEEL_ECCENTRICITY]
+        return (inertial + added_forces(weightless, state, parameters) - driving)[5:]
+    total = inertial + added_forces(terms, state, parameters) - driving
     return on_radii(symbolic.complement(mode, alpha), radii).T @ total
 
 

@@ -170,6 +170,19 @@ def test_a_motor_gives_what_gain_bias_and_ripple_make_of_the_report(vehicle: Veh
     assert np.allclose(true, [1.1, 0.8, 1.0, 1.0 + ripple])
 
 
+def test_the_weight_on_an_eccentric_wheel_does_the_work_of_lifting_it(
+    state: terms.State, vehicle: VehicleDescription
+) -> None:
+    """Power of the force is the rate of N (r + e cos(β + φ)), by differences."""
+    e, phase, beta = 2e-4, 0.3, np.asarray(state.beta, dtype=float)
+    values = {"amplitude": e, "phase": phase}
+    force = forces(EffectName.WHEEL_ECCENTRICITY, "wheel_fr", state, vehicle, **values)
+    weight, step = vehicle.prior["m_ch"] * terms.GRAVITY / 4, 1e-6
+    height = [weight * e * np.cos(beta[2] + turn + phase) for turn in (-step, step)]
+    assert force[7] == pytest.approx((height[1] - height[0]) / (2 * step), rel=1e-6)
+    assert np.count_nonzero(force) == 1
+
+
 def test_wheels_on_other_radii_still_roll(vehicle: VehicleDescription) -> None:
     effects = [
         terms.term_of(make_effect(EffectName.WHEEL_RADIUS, "wheel_fl", {"error": -0.002})),
