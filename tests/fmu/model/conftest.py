@@ -171,10 +171,14 @@ CoreOf = Callable[..., Core]
 
 @pytest.fixture(scope="session")
 def core_of(tmp_path_factory: pytest.TempPathFactory) -> CoreOf:
-    """Compiles a model for a vehicle, effects and kind of inputs."""
+    """Compiles a model for a vehicle, effects and kind of inputs, once each."""
+    built: dict[tuple[str, ...], Core] = {}
 
     def build(vehicle: str = "prototype", effects: Sequence[Effect] = (), inputs: Inputs = Inputs.TORQUE) -> Core:
-        return Core(tmp_path_factory.mktemp("core"), vehicle, effects, inputs)
+        key = (vehicle, inputs, *map(str, effects))
+        if key not in built:
+            built[key] = Core(tmp_path_factory.mktemp("core"), vehicle, effects, inputs)
+        return built[key]
 
     return build
 

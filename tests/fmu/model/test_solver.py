@@ -185,4 +185,20 @@ def test_whatever_it_is_given_it_answers_with_finite_numbers_or_with_an_error(
         values = [instance.blocks[block] for block in (Block.STATE, Block.OUTPUT)]
         assert np.isfinite(np.concatenate(values)).all()
     else:
-        assert any(row.name in outcome.message for row in speed_controlled.table.variables) or "step" in outcome.message
+        names = [row.name for row in speed_controlled.table.variables]
+        assert any(name in outcome.message for name in [*names, "step"])
+
+
+def test_halving_the_step_divides_the_error_by_eight(prototype: Any) -> None:
+    """Order three, on a vehicle soft enough for steps to be compared: nothing is rejected, every step has one length."""
+    soft = {"creep_stiffness": 5e2, "epsilon": 50.0, "stick_time": 100.0}
+    start = prototype.new(alpha_l=0.3, alpha_r=0.2, torque_fl=1.5, torque_rl=1.2, torque_fr=1.4, torque_rr=1.0, **soft)
+    expected, errors = reference(start, 0.32), []
+    for length in (0.005, 0.0025, 0.00125):
+        instance = start.copy()
+        instance.raw.tolerance, instance.raw.step_length = 1e9, 1.0
+        for _ in range(round(0.32 / length)):
+            instance.step(length)
+        errors.append(np.abs(instance.x[:9] - expected[:9]).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(3.0, abs=0.1)
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(3.0, abs=0.1)
