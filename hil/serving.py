@@ -141,7 +141,8 @@ class VehicleServer:
         else:
             self._devices = make(self._port.send_data)
         self._grid = self._devices.time
-        self._behind = clock.now() - self._devices.time
+        self._behind = 0.0
+        self._served = False
         self._stepping = False
         self._last_sync = 0.0
         self.report = ServingReport()
@@ -149,6 +150,9 @@ class VehicleServer:
     def serve(self, stop: Callable[[], bool]) -> ServingReport:
         """Serve until `stop()`, which is asked at least every millisecond of idleness."""
         with steady_memory():
+            if not self._served:
+                # Simulated time begins here: putting memory in order has taken real time.
+                self._served, self._behind = True, self._clock.now() - self._devices.time
             while not stop():
                 frame = self._port.take(self._patience())
                 if frame is None:
