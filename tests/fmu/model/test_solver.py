@@ -190,7 +190,7 @@ def test_whatever_it_is_given_it_answers_with_finite_numbers_or_with_an_error(
 
 
 def test_halving_the_step_divides_the_error_by_eight(prototype: Any) -> None:
-    """Order three, on a vehicle soft enough for steps to be compared: nothing is rejected, every step has one length."""
+    """Order three, on a vehicle soft enough for it to show; nothing is rejected, every step has one length."""
     soft = {"creep_stiffness": 5e2, "epsilon": 50.0, "stick_time": 100.0}
     start = prototype.new(alpha_l=0.3, alpha_r=0.2, torque_fl=1.5, torque_rl=1.2, torque_fr=1.4, torque_rr=1.0, **soft)
     expected, errors = reference(start, 0.32), []
