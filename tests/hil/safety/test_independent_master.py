@@ -20,7 +20,7 @@ FORWARD = {1: 1, 2: 1, 3: -1, 4: -1}
 """Node -> sign of a shaft that rolls its wheel forward; the right side is mounted the other way round."""
 
 MASTER = 127
-PATIENCE = 20.0
+PATIENCE = 30.0
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def nodes(bus_name: str) -> Iterator[dict[int, BaseNode402]]:
     network.NOTIFIER_SHUTDOWN_TIMEOUT = 2.0
     made = {number: BaseNode402(number, str(DEFAULT_NETWORK.with_name("drive.eds"))) for number in FORWARD}
     for node in made.values():
-        node.sdo.RESPONSE_TIMEOUT = 5.0
+        node.sdo.RESPONSE_TIMEOUT = PATIENCE
         # The machine that runs this may be busy with other things.
         node.TIMEOUT_CHECK_TPDO = node.TIMEOUT_SWITCH_OP_MODE = PATIENCE
         node.TIMEOUT_SWITCH_STATE_FINAL = node.TIMEOUT_SWITCH_STATE_SINGLE = PATIENCE
