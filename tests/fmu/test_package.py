@@ -169,6 +169,7 @@ def test_the_system_s_compiler_builds_for_this_computer_alone() -> None:
     assert "ziglang" in error.value.remedy
 
 
+@pytest.mark.slow
 def test_the_system_s_compiler_will_do(source: ModelSource, need: Callable[[str], str], tmp_path: Path) -> None:
     compiler = Compiler("gcc", (need("gcc"),), cross=False)
     content = build_fmu(source, Order(FmiVersion.FMI2, Inputs.TORQUE, (host_platform(),)), compiler, cache=tmp_path)
