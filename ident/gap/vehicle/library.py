@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Final
 
@@ -27,11 +27,13 @@ class Shape:
     Attributes:
         linear: parameters in which the rows are linear near zero.
         angle: of the first of them, where the pair is a size and a direction or phase; two columns then.
+        simple: whether the angle zero is tried alone too, with one column: the other may show next to nothing.
         tried: values of nonlinear parameters.
     """
 
     linear: tuple[str, ...]
     angle: str | None = None
+    simple: bool = False
     tried: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
@@ -46,7 +48,7 @@ SHAPES: Final[Mapping[EffectName, Shape]] = MappingProxyType(
         EffectName.ASYMMETRIC_COULOMB: Shape(("imbalance",)),
         EffectName.ASYMMETRIC_VISCOUS: Shape(("imbalance",)),
         EffectName.QUADRATIC_DRAG: Shape(("coefficient",)),
-        EffectName.SLOPE: Shape(("angle",), angle="direction"),
+        EffectName.SLOPE: Shape(("angle",), angle="direction", simple=True),
         EffectName.COM_OFFSET: Shape(("x", "y")),
         EffectName.PAYLOAD: Shape(("mass", "inertia")),
         EffectName.TORQUE_GAIN: Shape(("error",)),
@@ -120,7 +122,8 @@ def term_causes(names: Sequence[EffectName]) -> list[TermCause]:
 def _variants(name: EffectName, where: str) -> list[UnitVariant]:
     shape = SHAPES[name]
     grid = itertools.product(*shape.tried.values())
-    return [_variant(name, where, shape, dict(zip(shape.tried, values, strict=True))) for values in grid]
+    alone = [_variant(name, where, replace(shape, angle=None), {})] if shape.simple else []
+    return alone + [_variant(name, where, shape, dict(zip(shape.tried, values, strict=True))) for values in grid]
 
 
 def _variant(name: EffectName, where: str, shape: Shape, held: dict[str, float]) -> UnitVariant:
