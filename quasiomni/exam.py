@@ -56,6 +56,9 @@ def seal(
     order = SealingOrder(out, "prototype", composition, first_seed, jobs, scheduler)
     with _bar("sealing") as shown:
         sealed = seal(order, load_sizes(sizes), shown)
+    undriven = sum(ExamFolder(out).undriven(name).is_file() for name in sealed.identifiers)
+    if undriven:
+        console.print(f"[yellow]{undriven} cases stopped the campaign and have no records.[/yellow]")
     console.print(f"{len(sealed.identifiers)} cases. SHA-256 of the sealed answer: {sealed.answer_hash}")
     console.print(f"Next: [bold]quasiomni exam diagnose {out}[/bold]")
 

@@ -65,7 +65,9 @@ def diagnose_exam(
     progress: Progress,
     removed: Mapping[str, str] | None = None,
 ) -> None:
-    """Diagnose all cases that have no answer yet.
+    """Diagnose all cases that have records and no answer yet.
+
+    The order of the cases is random, so those of an exam that is sealed in part are a fair sample of it.
 
     Args:
         folder: of the exam.
@@ -75,15 +77,26 @@ def diagnose_exam(
         removed: candidate that is taken out of the library, by case; all of them are left in without.
 
     Raises:
-        UserError: there is no exam, or records are missing.
+        UserError: there is no exam, or it has no records yet.
     """
     forbid_emulator()
     exam = read_exam(folder)
-    asked = [identifier for identifier in exam.identifiers if removed is None or identifier in removed]
+    there = [identifier for identifier in exam.identifiers if folder.complete(identifier)]
+    if not there:
+        raise UserError(
+            f"{folder.path} holds no records yet.", "Seal first: quasiomni exam seal goes on where it stopped."
+        )
+    asked = [identifier for identifier in there if removed is None or identifier in removed]
     left = [identifier for identifier in asked if not folder.diagnosis(identifier, removed is not None).is_file()]
     vehicle, model = (path.read_text(encoding="utf-8") for path in (folder.vehicle, folder.model))
     tasks = (
-        (identifier, *_contents(folder, identifier), vehicle, model, (removed or {}).get(identifier))
+        (
+            identifier,
+            *(folder.record(identifier, which).read_bytes() for which in RECORDS),
+            vehicle,
+            model,
+            (removed or {}).get(identifier),
+        )
         for identifier in left
     )
     progress(len(asked) - len(left), len(asked))
@@ -121,12 +134,3 @@ def diagnose_case(
         # One case that fails must not end an exam of hours; it counts as a wrong answer.
         content = {**_FAILED, "error": repr(error)}
     return identifier, json.dumps({**content, "seconds": time.process_time() - started}).encode()
-
-
-def _contents(folder: ExamFolder, identifier: str) -> list[bytes]:
-    try:
-        return [folder.record(identifier, which).read_bytes() for which in RECORDS]
-    except OSError as error:
-        raise UserError(
-            f"{error.filename} is missing.", "Finish sealing: quasiomni exam seal goes on where it stopped."
-        ) from error

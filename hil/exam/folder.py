@@ -57,6 +57,14 @@ class ExamFolder:
         """One of the RECORDS of a case."""
         return self.path / "cases" / f"{identifier}.{which}.parquet"
 
+    def complete(self, identifier: str) -> bool:
+        """Whether both records of a case are there."""
+        return all(self.record(identifier, which).is_file() for which in RECORDS)
+
+    def undriven(self, identifier: str) -> Path:
+        """Why a case could not be driven; sealed with the answer."""
+        return self.path / "sealed" / f"{identifier}.txt"
+
     def diagnosis(self, identifier: str, removed: bool = False) -> Path:
         """What the diagnosing side answered; with the true candidate removed, or with all."""
         return self.path / ("diagnoses_without" if removed else "diagnoses") / f"{identifier}.json"

@@ -72,8 +72,10 @@ class SealingOrder:
 def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
     """Seal an exam, or go on with one that was stopped.
 
+    A case whose effects stop the campaign has no records: what was wrong is sealed with the answer.
+
     Raises:
-        UserError: the folder holds another exam, or a case cannot be driven.
+        UserError: the folder holds another exam.
     """
     folder = ExamFolder(order.out)
     if not folder.manifest.is_file():
@@ -86,29 +88,31 @@ def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
     done = len(cases) - len(left)
     progress(done, len(cases))
     for identifier, contents in run_all(drive_case, tasks, jobs=order.jobs, scheduler=order.scheduler):
-        for which, content in zip(RECORDS, contents, strict=True):
-            path = folder.record(identifier, which)
-            write_atomically(path, content)
-            os.utime(path, _EPOCH)
+        if isinstance(contents, str):
+            write_atomically(folder.undriven(identifier), contents.encode())
+        else:
+            _write_records(folder, identifier, contents)
         done += 1
         progress(done, len(cases))
     return exam
 
 
-def drive_case(plans: str, prototype: str, cycle: float, case: Case) -> tuple[str, tuple[bytes, bytes]]:
-    """Both records of a case; runs in a worker.
+def _write_records(folder: ExamFolder, identifier: str, contents: tuple[bytes, bytes]) -> None:
+    for which, content in zip(RECORDS, contents, strict=True):
+        path = folder.record(identifier, which)
+        write_atomically(path, content)
+        os.utime(path, _EPOCH)
 
-    Raises:
-        UserError: the vehicle cannot be driven with these effects.
-    """
+
+def drive_case(plans: str, prototype: str, cycle: float, case: Case) -> tuple[str, tuple[bytes, bytes] | str]:
+    """Both records of a case, or why the vehicle cannot be driven with its effects; runs in a worker."""
     both = _plans(plans, prototype, cycle)
     effects = [effect_of(injected) for injected in case.effects]
     try:
         fit = drive(both.fit, prototype, case.seed, effects)
         confirm = drive(both.confirm, prototype, case.seed + 1, effects)
     except UserError as error:
-        what = ", ".join(f"{effect.name}@{effect.where}={effect.size:g}" for effect in case.effects)
-        raise UserError(f"Case {case.identifier} ({what}) was not driven: {error.what}", error.remedy) from error
+        return case.identifier, f"{error.what} {error.remedy}\n"
     return case.identifier, (record_bytes(fit), record_bytes(confirm))
 
 
@@ -152,4 +156,4 @@ def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
 
 
 def _finished(folder: ExamFolder, identifier: str) -> bool:
-    return all(folder.record(identifier, which).is_file() for which in RECORDS)
+    return folder.complete(identifier) or folder.undriven(identifier).is_file()

@@ -1,0 +1,68 @@
+"""An exam of two cases from drawing to score, with the command line, in processes of their own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from hil.exam.folder import RECORDS, ExamFolder, read_exam
+from ident.records.files import read_record
+
+pytestmark = pytest.mark.slow
+
+CASES = ["--effects", "0", "--pairs", "0", "--none", "1", "--unknown", "1", "--invisible", "0"]
+
+
+def quasiomni(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "quasiomni", *arguments], capture_output=True, text=True, timeout=1800, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> ExamFolder:
+    path = tmp_path_factory.mktemp("exam") / "exam"
+    sealed = quasiomni("exam", "seal", "--out", str(path), "--first-seed", "901", "--jobs", "1", *CASES)
+    assert sealed.returncode == 0, sealed.stderr
+    return ExamFolder(path)
+
+
+def test_all_records_have_one_size_and_one_date(folder: ExamFolder) -> None:
+    for which in RECORDS:
+        stats = [folder.record(name, which).stat() for name in read_exam(folder).identifiers]
+        assert len({(stat.st_size, stat.st_mtime) for stat in stats}) == 1
+
+
+def test_a_record_holds_the_four_steps_and_their_repeats(folder: ExamFolder) -> None:
+    for which in RECORDS:
+        record = read_record(folder.record(read_exam(folder).identifiers[0], which))
+        assert record.steps == ["steering_left", "steering_right", "straight", "rotation"]
+        assert all(segment.periods == [0, 1, 2, 3] for segment in record.segments)
+
+
+def test_sealing_again_changes_nothing(folder: ExamFolder) -> None:
+    before = folder.answer.read_bytes()
+    again = quasiomni("exam", "seal", "--out", str(folder.path), "--first-seed", "901", "--jobs", "1", *CASES)
+    assert again.returncode == 0, again.stderr
+    assert folder.answer.read_bytes() == before
+
+
+def test_another_exam_is_not_sealed_into_the_same_folder(folder: ExamFolder) -> None:
+    other = quasiomni("exam", "seal", "--out", str(folder.path), "--first-seed", "7", "--jobs", "1", *CASES)
+    assert other.returncode == 2
+    assert "another exam" in " ".join(other.stderr.split())
+
+
+def test_the_exam_is_diagnosed_and_scored(folder: ExamFolder) -> None:
+    diagnosed = quasiomni("exam", "diagnose", str(folder.path), "--jobs", "1")
+    assert diagnosed.returncode == 0, diagnosed.stderr
+    answers = [json.loads(folder.diagnosis(name).read_text()) for name in read_exam(folder).identifiers]
+    assert all(answer["verdict"] in ("effect", "none", "unknown") for answer in answers)
+    scored = quasiomni("exam", "score", str(folder.path))
+    assert scored.returncode == 0, scored.stderr
+    score = json.loads((folder.path / "score.json").read_text())
+    assert score["cases"] == 2
+    assert (folder.path / "reliability.svg").is_file()
