@@ -89,7 +89,7 @@ def test_enable_move_quick_stop_fault_reset_and_home(nodes: dict[int, BaseNode40
     for node in nodes.values():
         node.sdo[0x60FF].raw = FORWARD[node.id] * 5 * COUNTS
     wait_for(lambda: all(abs(speed(node) - 5.0) < 0.1 for node in nodes.values()))
-    assert all(node.sdo[0x6041].raw & 1 << 10 for node in nodes.values()), "target reached"
+    wait_for(lambda: all(node.sdo[0x6041].raw & 1 << 10 for node in nodes.values()))
     wait_for(lambda: nodes[1].sdo[0x6064].raw > start + 5 * COUNTS)
     assert abs(nodes[1].sdo[0x6077].raw) > 20, "friction asks for torque"
 
