@@ -9,7 +9,7 @@ from typing import Final
 from hil.exam.driving import drive
 from hil.exam.noise_units import Noise, SizeInNoise, noise_of, size_in_noise
 from hil.exam.plans import plan_exam
-from hil.exam.probes import CURVED, DRIFTS, KINEMATIC, SHARE, SIGNED, Probe, all_probes
+from hil.exam.probes import CURVED, DRIFTS, SHARE, SIGNED, Probe, all_probes
 from hil.exam.quiet import drive_quietly
 from hil.exam.sealing import effect_of
 from hil.exam.sizes import EffectSize
@@ -30,6 +30,9 @@ NOISE_SEED: Final = 11
 CLEAR: Final = 0.8
 """Noise units from which on a probe counts: below, the last bits of where the wheels came to rest after an alignment
 differ as much between two runs as the effect makes them."""
+
+NEGLIGIBLE: Final = 0.1
+"""The same for effects that are not proportional to their size, whose small points shape the curve."""
 
 VISIBLE: Final = 1.0
 """Noise units that an effect must reach at its largest size to be one that these campaigns show."""
@@ -96,21 +99,30 @@ def _of_share(probe: Probe, share: float) -> float:
 
 
 def _row(probe: Probe, measured: Sequence[tuple[float, SizeInNoise]]) -> EffectSize:
-    channel = "drift" if probe.name in DRIFTS else "kinematic" if probe.name in KINEMATIC else "torque"
-    points = [(size, float(getattr(units, channel))) for size, units in measured]
-    clear = tuple(point for point in points if point[1] > CLEAR) or tuple(points[-1:])
-    visible = bool(points) and max(units for _, units in points) >= VISIBLE
+    channel, points = _seen_in(probe, measured)
     return EffectSize(
         name=str(probe.name),
         where=probe.where,
         parameter=probe.parameter,
         unit=probe.unit,
         channel=channel,
-        points=_ascending(clear) if visible else (),
+        points=points,
         largest=probe.largest,
         signed=probe.name in SIGNED,
         known=probe.known,
     )
+
+
+def _seen_in(
+    probe: Probe, measured: Sequence[tuple[float, SizeInNoise]]
+) -> tuple[str, tuple[tuple[float, float], ...]]:
+    """The channel that shows the effect, and its points there; no points where none does."""
+    for channel in ("drift",) if probe.name in DRIFTS else ("torque", "kinematic"):
+        points = [(size, float(getattr(units, channel))) for size, units in measured]
+        if any(units >= VISIBLE for _, units in points):
+            least = NEGLIGIBLE if probe.name in CURVED else CLEAR
+            return channel, _ascending([point for point in points if point[1] > least])
+    return "torque", ()
 
 
 def _ascending(points: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:

@@ -29,9 +29,6 @@ SIGNED: Final = frozenset(
 DRIFTS: Final = frozenset({EffectName.PAYLOAD, EffectName.PARAMETER_CHANGE})
 """Effects that the model's own columns absorb: measured without that."""
 
-KINEMATIC: Final = frozenset({EffectName.WHEEL_RADIUS, EffectName.STEERING_OFFSET})
-"""Effects that show in the rolling constraints long before they show in a torque."""
-
 PRACTICAL: Final[Mapping[EffectName, Mapping[str, float]]] = MappingProxyType(
     {
         EffectName.STRIBECK: {"steering": 6.0, "wheel": 2.0, "wheels": 1.0},
@@ -50,7 +47,7 @@ PRACTICAL: Final[Mapping[EffectName, Mapping[str, float]]] = MappingProxyType(
         EffectName.WHEEL_RADIUS: {"wheel": 1e-3},
         EffectName.WHEEL_ECCENTRICITY: {"wheel": 3e-4},
         EffectName.STEERING_OFFSET: {"steering": 0.01},
-        EffectName.SLIP: {"wheel": 0.04, "chassis": 0.04},
+        EffectName.SLIP: {"wheel": 0.12, "chassis": 0.15},
         EffectName.SCRUB: {"steering": 6.0, "chassis": 12.0},
         EffectName.STEERING_UNIT_MASS: {"chassis": 8.0},
         EffectName.PARAMETER_CHANGE: {
@@ -85,7 +82,7 @@ SHARE: Final = 0.6
 """Of the largest size, at which an effect is driven that is proportional to its size, or nearly so."""
 
 CURVED: Final[Mapping[EffectName, tuple[float, ...]]] = MappingProxyType(
-    {EffectName.SLIP: (0.4, 0.6, 1.0), EffectName.BACKLASH: (0.2, 0.6)}
+    {EffectName.SLIP: (0.4, 0.6, 0.8), EffectName.BACKLASH: (0.2, 0.6)}
 )
 """Shares of the effects that are not: a threshold, a play that is smaller than a stroke."""
 
