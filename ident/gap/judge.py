@@ -32,12 +32,14 @@ class Limits:
         size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
         improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
+        minor: log evidence over that of the strongest effect above which one counts that closes less.
     """
 
     deviations: float = 3.0
     size: float = 0.25
     explained: float = 0.5
     improvement: float = 0.01
+    minor: float = 0.05
 
 
 @dataclass(frozen=True)
@@ -124,11 +126,11 @@ def judge(
     # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
         regression = Regression(fit, make_rows(fit, confirm), settings or Settings(), seed)
-        found, limits = search(regression), limits or Limits()
-        judgement = _Judgement((fit, confirm), regression, found, limits, seed)
+        found = search(regression)
+        judgement = _Judgement((fit, confirm), regression, found, limits or Limits(), seed)
         while (kept := judgement.worthwhile()) != found.variants:
             found = concluded(regression, kept)
-            judgement = _Judgement((fit, confirm), regression, found, limits, seed)
+            judgement = _Judgement((fit, confirm), regression, found, limits or Limits(), seed)
         return judgement.findings()
 
 
@@ -174,8 +176,10 @@ class _Judgement:
         if len(variants) < 2:
             return variants
         closed = [self._closed(index) for index in range(len(variants))]
-        least = int(np.argmin(closed))
-        return variants if closed[least] >= self.limits.improvement else self._others(least)
+        evidence = [self._log_evidence(index) for index in range(len(variants))]
+        least = int(np.argmin(evidence))
+        minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
+        return self._others(least) if minor else variants
 
     def _log_evidence(self, index: int) -> float:
         return float(self.found.slots[index].evidence.log_evidence[self.found.variants[index]])

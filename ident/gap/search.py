@@ -18,16 +18,22 @@ from numpy.typing import NDArray
 from ident.gap.evidence import Directions, Evidence, White, best_pair, directions, gather
 from ident.gap.problem import Problem
 from ident.gap.rows import Rows
-from ident.gap.whitening import Whitener, fit_whitener
+from ident.gap.whitening import ORDER, Whitener, fit_whitener
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+LARGE: Final = 0.2
+"""Part of the sum of squares, colour apart, from which a candidate is taken off too: whitening can hide it."""
 ROWS_PER_CONTENDER: Final = 40
 CONTENDING: Final = 12.0
 """Likelihood ratio from which a candidate is taken off: what chance alone seldom reaches is not taken for noise."""
 CONTENDERS: Final = 12
 """Candidates that are taken off before the colour of the noise is found."""
+
+
+SILENT = 1e-12
+"""Rms, in whatever unit, of a group that leaves nothing at all, as ideal records do."""
 
 
 @dataclass(frozen=True)
@@ -108,19 +114,22 @@ class Regression:
         Were the colour that of the whole residual, an effect of long memory would be taken for noise of long memory
         and whitened away. What the best candidates can explain is therefore taken off first, believed or not.
         """
-        plain = self._colour(variants)
-        best = self._best(directions(self.white(plain, variants), self.rows.layout), variants)
-        return self._colour((*variants, *best[: min(CONTENDERS, len(self.rows) // ROWS_PER_CONTENDER)]))
+        plain, flat = self._colour(variants), self._colour(variants, order=0)
+        best = self._best(directions(self.white(plain, variants), self.rows.layout), variants, CONTENDING)
+        level = directions(self.white(flat, variants), self.rows.layout)
+        large = self._best(level, variants, LARGE * float(level.residual @ level.residual))
+        most = min(CONTENDERS, len(self.rows) // ROWS_PER_CONTENDER)
+        return self._colour((*variants, *_one_each([*large[:most], *best[:most]], self.owners)))
 
-    def _colour(self, variants: Sequence[int]) -> Whitener:
+    def _colour(self, variants: Sequence[int], order: int = ORDER) -> Whitener:
         """Colour of what the baseline and these variants leave, fitted by turns with them."""
         design = np.hstack([self.rows.baseline, self.columns_of(variants)])
         weighted = np.column_stack([design, self.rows.target]) / self._scale[:, None]
         residual = self.rows.target - design @ least_squares(weighted[:, :-1], weighted[:, -1])
-        whitener = fit_whitener(self.rows, residual, design.shape[1])
+        whitener = fit_whitener(self.rows, residual, design.shape[1], order)
         white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
         residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
-        return fit_whitener(self.rows, residual, design.shape[1])
+        return fit_whitener(self.rows, residual, design.shape[1], order)
 
     @cached_property
     def _scale(self) -> Array:
@@ -130,16 +139,17 @@ class Regression:
             place = self.rows.group == group
             baseline, target = self.rows.baseline[place], self.rows.target[place]
             left = target - baseline @ least_squares(baseline, target)
-            scale[place] = max(float(np.sqrt(np.mean(left**2))), np.finfo(float).tiny)
+            size = float(np.sqrt(np.mean(left**2)))
+            scale[place] = size if size > SILENT else 1.0
         return scale
 
-    def _best(self, found: Directions, given: Sequence[int]) -> list[int]:
-        """The best variant of every candidate that is not given, by likelihood ratio."""
+    def _best(self, found: Directions, given: Sequence[int], least: float) -> list[int]:
+        """The best variant of every candidate that is not given, by likelihood ratio, if that exceeds `least`."""
         ratios = found.ratios(found.basis.T @ found.residual)
         taken = {self.owners[variant] for variant in given}
         best: dict[int, int] = {}
         for variant in np.argsort(ratios)[::-1].tolist():
-            if self.owners[variant] not in taken and ratios[variant] > CONTENDING:
+            if self.owners[variant] not in taken and ratios[variant] > least:
                 best.setdefault(self.owners[variant], variant)
         return list(best.values())
 
@@ -276,6 +286,14 @@ def _revised(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
 
 def _without(taken: tuple[int, ...], index: int) -> tuple[int, ...]:
     return (*taken[:index], *taken[index + 1 :])
+
+
+def _one_each(variants: Sequence[int], owners: Sequence[int]) -> tuple[int, ...]:
+    """The first variant of every candidate."""
+    first: dict[int, int] = {}
+    for variant in variants:
+        first.setdefault(owners[variant], variant)
+    return tuple(first.values())
 
 
 def _stretches(rows: Rows, length: int) -> NDArray[np.int64]:

@@ -61,14 +61,14 @@ def row_ages(rows: Rows) -> NDArray[np.int64]:
     return np.asarray(number - np.repeat(starts, lengths))
 
 
-def fit_whitener(rows: Rows, residual: Array, freedom_lost: float = 0.0) -> Whitener:
-    """Whitener of a residual (n,); `freedom_lost` parameters were fitted to it."""
+def fit_whitener(rows: Rows, residual: Array, freedom_lost: float = 0.0, order: int = ORDER) -> Whitener:
+    """Whitener of a residual (n,); `freedom_lost` parameters were fitted to it. Of order 0, it only scales."""
     age = row_ages(rows)
     inflation = len(rows) / max(len(rows) - freedom_lost, 1.0)
     tolerated = _tolerated(rows)
     groups = range(int(rows.group.max(initial=-1)) + 1)
     return Whitener(
-        tuple(_predictor(residual, age, rows.group == group, inflation, tolerated[group]) for group in groups)
+        tuple(_predictor(residual, age, rows.group == group, inflation, tolerated[group], order) for group in groups)
     )
 
 
@@ -83,10 +83,10 @@ def _tolerated(rows: Rows) -> Array:
 
 
 def _predictor(
-    residual: Array, age: NDArray[np.int64], chosen: NDArray[np.bool_], inflation: float, tolerated: Array
+    residual: Array, age: NDArray[np.int64], chosen: NDArray[np.bool_], inflation: float, tolerated: Array, order: int
 ) -> Predictor:
     place = np.flatnonzero(chosen)
-    depth = min(ORDER, len(place) // 20)
+    depth = min(order, len(place) // 20)
     covariance = np.empty(depth + 1)
     for lag in range(depth + 1):
         later = place[age[place] >= lag]

@@ -30,6 +30,8 @@ BAND: Final = 1.3
 """Ratio of the ends of the bands over which spectra are averaged."""
 LEAST_ROWS: Final = 300
 """Rows that the shortest repeat, or a record without any, shall have."""
+MOST_ROWS: Final = 4000
+"""Rows of a repeat beyond which more say nothing new and take long."""
 EFFORT_SHARE: Final = 0.99
 """Of the power of the effort that the rows keep. What lies above belongs to drives and structures, not to the axis."""
 DIFFERENCES: Final = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60
@@ -39,6 +41,7 @@ REPEAT_MISMATCH: Final = 0.03
 """Rms difference of two repeats of a motion over its standard deviation, at most."""
 ALMOST_WHOLE: Final = 0.95
 """Part of a repeat that must be there for it to count."""
+SMALLEST_MOTION: Final = 1e-9
 FEWEST_ROWS: Final = 60
 """Independent rows that a diagnosis needs."""
 
@@ -95,6 +98,8 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth:
     """
     dt = record.sample_time
     memory = 4 / bandwidth
+    if np.ptp(axis.position) < SMALLEST_MOTION:
+        raise EstimationError(f"{record.source}: {axis.label} does not move.", "Record it while it is driven.")
     if len(record) * dt * bandwidth / (2 * math.pi) < FEWEST_ROWS / ROWS_PER_CUTOFF:
         raise EstimationError(
             f"{record.source} lasts {len(record) * dt:.3g} s, too short for its bandwidth of "
@@ -104,8 +109,6 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth:
     position = smoothed(axis.position, cutoff, dt)
     velocity = derivative(position, dt)
     speed = float(np.percentile(np.abs(velocity), 95))
-    if not speed * len(record) * dt > 1e-9 or np.ptp(axis.position) < 1e-9:
-        raise EstimationError(f"{record.source}: {axis.label} does not move.", "Record it while it is driven.")
     slow = (np.abs(velocity) < STUCK_SPEED * speed) | (np.diff(np.sign(velocity), prepend=np.sign(velocity[0])) != 0)
     moving = ~ndimage.binary_dilation(slow, np.ones(2 * round(memory / dt) + 1))
     ends = max(1, round(2 * memory / dt))
@@ -135,7 +138,8 @@ def effort_bandwidth(effort: Array, duration: float, limit: float, sample_time: 
     frequency, power = signal.periodogram(effort, 1 / sample_time, detrend="constant")
     share = np.cumsum(power) / max(float(power.sum()), np.finfo(float).tiny)
     found = float(frequency[min(int(np.searchsorted(share, EFFORT_SHARE)), len(frequency) - 1)])
-    return min(2 * math.pi * max(found, LEAST_ROWS / (ROWS_PER_CUTOFF * duration)), limit)
+    wanted = float(np.clip(ROWS_PER_CUTOFF * duration * found, LEAST_ROWS, MOST_ROWS))
+    return min(2 * math.pi * wanted / (ROWS_PER_CUTOFF * duration), limit)
 
 
 def repeat_duration(record: AxisRecord) -> float:

@@ -183,6 +183,12 @@ def _first_estimate(signals: _Signals, index: int, scale: Scale) -> Array:
     return np.asarray(np.stack(columns, axis=1) @ scale.values)
 
 
+def _settled(signals: _Signals, index: int) -> slice:
+    """From the first to the last row of an axis that counts: without the ends, where filters ring."""
+    rows = np.flatnonzero(signals.motions[index].moving)
+    return slice(int(rows[0]), int(rows[-1]) + 1)
+
+
 def _of_record(signals: _Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]]]:
     period = with_repeats(signals.record)
     models = [_model(signals, index, scale) for index, scale in enumerate(reference.scales)]

@@ -101,7 +101,7 @@ class Machine:
         breakaway: friction at rest beyond Coulomb's [N], gone at `stribeck` [m/s]; with bristles only.
         compliance: of a spring with `share` of the mass behind it [m/N].
         follower: friction that follows the speed of another carriage, which moves by itself [N s/m, N].
-        noise: rms of the measured effort's noise [N].
+        noise, encoder: rms of the noise of the measured effort [N] and of the positions [m].
     """
 
     mass: float = 20.0
@@ -117,6 +117,7 @@ class Machine:
     share: float = 0.6
     follower: tuple[float, float] = (0.0, 0.0)
     noise: float = 0.2
+    encoder: float = 2e-7
     rate: float = 1000.0
     substeps: int = 4
     duration: float = 5.0
@@ -129,6 +130,7 @@ class Machine:
         other = np.roll(self._reference(generator), round(self.duration * self.rate / 16))
         position, effort = self._integrated(reference, np.gradient(other, 1 / self.rate))
         effort = effort + self.noise * generator.normal(size=len(effort))
+        position = position + self.encoder * generator.normal(size=len(effort))
         period = np.repeat(np.arange(self.repeats), len(effort) // self.repeats).astype(np.int64)
         axes = [AxisSignals("", AxisKind.LINEAR, position, effort)]
         if any(self.follower):
@@ -136,7 +138,9 @@ class Machine:
             inertia = 5.0 * np.gradient(np.gradient(other, 1 / self.rate), 1 / self.rate)
             axes = [
                 AxisSignals("1", AxisKind.LINEAR, position, effort),
-                AxisSignals("2", AxisKind.LINEAR, other, inertia + own),
+                AxisSignals(
+                    "2", AxisKind.LINEAR, other + self.encoder * generator.normal(size=len(other)), inertia + own
+                ),
             ]
         return AxisRecord(tuple(axes), 1 / self.rate, np.arange(len(effort)) / self.rate, period, f"seed {seed}")
 

@@ -1,0 +1,170 @@
+"""Regressions whose truth is known: what is named, how surely, and what is not."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ident.errors import UserError
+from ident.gap.diagnosis import Gap, Verdict, write_diagnosis
+from ident.gap.judge import Findings, judge
+from ident.gap.problem import Nominal
+from ident.gap.split import split_problem
+
+
+def _judged(world: Any) -> Findings:
+    return judge(world.problem(0), world.problem(1), seed=1)
+
+
+def _names(findings: Findings) -> list[str]:
+    return [str(cause.candidate.effect) for cause in findings.causes]
+
+
+def test_an_effect_is_named_with_its_size_and_closes_the_gap(world: type[Any]) -> None:
+    findings = _judged(world(seed=7, true={"c": 0.3}))
+    assert findings.verdict is Verdict.EFFECT
+    assert _names(findings) == ["c"]
+    (cause,) = findings.causes
+    assert abs(cause.part.values[0] - 0.3) < 3 * cause.part.std[0]
+    assert cause.part.std[0] < 0.03
+    assert cause.probability == pytest.approx(0.99)
+    assert findings.gap.closed > 0.8
+    assert findings.gap.floor == pytest.approx(1.0)
+
+
+def test_two_effects_are_both_named(world: type[Any]) -> None:
+    findings = _judged(world(seed=8, true={"b": 0.25, "e": -0.25}))
+    assert sorted(_names(findings)) == ["b", "e"]
+
+
+def test_noise_alone_is_no_effect(world: type[Any]) -> None:
+    findings = _judged(world(seed=9))
+    assert findings.verdict is Verdict.NONE
+    assert findings.diagnosis().effects == ()
+    assert findings.gap.before == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_gap_without_a_candidate_is_unknown(world: type[Any]) -> None:
+    findings = _judged(world(seed=10, hidden=0.8))
+    assert findings.verdict is Verdict.UNKNOWN
+    assert findings.remainder.deviations > 3
+
+
+def test_candidates_that_are_the_same_form_one_ambiguity_set_and_share_their_probability(world: type[Any]) -> None:
+    findings = _judged(world(seed=11, true={"a": 0.3}, alike={"d": "a"}))
+    (effect,) = findings.diagnosis().effects
+    assert set(effect.ambiguity_set) == {"a", "d"}
+    assert effect.probability == pytest.approx(0.5, abs=0.01)
+
+
+def test_what_the_parameters_absorb_is_invisible(world: type[Any]) -> None:
+    problems = []
+    for part in (0, 1):
+        problem = world(seed=12).problem(part)
+        first = problem.candidates[0]
+        columns = tuple(block.baseline[:, :1].copy() for block in problem.blocks)
+        hidden = replace(first, effect="hidden", variants=(replace(first.variants[0], columns=columns),))
+        problems.append(replace(problem, candidates=(*problem.candidates, hidden)))
+    assert judge(*problems, seed=1).invisible == ("hidden",)
+
+
+def test_with_a_model_a_changed_parameter_is_a_cause_and_without_one_it_is_not(world: type[Any]) -> None:
+    """The truth is (1, -2, 0.5); the model says that the first is 0.9 and is sure of it."""
+    problems = []
+    for part in (0, 1):
+        problem = world(seed=13).problem(part)
+        first = problem.candidates[0]
+        columns = tuple(0.9 * block.baseline[:, :1] for block in problem.blocks)
+        drift = replace(first, effect="parameter_change", where="p", drift=True)
+        drift = replace(drift, variants=(replace(first.variants[0], columns=columns),))
+        problems.append(replace(problem, candidates=(*problem.candidates, drift)))
+    nominal = Nominal(np.array([0.9, -2.0, 0.5]), np.full(3, 0.005))
+    judged = judge(*(replace(problem, nominal=nominal) for problem in problems), seed=1)
+    assert _names(judged) == ["parameter_change"]
+    assert judged.causes[0].part.values[0] == pytest.approx(1 / 0.9 - 1, abs=0.03)
+    assert _names(judge(*problems, seed=1)) == []
+
+
+def test_an_effect_left_out_is_said_to_bias_the_parameter_it_hides_in(world: type[Any]) -> None:
+    problems = []
+    for part in (0, 1):
+        problem = world(seed=14, true={}).problem(part)
+        first = problem.candidates[0]
+        columns = tuple(block.baseline[:, :1] + first.variants[0].columns[i] for i, block in enumerate(problem.blocks))
+        blocks = tuple(
+            replace(block, target=block.target + 0.4 * columns[i][:, 0]) for i, block in enumerate(problem.blocks)
+        )
+        mixed = replace(first, effect="mixed", variants=(replace(first.variants[0], columns=columns),))
+        problems.append(replace(problem, blocks=blocks, candidates=(mixed, *problem.candidates[1:])))
+    (cause,) = judge(*problems, seed=1).causes
+    assert cause.candidate.effect == "mixed"
+    assert cause.biased["p"] > 5
+    assert abs(cause.biased["q"]) < abs(cause.biased["p"]) / 3
+
+
+def test_one_record_confirms_itself_by_its_later_repeats(world: type[Any]) -> None:
+    fit, confirm = split_problem(world(seed=15, true={"f": 0.3}).problem(0))
+    assert np.unique(fit.blocks[0].period[fit.blocks[0].period >= 0]).tolist() == [0, 1]
+    assert np.unique(confirm.blocks[0].period[confirm.blocks[0].period >= 0]).tolist() == [2, 3]
+    assert _names(judge(fit, confirm, seed=1)) == ["f"]
+
+
+def test_the_answer_is_the_same_every_time(world: type[Any]) -> None:
+    first, second = (_judged(world(seed=16, true={"a": 0.15})).diagnosis().as_json() for _ in range(2))
+    assert first == second
+
+
+@pytest.mark.slow
+def test_false_alarms_are_rare_and_intervals_hold(world: type[Any]) -> None:
+    alarms, inside = 0, []
+    names = tuple("abcdefghijklmnopqrst")
+    for seed in range(60):
+        alarms += _judged(world(seed=1000 + seed, names=names)).verdict is not Verdict.NONE
+        found = _judged(world(seed=2000 + seed, names=names, true={"c": 0.2}))
+        part = next(cause.part for cause in found.causes if cause.candidate.effect == "c")
+        inside.append(abs(part.values[0] - 0.2) < 1.96 * part.std[0])
+    assert alarms <= 7
+    assert np.mean(inside) > 0.86
+
+
+@given(
+    before=st.floats(1.05, 50),
+    share=st.floats(0, 1),
+)
+def test_the_share_closed_is_that_of_the_power_above_the_floor(before: float, share: float) -> None:
+    after = np.sqrt(before**2 - share * (before**2 - 1))
+    assert Gap(before, float(after), 1.0).closed == pytest.approx(share, abs=1e-9)
+
+
+def test_the_json_holds_what_was_agreed_and_nothing_else(world: type[Any], tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "diagnosis.json"
+    write_diagnosis(_judged(world(seed=7, true={"c": 0.3})).diagnosis("drive more"), path)
+    content = json.loads(path.read_text())
+    assert list(content) == ["verdict", "effects", "where", "gap", "invisible", "next_experiment"]
+    assert list(content["effects"][0]) == [
+        "name",
+        "where",
+        "parameters",
+        "probability",
+        "ambiguity_set",
+        "gap_closed_held_out",
+    ]
+    assert set(content["effects"][0]["parameters"]["size"]) == {"value", "std", "unit"}
+    assert set(content["where"][0]) == {"channel", "step", "coordinate", "region", "share"}
+    assert set(content["gap"]) == {"before", "after", "floor", "closed"}
+    whole = [entry["share"] for entry in content["where"] if entry["region"] == "all"]
+    assert sum(whole) == pytest.approx(1.0)
+    assert not list(path.parent.glob(".*"))
+
+
+def test_a_place_that_cannot_be_written_is_named(world: type[Any], tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="cannot be written"):
+        write_diagnosis(_judged(world(seed=7)).diagnosis(), tmp_path / "file" / "diagnosis.json")
