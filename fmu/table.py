@@ -60,8 +60,8 @@ _GEOMETRY: Final = {
     "wheel_offset": "From steering axis to wheel contact along the axle (a)",
     "wheel_radius": "Radius of the wheels (r)",
     "gear_ratio": "Motor turns per wheel turn (i_G)",
+    "steering_limit": "Mechanical stops of the steering angles, either side",
 }
-"""In the order of the geometry vector of `ident.vehicle.symbolic`."""
 
 
 def variable_table(

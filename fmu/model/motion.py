@@ -16,6 +16,7 @@ import casadi as ca
 
 from fmu.model.contact import contact_forces, static_loads
 from fmu.model.stiction import held_rates
+from fmu.model.stops import stop_torques
 from fmu.model.symbols import Symbols, dynamic_parameters
 from ident.vehicle import effect_terms, symbolic
 from ident.vehicle.effect_terms import EffectTerm, State
@@ -88,7 +89,7 @@ def motor_wrench(motion: Motion, shaft_torques: Expression) -> Expression:
 
 
 def _resistance(motion: Motion, p: Symbols) -> Expression:
-    """Θ p + f (9,), Coulomb friction and its like at the rates that hold."""
+    """Θ p + f (9,), Coulomb friction and its like at the rates that hold, and the stops of the steering."""
     parameters = effect_terms.changed_parameters(motion.terms, dynamic_parameters(p))
     coulomb = ca.SX([float(name in _COULOMB) for name in PARAMETER_NAMES])
     theta = symbolic.regressor(motion.state.rates, motion.state.accelerations)
@@ -100,4 +101,5 @@ def _resistance(motion: Motion, p: Symbols) -> Expression:
         + theta_held @ (parameters * coulomb)
         + effect_terms.added_forces(others, motion.state, parameters)
         + effect_terms.added_forces(holding, motion.held, parameters)
+        + stop_torques(motion.state.alpha, motion.state.rates, p)
     )

@@ -195,6 +195,7 @@ POSTURES = {
     "rotation": (None, None),
     "alignment": (0.7, -0.3),
     "just_off": (0.001, -0.001),
+    "at_the_stop": (1.6203, -1.61995),
 }
 
 

@@ -63,10 +63,11 @@ def test_directional_derivatives_agree_with_finite_differences_to_a_millionth(mo
         direction[index] = 1.0
         exact = seeded(moving, block, direction)
         # Between truncation of long steps and rounding of short ones each result has a step that suits it.
-        sizes = max(abs(moving.blocks[block][index]), 1e-2) * 10.0 ** np.arange(-1.0, -6.0, -0.5)
+        sizes = max(abs(moving.blocks[block][index]), 1e-2) * 10.0 ** np.arange(-1.0, -8.5, -0.5)
         estimates = np.array([central_difference(moving, block, direction, size) for size in sizes])
         error = np.abs(estimates - exact).min(axis=0)
-        rounding = 1e-12 * np.abs(everything(moving)) / sizes[0]
+        # What cancels inside, contacts and stops, is up to a thousand times what is left.
+        rounding = 1e-12 * np.abs(everything(moving)).max() / sizes[3]
         bound = 1e-6 * np.maximum(np.abs(exact), 1e-3 * np.abs(exact).max()) + rounding
         assert (error <= bound).all(), (row.name, error / bound)
 

@@ -19,13 +19,13 @@ GRAVITY = 9.80665
 
 
 def random_instance(core: Any, posture: Array, seed: int, *, slip: float = 1e-4) -> Any:
-    """A vehicle in motion, its wheels slipping a little, its friction without memory."""
+    """A vehicle in motion, its wheels slipping a little, its friction without memory, its stops far away."""
     generator = np.random.default_rng(seed)
     geometry = core.vehicle.geometry
     twist, steering = generator.normal(size=3) * 0.3, generator.normal(size=2) * 0.5
     rows = kinematics.constraint_matrix(posture, geometry)[0, 4:]
     wheels = (rows[:, :3] @ twist + rows[:, 3:5] @ steering) / geometry.wheel_radius + slip * generator.normal(size=4)
-    instance = core.new()
+    instance = core.new(steering_limit=1e3)
     instance.x[:9] = [*twist, *steering, *wheels]
     instance.set(alpha_l=posture[0], alpha_r=posture[1], gamma=generator.normal())
     instance.u[:4] = generator.normal(size=4)
@@ -57,7 +57,7 @@ def test_the_derivatives_fulfil_the_equations_of_motion_with_contact_forces_for_
     motors = np.concatenate([np.zeros(5), geometry.gear_ratio * instance.u[:4]])
     floor = rolling.T @ contact_forces(core, rolling @ rates)
     scale = np.abs(motors).max() + np.abs(floor).max()
-    np.testing.assert_allclose(inertial, motors + floor, atol=1e-10 * scale)
+    np.testing.assert_allclose(inertial, motors + floor, rtol=1e-9, atol=1e-10 * scale)
 
 
 def test_the_pose_moves_with_the_twist_turned_into_the_world(core: Any, posture: Array) -> None:

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 PART_OF_MOTION = 1e-3
 INTERVALS = [pytest.param(0.0005, marks=pytest.mark.slow), 0.002, 0.02]
-HELD_BY_STOPS = {"d_cl": 1e3, "d_cr": 1e3}
+HELD_STEERING = {"d_cl": 1e3, "d_cr": 1e3}
 """In mode 3 the torques that drive also steer; the reduced model knows no steering there, the FMU needs it held."""
 
 
@@ -130,7 +130,7 @@ def there_and_back(mode: Mode, amplitudes: Array, vehicle: VehicleDescription, i
     [
         (Mode.ALIGNMENT, (0.6, 0.4), {}),
         (Mode.STEERED, (0.0, 0.4), {}),
-        (Mode.LATERAL, (0.4,), HELD_BY_STOPS),
+        (Mode.LATERAL, (0.4,), HELD_STEERING),
         (Mode.ROTATION, (0.5,), {}),
     ],
 )
