@@ -154,6 +154,9 @@ class UnixHub(can.BusABC):
                 packet = client.socket.recv(_LARGEST_HELLO, socket.MSG_DONTWAIT)
             except BlockingIOError:
                 return
+            except ConnectionResetError:
+                # It has closed with frames unread. What it sent before is still to be had, after this one error.
+                continue
             except OSError:
                 packet = b""
             self._take(packet, client)

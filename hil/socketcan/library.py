@@ -17,9 +17,10 @@ from platformdirs import user_cache_path
 
 from ident.errors import BusError
 
-SOURCE: Final = Path(__file__).with_name("preload.c")
-"""The library's source."""
+SOURCES: Final = tuple(Path(__file__).with_name(name) for name in ("preload.c", "broadcast.c"))
+"""The library's sources; their header stands beside them."""
 
+_HEADER: Final = Path(__file__).with_name("broadcast.h")
 _OPTIONS: Final = ("-std=gnu11", "-O2", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror")
 _LONGEST_NAME: Final = 15
 _SYSTEM_COMPILERS: Final = ("cc", "gcc", "clang")
@@ -45,7 +46,8 @@ def build_library(cache: Path | None = None, compiler: list[str] | None = None) 
     """
     if sys.platform != "linux":
         raise BusError("SocketCAN programs exist on Linux only.", "Use python-can's own interfaces instead.")
-    digest = hashlib.sha256(SOURCE.read_bytes()).hexdigest()[:16]
+    content = b"".join(path.read_bytes() for path in (*SOURCES, _HEADER))
+    digest = hashlib.sha256(content).hexdigest()[:16]
     target = (cache or user_cache_path("quasiomni")) / f"socketcan-{digest}.so"
     if not target.is_file():
         _compile(compiler or _any_compiler(), target)
@@ -87,7 +89,7 @@ def _compile(compiler: list[str], target: Path) -> None:
         # Built beside its place and then moved: two processes may build at once.
         with tempfile.TemporaryDirectory(dir=target.parent) as folder:
             built = Path(folder) / target.name
-            command = [*compiler, *_OPTIONS, str(SOURCE), "-o", str(built), "-ldl"]
+            command = [*compiler, *_OPTIONS, *map(str, SOURCES), "-o", str(built), "-ldl", "-lpthread"]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             if done.returncode:
                 raise BusError(

@@ -6,9 +6,13 @@
  * write, send, recv, select, poll and epoll are the system's own; only calls that know of addresses, interfaces and
  * CAN options pass through here. Filters are applied in the hub: a frame that does not pass wakes nobody up.
  *
- * Not here: CAN FD, CAN_BCM, CAN_ISOTP, netlink. "any" (interface index 0) is the first interface.
+ * The sending half of CAN_BCM is in broadcast.c: there, send and write are commands.
+ *
+ * Not here: CAN FD, CAN_ISOTP, netlink. "any" (interface index 0) is the first interface.
  */
 #define _GNU_SOURCE
+#include "broadcast.h"
+
 #include <dlfcn.h>
 #include <errno.h>
 #include <linux/can.h>
@@ -50,6 +54,7 @@ struct hello {
 };
 
 struct can_socket {
+    int broadcast; /* CAN_BCM instead of CAN_RAW */
     int connected;
     int interface;
     unsigned count;
@@ -111,15 +116,17 @@ static struct can_socket *find(int fd) {
 
 static int tell(int fd, struct can_socket *entry) {
     size_t size = offsetof(struct hello, filters) + entry->count * sizeof(struct can_filter);
-    return send(fd, &entry->hello, size, MSG_NOSIGNAL) < 0 ? -1 : 0;
+    /* sendto, which is not mapped: send may be a command to the broadcast manager. */
+    return sendto(fd, &entry->hello, size, MSG_NOSIGNAL, NULL, 0) < 0 ? -1 : 0;
 }
 
 int socket(int domain, int type, int protocol) {
     typedef int (*socket_t)(int, int, int);
     socket_t real = REAL(socket_t, "socket");
     int flags = type & (SOCK_CLOEXEC | SOCK_NONBLOCK);
-    if (domain != PF_CAN || (type & ~flags) != SOCK_RAW || protocol != CAN_RAW || interface_count == 0)
-        return real(domain, type, protocol);
+    int raw = (type & ~flags) == SOCK_RAW && protocol == CAN_RAW;
+    int broadcast = (type & ~flags) == SOCK_DGRAM && protocol == CAN_BCM;
+    if (domain != PF_CAN || !(raw || broadcast) || interface_count == 0) return real(domain, type, protocol);
     int fd = real(AF_UNIX, SOCK_SEQPACKET | flags, 0);
     if (fd < 0) return fd;
     struct can_socket *entry = fd < SOCKETS ? calloc(1, sizeof *entry) : NULL;
@@ -129,7 +136,8 @@ int socket(int domain, int type, int protocol) {
         return -1;
     }
     free(sockets[fd]);
-    entry->count = 1; /* One filter of zeros: everything, as the kernel has it. */
+    entry->broadcast = broadcast;
+    entry->count = raw ? 1 : 0; /* One filter of zeros: everything, as the kernel has it. */
     entry->hello.magic = HELLO_MAGIC;
     sockets[fd] = entry;
     return fd;
@@ -142,12 +150,9 @@ static void await_acknowledgement(int fd) {
     if (poll(&waiting, 1, ACKNOWLEDGE_TIMEOUT_MS) == 1) (void)!recv(fd, &answer, sizeof answer, 0);
 }
 
-int bind(int fd, const struct sockaddr *address, socklen_t length) {
-    typedef int (*bind_t)(int, const struct sockaddr *, socklen_t);
+/* Connects a socket to the hub of the interface in an address. */
+static int join(int fd, struct can_socket *entry, const struct sockaddr_can *wanted) {
     typedef int (*connect_t)(int, const struct sockaddr *, socklen_t);
-    struct can_socket *entry = find(fd);
-    if (!entry || address->sa_family != AF_CAN) return REAL(bind_t, "bind")(fd, address, length);
-    const struct sockaddr_can *wanted = (const struct sockaddr_can *)address;
     int chosen = wanted->can_ifindex ? interface_of_index(wanted->can_ifindex) : 0;
     if (chosen < 0) {
         errno = ENODEV;
@@ -166,6 +171,42 @@ int bind(int fd, const struct sockaddr *address, socklen_t length) {
     entry->hello.flags &= ~ACKNOWLEDGE;
     await_acknowledgement(fd);
     return 0;
+}
+
+int bind(int fd, const struct sockaddr *address, socklen_t length) {
+    typedef int (*bind_t)(int, const struct sockaddr *, socklen_t);
+    struct can_socket *entry = find(fd);
+    if (!entry || address->sa_family != AF_CAN) return REAL(bind_t, "bind")(fd, address, length);
+    return join(fd, entry, (const struct sockaddr_can *)address);
+}
+
+int connect(int fd, const struct sockaddr *address, socklen_t length) {
+    typedef int (*connect_t)(int, const struct sockaddr *, socklen_t);
+    struct can_socket *entry = address && address->sa_family == AF_CAN ? find(fd) : NULL;
+    if (!entry) return REAL(connect_t, "connect")(fd, address, length);
+    return join(fd, entry, (const struct sockaddr_can *)address);
+}
+
+static int is_broadcast(int fd) { return fd >= 0 && fd < SOCKETS && sockets[fd] && sockets[fd]->broadcast && find(fd); }
+
+ssize_t send(int fd, const void *data, size_t size, int flags) {
+    typedef ssize_t (*send_t)(int, const void *, size_t, int);
+    return is_broadcast(fd) ? broadcast_command(fd, data, size) : REAL(send_t, "send")(fd, data, size, flags);
+}
+
+ssize_t write(int fd, const void *data, size_t size) {
+    typedef ssize_t (*write_t)(int, const void *, size_t);
+    return is_broadcast(fd) ? broadcast_command(fd, data, size) : REAL(write_t, "write")(fd, data, size);
+}
+
+int close(int fd) {
+    typedef int (*close_t)(int);
+    if (is_broadcast(fd)) broadcast_close(fd);
+    if (fd >= 0 && fd < SOCKETS && sockets[fd]) {
+        free(sockets[fd]);
+        sockets[fd] = NULL;
+    }
+    return REAL(close_t, "close")(fd);
 }
 
 static void write_address(const struct can_socket *entry, void *address, socklen_t *length) {

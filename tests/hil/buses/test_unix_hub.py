@@ -179,3 +179,16 @@ def test_frames_without_messages_are_the_same_frames(hub: UnixHub, tmp_path: Pat
         assert taken is not None
         assert taken[0] == 0x701 | REMOTE
         assert hub.take(0.0) is None
+
+
+def test_the_last_frames_of_a_client_that_closes_without_having_read_are_not_lost(hub: UnixHub, tmp_path: Path) -> None:
+    hasty = Client(hub, tmp_path / "bus", Hello())
+    for number in range(10):
+        hub.send(frames(0x100 + number)[0])
+    hasty.socket.send(pack_frame(frames(0x555)[0]))
+    hasty.socket.close()
+    received = hub.recv(1.0)
+    assert received is not None
+    assert received.arbitration_id == 0x555
+    assert hub.recv(0.05) is None
+    assert hub.clients == 0

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import can
 import pytest
 
 from emulator.firmware.flywheels import Flywheels
@@ -203,6 +204,72 @@ def test_python_canopen_finds_and_reads_the_nodes_over_socketcan(served: Served)
     nodes, name = done.stdout.splitlines()
     assert nodes == "[1, 2, 3, 4, 5, 6]"
     assert name
+
+
+PERIODIC = """
+import can, time
+bus = can.Bus(interface="socketcan", channel="can0")
+message = can.Message(arbitration_id=0x555, data=[1], is_extended_id=False)
+task = bus.send_periodic(message, 0.02)
+time.sleep(1.0)
+message.data = bytearray([2])
+task.modify_data(message)
+time.sleep(1.0)
+task.stop()
+time.sleep(0.3)
+bus.send(can.Message(arbitration_id=0x556, is_extended_id=False))
+limited = bus.send_periodic(can.Message(arbitration_id=0x557, is_extended_id=False), 0.01, duration=0.1)
+time.sleep(1.0)
+bus.send(can.Message(arbitration_id=0x558, is_extended_id=False))
+bus.shutdown()
+"""
+
+
+def test_python_cans_periodic_messages_are_sent_by_the_broadcast_manager(served: Served) -> None:
+    with UnixBus(served.path) as bus:
+        running = served.start(sys.executable, "-c", PERIODIC)
+        received: list[can.Message] = []
+        while not received or received[-1].arbitration_id != 0x558:
+            message = bus.recv(PATIENCE)
+            assert message is not None, running.communicate()
+            received.append(message)
+        running.wait(PATIENCE)
+    by_id = {can_id: [one for one in received if one.arbitration_id == can_id] for can_id in (0x555, 0x556, 0x557)}
+    first, second = ([one for one in by_id[0x555] if one.data[0] == number] for number in (1, 2))
+    # One second each at 20 ms; a busy machine may sleep over some.
+    assert 35 <= len(first) <= 52
+    assert 35 <= len(second) <= 52
+    assert by_id[0x555][-1].timestamp < by_id[0x556][0].timestamp - 0.2
+    # python-can asks for duration / period = 10 frames, and announces the first.
+    assert len(by_id[0x557]) in (10, 11)
+
+
+CANOPEN_SYNC = """
+import canopen, time
+network = canopen.Network()
+network.connect(interface="socketcan", channel="can0")
+node = network.add_node(1, canopen.ObjectDictionary())
+node.sdo.download(0x1800, 2, b"\\x01")
+node.nmt.state = "OPERATIONAL"
+answers = []
+network.subscribe(0x181, lambda *arguments: answers.append(arguments))
+network.sync.start(0.02)
+time.sleep(1.0)
+network.sync.stop()
+time.sleep(0.3)
+settled = len(answers)
+time.sleep(0.3)
+network.disconnect()
+print(settled, len(answers) - settled)
+"""
+
+
+def test_python_canopens_own_sync_producer_drives_the_nodes(served: Served) -> None:
+    done = served.run(sys.executable, "-c", CANOPEN_SYNC)
+    assert done.returncode == 0, done.stderr
+    answers, afterwards = (int(word) for word in done.stdout.split())
+    assert 35 <= answers <= 52
+    assert afterwards == 0
 
 
 C_PROGRAM = """
