@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ident.errors import RecordError
 from ident.gap.diagnosis import Diagnosis
@@ -11,6 +11,7 @@ from ident.gap.judge import Findings, judge
 from ident.gap.problem import Problem
 from ident.gap.split import split_problem
 from ident.gap.vehicle.build import build_problem
+from ident.gap.vehicle.drift import with_drift
 from ident.gap.vehicle.experiments import next_experiment
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
@@ -64,8 +65,16 @@ def diagnose_vehicle(
         _refuse_strangers(fitted, confirming)
     else:
         fitted, confirming = split_problem(fitted)
-    findings = judge(fitted, confirming, seed=seed)
+    findings = judge(_free(fitted), _free(confirming), seed=seed)
+    if fitted.nominal is not None:
+        findings = with_drift(findings, _free(fitted), _free(confirming), fitted.nominal)
     return VehicleDiagnosis(findings, next_experiment(findings, [block.step for block in fitted.blocks]))
+
+
+def _free(problem: Problem) -> Problem:
+    """The search for structure: parameters free, changed values of them no candidates."""
+    structural = tuple(candidate for candidate in problem.candidates if not candidate.drift)
+    return replace(problem, nominal=None, candidates=structural)
 
 
 def _refuse_strangers(fitted: Problem, confirming: Problem) -> None:

@@ -32,14 +32,21 @@ def rate(values: Array, segment: Segment) -> Array:
 
 
 def noisy(record: Record, seed: int, load: float = 0.01) -> Record:
-    """Torque readings with slow load changes (0.1 s) of every wheel and white noise [Nm at the shaft]."""
+    """Torques under slow changes of the load (0.1 s), shared by the motors as the load itself is, and reading noise.
+
+    Args:
+        record: without noise.
+        seed: of the noise.
+        load: rms of the changes [Nm at the shafts].
+    """
     generator = np.random.default_rng(seed)
     segments = []
     for segment in record.segments:
         memory = np.exp(-segment.sample_time / 0.1)
-        white = generator.normal(size=segment.motor_torques.shape)
-        slow = signal.lfilter([np.sqrt(1 - memory**2)], [1, -memory], white, axis=0)
-        segments.append(with_torques(segment, load * slow + 0.006 * generator.normal(size=white.shape)))
+        slow = signal.lfilter([np.sqrt(1 - memory**2)], [1, -memory], generator.normal(size=len(segment)))
+        shared = np.linalg.svd(segment.motor_torques, full_matrices=False)[2][0]
+        reading = 0.002 * generator.normal(size=segment.motor_torques.shape)
+        segments.append(with_torques(segment, 2 * load * slow[:, None] * shared + reading))
     return replace(record, segments=segments)
 
 
