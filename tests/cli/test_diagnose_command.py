@@ -1,0 +1,126 @@
+"""`quasiomni diagnose`: ten lines, a JSON that programs read, a page that needs nothing else, and clear refusals."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from ident.records.channels import Channels, write_channels
+
+Quasi = Callable[..., Any]
+
+
+def _axis(seed: int, *, asymmetry: float = 6.0) -> dict[str, np.ndarray]:
+    """A carriage of 10 kg whose friction is larger forward than backward."""
+    generator = np.random.default_rng(seed)
+    strokes = np.repeat(generator.choice([0.1, 0.2, 0.3], 24) * np.tile([1.0, -1.0], 12), 250)
+    window = signal.windows.hann(80)
+    velocity = signal.convolve(strokes, window / window.sum(), mode="same")
+    position = np.cumsum(velocity) * 2e-3
+    acceleration = np.gradient(velocity, 2e-3)
+    effort = 10 * acceleration + 30 * velocity + 5 * np.sign(velocity) + asymmetry * np.abs(velocity)
+    effort = effort + 0.1 * generator.normal(size=len(effort))
+    return {"time": np.arange(len(effort)) * 2e-3, "position": position, "effort": effort}
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Callable[..., Path]:
+    def write(seed: int, name: str = "", **changes: Any) -> Path:
+        path = tmp_path / (name or f"axis{seed}.csv")
+        write_channels(Channels({**_axis(seed), **changes}), path)
+        return path
+
+    return write
+
+
+def test_the_answer_fits_ten_lines_and_the_files_say_the_same(
+    quasi: Quasi, record: Callable[..., Path], tmp_path: Path
+) -> None:
+    out, page = tmp_path / "diagnosis.json", tmp_path / "report.html"
+    answer = quasi("diagnose", record(1), "--confirm", record(2), "--axis", "--json", out, "--report", page)
+    assert answer.code == 0
+    lines = answer.out.strip().splitlines()
+    assert len([line for line in lines if not line.startswith("Written")]) <= 10
+    assert "asymmetric viscous" in lines[0]
+    content = json.loads(out.read_text())
+    assert content["verdict"] == "effect"
+    assert content["effects"][0]["name"] == "asymmetric_viscous"
+    assert content["effects"][0]["parameters"]["imbalance"]["value"] == pytest.approx(6.0, rel=0.1)
+    text = page.read_text()
+    assert "asymmetric viscous" in text
+    assert "<script src" not in text
+    assert '<link rel="stylesheet"' not in text
+
+
+def test_one_record_alone_is_diagnosed_too(quasi: Quasi, record: Callable[..., Path]) -> None:
+    answer = quasi("diagnose", record(3), "--axis")
+    assert answer.code == 0
+    assert "asymmetric viscous" in answer.out
+
+
+def _refused(quasi: Quasi, tmp_path: Path, *arguments: object) -> str:
+    """What it complains about; no JSON is left, not even half of one."""
+    out = tmp_path / "diagnosis.json"
+    answer = quasi("diagnose", *arguments, "--json", out)
+    assert answer.code == 2
+    assert "error:" in answer.error
+    assert "remedy:" in answer.error
+    assert not out.exists()
+    assert not list(tmp_path.glob(".*.part"))
+    return str(answer.error)
+
+
+def test_a_missing_channel_is_named(quasi: Quasi, tmp_path: Path) -> None:
+    path = tmp_path / "part.csv"
+    values = _axis(1)
+    write_channels(Channels({"time": values["time"], "position": values["position"]}), path)
+    assert "effort" in _refused(quasi, tmp_path, path, "--axis")
+
+
+def test_a_value_that_is_no_number_is_named(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
+    effort = _axis(1)["effort"]
+    effort[77] = np.nan
+    assert "effort" in _refused(quasi, tmp_path, record(1, effort=effort), "--axis")
+
+
+def test_time_that_jumps_is_refused(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
+    time = _axis(1)["time"]
+    time[500:] += 0.01
+    assert "not uniform" in _refused(quasi, tmp_path, record(1, time=time), "--axis")
+
+
+def test_a_confirming_record_of_another_rate_is_refused(
+    quasi: Quasi, record: Callable[..., Path], tmp_path: Path
+) -> None:
+    slow = record(2, time=_axis(2)["time"] * 2)
+    assert "sampled every" in _refused(quasi, tmp_path, record(1), "--confirm", slow, "--axis")
+
+
+def test_an_axis_that_does_not_move_is_refused(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
+    still = record(1, position=np.full(6000, 0.1))
+    assert "does not move" in _refused(quasi, tmp_path, still, "--axis")
+
+
+@pytest.mark.parametrize("name", ["axis1.csv", "copy.csv"])
+def test_a_record_cannot_confirm_itself_under_any_name(
+    quasi: Quasi, record: Callable[..., Path], tmp_path: Path, name: str
+) -> None:
+    first = record(1)
+    shifted = record(1, name, time=_axis(1)["time"] + (0.0 if name == "axis1.csv" else 100.0))
+    assert "the same samples" in _refused(quasi, tmp_path, first, "--confirm", shifted, "--axis")
+
+
+def test_a_record_that_is_not_there_is_named(quasi: Quasi, tmp_path: Path) -> None:
+    assert "nowhere.csv" in _refused(quasi, tmp_path, tmp_path / "nowhere.csv", "--axis")
+
+
+def test_a_model_of_the_platform_is_no_model_of_an_axis(
+    quasi: Quasi, record: Callable[..., Path], tmp_path: Path
+) -> None:
+    assert "--model" in _refused(quasi, tmp_path, record(1), "--axis", "--model", tmp_path / "parameters.toml")
