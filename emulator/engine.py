@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +14,7 @@ import pybullet
 from emulator.as_built import GRAVITY, AsBuilt
 from emulator.prototype import Prototype
 from emulator.urdf import generate_urdf, rolling_joint, steering_joint
-from ident.errors import UserError
+from emulator.window import open_window
 from ident.vehicle.geometry import WHEELS
 
 STAND_CLEARANCE: Final = 0.05
@@ -86,7 +84,7 @@ class Engine:
         truth = self._prototype.truth
         self.coulomb = [truth[symbol] / 2 for symbol in ("d_cl", "d_cl", "d_cr", "d_cr")]
         self.coulomb += [truth["d_cw"]] * 4
-        self.client = _open_window() if gui else pybullet.connect(pybullet.DIRECT)
+        self.client = open_window() if gui else pybullet.connect(pybullet.DIRECT)
         self.place(on_stand=False, angles=[0.0] * 8)
 
     def build(self, built: AsBuilt) -> None:
@@ -323,23 +321,3 @@ class Engine:
 
 def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def _open_window() -> int:
-    require_display(os.environ)
-    client = int(pybullet.connect(pybullet.GUI))
-    pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=client)
-    pybullet.resetDebugVisualizerCamera(3.0, 40.0, -35.0, [0.0, 0.0, 0.0], physicsClientId=client)
-    return client
-
-
-def require_display(environment: Mapping[str, str]) -> None:
-    """Refuse a window where the environment names no display; the engine would end the whole process.
-
-    Raises:
-        UserError: Linux without DISPLAY.
-    """
-    if sys.platform == "linux" and not environment.get("DISPLAY"):
-        raise UserError(
-            "There is no display to show the vehicle on.", "Run without --gui, or set DISPLAY to an X server."
-        )

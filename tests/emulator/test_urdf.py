@@ -10,8 +10,8 @@ import numpy as np
 import pybullet
 import pytest
 
-from emulator.prototype import Prototype, load_prototype
 from emulator.as_built import AsBuilt
+from emulator.prototype import Prototype, load_prototype
 from emulator.urdf import generate_urdf
 from emulator.vehicle import EmulatedVehicle
 
