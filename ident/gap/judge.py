@@ -30,13 +30,15 @@ class Limits:
     Attributes:
         deviations: by which a smooth function must predict the confirming rows for there to be a remainder.
         size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
-        explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
+        repeating: the same, above which it is a remainder whether or not it can be predicted.
+        explained: share of a remainder that the effects named must explain, or the answer is `unknown`.
         improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
         minor: log evidence over that of the strongest effect above which one counts that closes less.
     """
 
     deviations: float = 3.0
     size: float = 0.25
+    repeating: float = 1.0
     explained: float = 0.5
     improvement: float = 0.01
     minor: float = 0.05
@@ -165,8 +167,8 @@ class _Judgement:
             after=self.after,
             significance=min(slot.evidence.significance for slot in (self.found.rest, *self.found.slots)),
             remainder=self.rest,
-            repeated_before=repeated(self.rows, self.floors, self._judged()),
-            repeated_after=repeated(self.rows, self.floors, self.after.blocks),
+            repeated_before=self._sizes(self._judged()),
+            repeated_after=self._sizes(self.after.blocks),
             problem=self.problems[0],
         )
 
@@ -224,15 +226,30 @@ class _Judgement:
         return named / max(named + self.rest.gain, np.finfo(float).tiny)
 
     def _verdict(self) -> Verdict:
-        left = self._is_left()
-        if not self.found.variants:
-            return Verdict.UNKNOWN if left else Verdict.NONE
-        return Verdict.UNKNOWN if left and self._explained() < self.limits.explained else Verdict.EFFECT
+        if self.found.variants:
+            unknown = self._predictable() and self._explained() < self.limits.explained
+            unknown |= self._repeating() and self._silenced() < self.limits.explained
+            return Verdict.UNKNOWN if unknown else Verdict.EFFECT
+        return Verdict.UNKNOWN if self._predictable() or self._repeating() else Verdict.NONE
 
-    def _is_left(self) -> bool:
-        sizes = repeated(self.rows, self.floors, self.after.blocks)
+    def _predictable(self) -> bool:
+        """Whether a smooth function of the states predicts what the effects leave, and it is no trifle."""
+        sizes = self._sizes(self.after.blocks)
         large = not sizes or max(sizes.values()) > self.limits.size
         return large and self.rest.deviations > self.limits.deviations and self.rest.gain > 0
+
+    def _repeating(self) -> bool:
+        """Whether what the effects leave repeats, and more than noise does."""
+        return max(self._sizes(self.after.blocks).values(), default=0.0) > self.limits.repeating
+
+    def _silenced(self) -> float:
+        """Share of the power that repeats that the effects take away, where most is left."""
+        after = self._sizes(self.after.blocks)
+        most = max(after, key=lambda label: after[label])
+        return 1 - (after[most] / max(self._sizes(self.before.blocks)[most], np.finfo(float).tiny)) ** 2
+
+    def _sizes(self, models: Sequence[Array]) -> Mapping[str, float]:
+        return repeated(self.rows, self.floors, models)
 
     def _causes(self) -> tuple[Cause, ...]:
         made = [self._cause(index, variant) for index, variant in enumerate(self.found.variants)]

@@ -61,8 +61,13 @@ def test_bristles_that_break_away_are_named_stribeck(machine: Make) -> None:
 
 
 def test_a_second_mass_on_a_spring_is_named_elasticity(machine: Make) -> None:
-    findings = _diagnosed(machine(compliance=2e-5))
+    findings = _diagnosed(machine(compliance=5e-6))
     assert findings.causes[0].candidate.effect == "elasticity"
+
+
+def test_a_resonance_that_no_candidate_describes_is_not_taken_for_noise(machine: Make) -> None:
+    """The same spring, so soft that it rings within the bandwidth of the rows."""
+    assert _diagnosed(machine(compliance=2e-5)).verdict is not Verdict.NONE
 
 
 def test_friction_that_follows_another_axis_is_named(machine: Make) -> None:
