@@ -15,7 +15,7 @@ from ident.estimate.equations import ROWS, RowsOfStep
 from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.gap.problem import Block, Candidate, Channel, Nominal, Problem, Variant
 from ident.gap.vehicle import rows
-from ident.gap.vehicle.library import DRIFTS, SHAPES, TermCause, placed_parameters, term_causes
+from ident.gap.vehicle.library import DRIFTS, ONE_SIDED, SHAPES, TermCause, placed_parameters, term_causes
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
 from ident.gap.vehicle.transforms import Setting, TransformCause, transform_cause, transform_causes
@@ -345,6 +345,7 @@ def _candidate(
         variants=variants,
         contribution=None if linear else _contribution(cause, _acting(variants, sources), sources, context),
         drift=cause.name in DRIFTS,
+        least=0.0 if cause.name in ONE_SIDED else None,
     )
 
 

@@ -12,7 +12,7 @@ from ident.gap.problem import Problem
 from ident.gap.split import split_problem
 from ident.gap.vehicle.build import build_problem
 from ident.gap.vehicle.drift import with_drift
-from ident.gap.vehicle.experiments import next_experiment
+from ident.gap.vehicle.experiments import hidden_effects, next_experiment
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EffectName
@@ -59,15 +59,19 @@ def diagnose_vehicle(
     Raises:
         RecordError: a record holds none of the steps of a diagnosis, or the confirming records none of those fitted.
     """
-    fitted = build_problem(fit, vehicle, model, effects=effects)
+    hidden = hidden_effects(segment.step for record in fit for segment in record.segments)
+    shown = [name for name in effects if name not in hidden]
+    fitted = build_problem(fit, vehicle, model, effects=shown)
     if confirm:
-        confirming = build_problem(confirm, vehicle, model, effects=effects)
+        confirming = build_problem(confirm, vehicle, model, effects=shown)
         _refuse_strangers(fitted, confirming)
     else:
         fitted, confirming = split_problem(fitted)
     findings = judge(_free(fitted), _free(confirming), seed=seed)
     if fitted.nominal is not None:
         findings = with_drift(findings, _free(fitted), _free(confirming), fitted.nominal)
+    invisible = tuple(str(name) for name in effects if name in hidden or name in findings.invisible)
+    findings = replace(findings, invisible=invisible)
     return VehicleDiagnosis(findings, next_experiment(findings, [block.step for block in fitted.blocks]))
 
 

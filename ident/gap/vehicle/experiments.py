@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from ident.gap.judge import Findings
 from ident.gap.vehicle.ideal import DIAGNOSTIC
+from ident.gap.vehicle.library import DRIFTS
 from ident.gap.vehicle.visibility import Sight
 from ident.gap.vehicle.visibility_table import stored_table
+from ident.vehicle.effects import EffectName
 
 
 def next_experiment(findings: Findings, steps: Collection[str]) -> str | None:
@@ -27,6 +29,20 @@ def next_experiment(findings: Findings, steps: Collection[str]) -> str | None:
         if advice is not None:
             return f"To tell {effect.name} from {' and '.join(rivals)}: {advice}."
     return _showing(diagnosis.invisible, steps)
+
+
+def hidden_effects(steps: Iterable[str]) -> frozenset[EffectName]:
+    """Effects that an experiment of these steps cannot show, by the equations.
+
+    What breaks the equations, a sliding wheel for one, can look like them; they are not candidates. Changed parameters
+    are: they are hidden only as long as the parameters are free.
+    """
+    driven = frozenset(steps)
+    done = ["four steps", *(name for name in DIAGNOSTIC if name not in _open(driven))]
+    names = {key.partition("@")[0] for key in stored_table()["four steps"]} - set(DRIFTS)
+    return frozenset(
+        EffectName(name) for name in names if not any(_seen(name, stored_table()[experiment]) for experiment in done)
+    )
 
 
 def _splitting(key: str, rivals: Sequence[str], steps: Collection[str]) -> str | None:

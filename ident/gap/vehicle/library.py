@@ -68,6 +68,18 @@ DRIFTS: Final = (EffectName.PARAMETER_CHANGE, EffectName.PAYLOAD)
 """Effects that a refit of the parameters absorbs: causes only where the model's values are given."""
 
 
+ONE_SIDED: Final = (
+    EffectName.STRIBECK,
+    EffectName.QUADRATIC_DRAG,
+    EffectName.TIME_DELAY,
+    EffectName.BACKLASH,
+    EffectName.ELASTICITY,
+    EffectName.SCRUB,
+    EffectName.STEERING_UNIT_MASS,
+)
+"""Effects whose size cannot be negative."""
+
+
 @dataclass(frozen=True)
 class UnitVariant:
     """One choice of an effect's nonlinear parameters.
