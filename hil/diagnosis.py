@@ -24,7 +24,7 @@ from ident.records.record import Record
 from ident.report.gap import GapReport, write_gap_report
 from ident.report.gap_summary import summary_lines
 from ident.vehicle.description import VehicleDescription, load_vehicle
-from ident.vehicle.parameters import read_parameters
+from ident.vehicle.extended import read_model
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ def _axis_answer(order: DiagnosisOrder) -> _Answer:
 def _vehicle_answer(order: DiagnosisOrder) -> _Answer:
     network = load_network(network_file_of(order.vehicle or "prototype"))
     vehicle = _vehicle(order)
-    model = None if order.model is None else read_parameters(order.model)
+    model = None if order.model is None else read_model(order.model)
     records, confirming = ([read_any(path, network) for path in paths] for paths in (order.records, order.confirm))
     _refuse_repeated([part for record in (*records, *confirming) for part in _of_vehicle(record)])
     found = diagnose_vehicle(records, confirming, vehicle, model, seed=order.seed)

@@ -16,6 +16,7 @@ from ident.gap.vehicle.experiments import hidden_effects, next_experiment
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EffectName
+from ident.vehicle.extended import ExtendedModel
 from ident.vehicle.parameters import Parameters
 
 
@@ -41,7 +42,7 @@ def diagnose_vehicle(
     fit: Sequence[Record],
     confirm: Sequence[Record],
     vehicle: VehicleDescription,
-    model: Parameters | None = None,
+    model: ExtendedModel | Parameters | None = None,
     *,
     seed: int = 1,
     effects: Sequence[EffectName] = tuple(EffectName),
@@ -52,18 +53,20 @@ def diagnose_vehicle(
         fit: records that causes are looked for in.
         confirm: independent records; none: a part of `fit` confirms.
         vehicle: its geometry is taken as true.
-        model: the values being judged; None: they are refitted, and only structure can be missing.
+        model: being judged, with the effects that it has; None: parameters are refitted, only structure can be missing.
         seed: of the surrogates.
         effects: that are looked for.
 
     Raises:
         RecordError: a record holds none of the steps of a diagnosis, or the confirming records none of those fitted.
     """
+    if isinstance(model, Parameters):
+        model = ExtendedModel(model)
     hidden = hidden_effects(segment.step for record in fit for segment in record.segments)
     shown = [name for name in effects if name not in hidden]
-    fitted = build_problem(fit, vehicle, model, effects=shown)
+    fitted = _problem(fit, vehicle, model, shown)
     if confirm:
-        confirming = build_problem(confirm, vehicle, model, effects=shown)
+        confirming = _problem(confirm, vehicle, model, shown)
         _refuse_strangers(fitted, confirming)
     else:
         fitted, confirming = split_problem(fitted)
@@ -73,6 +76,14 @@ def diagnose_vehicle(
     invisible = tuple(str(name) for name in effects if name in hidden or name in findings.invisible)
     findings = replace(findings, invisible=invisible)
     return VehicleDiagnosis(findings, next_experiment(findings, [block.step for block in fitted.blocks]))
+
+
+def _problem(
+    records: Sequence[Record], vehicle: VehicleDescription, model: ExtendedModel | None, effects: Sequence[EffectName]
+) -> Problem:
+    if model is None:
+        return build_problem(records, vehicle, effects=effects)
+    return build_problem(records, vehicle, model.parameters, given=model.effects, effects=effects)
 
 
 def _free(problem: Problem) -> Problem:

@@ -83,7 +83,7 @@ def test_a_heavier_vehicle_is_a_drift_of_the_model_that_was_given(
 
     fit, confirm = drives(prototype, loaded)
     assert diagnose_vehicle([fit], [confirm], prototype).diagnosis.verdict is Verdict.NONE
-    known = replace(prototype.prior, std=0.005 * prototype.prior.values)
+    known = ExtendedModel(replace(prototype.prior, std=0.005 * prototype.prior.values))
     first = diagnose_vehicle([fit], [confirm], prototype, known).diagnosis.effects[0]
     assert {"payload", "parameter_change"} & {first.name, *first.ambiguity_set}
     assert first.where in ("chassis", "m_ch")
