@@ -1,0 +1,71 @@
+"""Sizes in noise units: proportional to the effect, blind to what the model absorbs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from emulator.effects.injection import AnyEffect
+from emulator.prototype import load_prototype
+from hil.exam.noise_units import Noise, SizeInNoise, size_in_noise
+from hil.exam.plans import plan_exam, plans_from_text, plans_text
+from hil.exam.quiet import drive_quietly
+from ident.campaign.plan import Plan
+from ident.records.record import Record
+from ident.vehicle.description import load_vehicle
+from ident.vehicle.effect_text import parse_effect
+
+pytestmark = pytest.mark.slow
+
+CYCLE = 0.002
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    return replace(plan_exam(load_vehicle("prototype"), 3, CYCLE).fit, periods=1)
+
+
+@pytest.fixture(scope="module")
+def plain(plan: Plan) -> Record:
+    return drive_quietly(plan, "prototype", ())
+
+
+def size(plan: Plan, plain: Record, *effects: AnyEffect) -> SizeInNoise:
+    steps = {"steering_left": "alpha_l", "steering_right": "alpha_r", "straight": "x", "rotation": "gamma"}
+    noise = Noise({(step, name): 1.0 for step, name in steps.items()}, {step: np.ones(8) for step in steps})
+    changed = drive_quietly(plan, "prototype", effects)
+    return size_in_noise(noise, plain, changed, load_prototype().truth.values, plan.vehicle.geometry)
+
+
+def test_twice_the_imbalance_is_twice_the_size(plan: Plan, plain: Record) -> None:
+    once, twice = (
+        size(plan, plain, parse_effect(f"asymmetric_coulomb@steering_left={imbalance}Nm")).torque
+        for imbalance in (1.0, 2.0)
+    )
+    assert twice == pytest.approx(2 * once, rel=0.1)
+    # Of a constant of 1 Nm, filtered and seen while moving, no column absorbs much.
+    assert once == pytest.approx(1.0, rel=0.4)
+
+
+def test_a_changed_mass_is_a_drift_and_leaves_no_gap(plan: Plan, plain: Record) -> None:
+    found = size(plan, plain, parse_effect("parameter_change@m_ch=5%"))
+    assert found.drift > 10.0
+    assert found.torque < 0.1 * found.drift
+
+
+def test_another_radius_shows_in_the_constraints_alone(plan: Plan, plain: Record) -> None:
+    found = size(plan, plain, parse_effect("wheel_radius@wheel_fl=1mm"))
+    assert found.kinematic > 1e-3
+    assert found.torque < 1.0
+
+
+def test_plans_survive_being_written() -> None:
+    vehicle = load_vehicle("prototype")
+    plans = plan_exam(vehicle, 3, CYCLE)
+    again = plans_from_text(plans_text(plans), vehicle, CYCLE)
+    for one, other in ((plans.fit, again.fit), (plans.confirm, again.confirm)):
+        for step in one.steps:
+            first, second = (each.reference(step, vehicle.prior) for each in (one, other))
+            assert np.array_equal(first.feed_forward, second.feed_forward)
