@@ -30,7 +30,7 @@ class Limits:
     Attributes:
         deviations: by which a smooth function must predict the confirming rows for there to be a remainder.
         size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
-        repeating: the same, above which it is a remainder whether or not it can be predicted.
+        repeating: the same, above which a gap without any effect is unknown, whether or not it can be predicted.
         explained: share of a remainder that the effects named must explain, or the answer is `unknown`.
         improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
         minor: log evidence over that of the strongest effect above which one counts that closes less.
@@ -38,7 +38,7 @@ class Limits:
 
     deviations: float = 3.0
     size: float = 0.25
-    repeating: float = 1.0
+    repeating: float = 1.5
     explained: float = 0.5
     improvement: float = 0.01
     minor: float = 0.05
@@ -226,11 +226,10 @@ class _Judgement:
         return named / max(named + self.rest.gain, np.finfo(float).tiny)
 
     def _verdict(self) -> Verdict:
-        if self.found.variants:
-            unknown = self._predictable() and self._explained() < self.limits.explained
-            unknown |= self._repeating() and self._silenced() < self.limits.explained
-            return Verdict.UNKNOWN if unknown else Verdict.EFFECT
-        return Verdict.UNKNOWN if self._predictable() or self._repeating() else Verdict.NONE
+        if not self.found.variants:
+            return Verdict.UNKNOWN if self._predictable() or self._repeating() else Verdict.NONE
+        unknown = self._predictable() and self._explained() < self.limits.explained
+        return Verdict.UNKNOWN if unknown else Verdict.EFFECT
 
     def _predictable(self) -> bool:
         """Whether a smooth function of the states predicts what the effects leave, and it is no trifle."""
@@ -239,14 +238,8 @@ class _Judgement:
         return large and self.rest.deviations > self.limits.deviations and self.rest.gain > 0
 
     def _repeating(self) -> bool:
-        """Whether what the effects leave repeats, and more than noise does."""
+        """Whether what the model leaves repeats, and is well above the noise."""
         return max(self._sizes(self.after.blocks).values(), default=0.0) > self.limits.repeating
-
-    def _silenced(self) -> float:
-        """Share of the power that repeats that the effects take away, where most is left."""
-        after = self._sizes(self.after.blocks)
-        most = max(after, key=lambda label: after[label])
-        return 1 - (after[most] / max(self._sizes(self.before.blocks)[most], np.finfo(float).tiny)) ** 2
 
     def _sizes(self, models: Sequence[Array]) -> Mapping[str, float]:
         return repeated(self.rows, self.floors, models)

@@ -18,7 +18,7 @@ Series = Sequence[Array]
 
 @dataclass(frozen=True)
 class Floors:
-    """Rms of the noise of every block, in the unit of its target.
+    """Rms of the noise of every block, and of what is tolerated in it, in the unit of its target.
 
     Attributes:
         values: one a block.
@@ -46,11 +46,13 @@ def noise_floors(rows: Rows, models: Series, left: Array) -> Floors:
         total, count = pooled.get(label, (0.0, 0))
         pooled[label] = (total + variance * freedom, count + freedom)
     values, measured = [], []
-    for label, (variance, freedom), place in zip(labels, spreads, rows.block_slices, strict=True):
+    for (block, _), label, (variance, freedom), place in zip(
+        rows.blocks, labels, spreads, rows.block_slices, strict=True
+    ):
         total, count = pooled[label]
         if freedom == 0:
             variance = total / count if count else float(np.mean(left[place] ** 2)) if left[place].size else 0.0
-        values.append(np.sqrt(variance))
+        values.append(np.hypot(np.sqrt(variance), block.tolerance))
         measured.append(count > 0)
     least = [max(block.tolerance, np.finfo(float).tiny) for block, _ in rows.blocks]
     return Floors(np.maximum(values, least), np.array(measured, dtype=bool))
