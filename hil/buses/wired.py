@@ -12,7 +12,7 @@ from hil.buses.wire import Wire, arbitration_key
 class Devices(Protocol):
     """Emulated nodes on a bus; they answer through the function that they were made with."""
 
-    def receive(self, can_id: int, data: bytes) -> None:
+    def receive(self, can_id: int, data: bytes, /) -> None:
         """Take a data frame."""
 
     def receive_remote(self, can_id: int) -> None:

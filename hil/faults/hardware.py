@@ -2,43 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol, cast
 
 from emulator.firmware.hardware import DriveHardware, EncoderHardware, VehicleHardware
 
 
 class _Positioned(Protocol):
+    @property
+    def counts_per_revolution(self) -> int: ...
+
     def position(self) -> int: ...
 
 
 class EncoderTap:
-    """A drive or an encoder whose position passes through here; everything else is the hardware's own."""
+    """A drive or an encoder whose position and speed can be had from here; everything else is the hardware's own.
+
+    As long as nothing is wrong the methods are the hardware's themselves, and cost what they cost there.
+
+    Attributes:
+        position: position [counts], as faulty as it is.
+        velocity: speed of the axis [rad/s], from the same encoder: zero while it sticks; of a drive only.
+    """
+
+    position: Callable[[], int]
+    velocity: Callable[[], float]
 
     def __init__(self, hardware: _Positioned) -> None:
         self._hardware = hardware
         self._stuck: int | None = None
         self._offset = 0
+        self.counts_per_revolution = hardware.counts_per_revolution
+        self._connect()
 
-    def position(self) -> int:
-        """Position [counts], as faulty as it is."""
-        return self._hardware.position() + self._offset if self._stuck is None else self._stuck
+    @property
+    def thermal_load(self) -> float:
+        """I2t load of a drive [-]; here because it is asked for in every cycle."""
+        return cast(DriveHardware, self._hardware).thermal_load
 
     def stick(self) -> None:
         """Stay at the present count."""
         self._stuck = self.position()
+        self._connect()
 
     def release(self) -> None:
         """Follow the axis again."""
         self._stuck = None
+        self._connect()
 
     def jump(self, counts: int) -> None:
         """Be off by so many more counts."""
         self._offset += counts
+        self._connect()
 
-    def velocity(self) -> float:
-        """Speed of the axis [rad/s], from the same encoder: zero while it sticks."""
-        return 0.0 if self._stuck is not None else cast(DriveHardware, self._hardware).velocity()
+    def _connect(self) -> None:
+        """Decide where position and speed come from."""
+        hardware, stuck, offset = self._hardware, self._stuck, self._offset
+        if stuck is not None:
+            self.position, self.velocity = (lambda: stuck), (lambda: 0.0)
+            return
+        self.position = (lambda: hardware.position() + offset) if offset else hardware.position
+        if hasattr(hardware, "velocity"):
+            self.velocity = hardware.velocity
 
     def __getattr__(self, name: str) -> Any:
         value = getattr(self._hardware, name)

@@ -44,8 +44,11 @@ class FaultInjector:
 
     Attributes:
         devices: the nodes.
+        receive: takes a data frame of the master (identifier, data); the nodes' own while no frame is to be changed.
         log: everything that was injected so far.
     """
+
+    receive: Callable[[int, bytes], None]
 
     def __init__(
         self,
@@ -65,6 +68,7 @@ class FaultInjector:
         self._count = 0
         self.log: list[Injected] = []
         self.devices = make(vehicle, self._from_node)
+        self._set_rules(())
         self._reach = Reach(self.devices, vehicle, Places(network), ground, self._agenda, send)
 
     @property
@@ -112,13 +116,6 @@ class FaultInjector:
         """One line for each fault that lasts or is still to come."""
         return [f"{one.number}: {one.fault}, from {one.begin:.3f} s to {one.end:.3f} s" for one in self.pending]
 
-    def receive(self, can_id: int, data: bytes) -> None:
-        """Take a data frame of the master."""
-        if self._rules:
-            self._pass(Frame(can_id, data, True))
-        else:
-            self.devices.receive(can_id, data)
-
     def receive_remote(self, can_id: int) -> None:
         """Take a remote frame of the master; faults act on data frames only."""
         self.devices.receive_remote(can_id)
@@ -136,6 +133,9 @@ class FaultInjector:
     def next_event(self) -> float:
         """Instant of the next timer or fault [s], infinite if there is none."""
         return min(self._agenda.next_event(), self.devices.next_event())
+
+    def _from_master(self, can_id: int, data: bytes) -> None:
+        self._pass(Frame(can_id, data, True))
 
     def _from_node(self, can_id: int, data: bytes) -> None:
         if self._rules:
@@ -171,11 +171,15 @@ class FaultInjector:
             return partial(self._begin_rule, FrameRule(fault, self._reach.places.selection(fault), rng))
         return PREPARATIONS[fault.kind](fault, self._reach)
 
+    def _set_rules(self, rules: tuple[FrameRule, ...]) -> None:
+        self._rules = rules
+        self.receive = self._from_master if rules else self.devices.receive
+
     def _begin_rule(self, rule: FrameRule) -> End:
-        self._rules = (*self._rules, rule)
+        self._set_rules((*self._rules, rule))
 
         def end() -> None:
-            self._rules = tuple(other for other in self._rules if other is not rule)
+            self._set_rules(tuple(other for other in self._rules if other is not rule))
             self._let_go(rule.end())
 
         return end
