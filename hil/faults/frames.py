@@ -73,7 +73,9 @@ class FrameRule:
         rng: decides which of them, and how.
 
     Attributes:
-        changed: frames that it has befallen.
+        fault, rng: as given.
+        held: frames that are held back.
+        changed: number of frames that it has befallen.
     """
 
     def __init__(self, fault: Fault, selects: Selection, rng: np.random.Generator) -> None:
