@@ -42,6 +42,9 @@ ASKEW: Final = 0.4
 CREEP: Final = 3e-4
 """Part of the rolling speed by which a wheel may creep, as any tyre does at some percent of its adhesion [-]."""
 
+TURNING_CREEP: Final = 1e-3
+"""The same for wheels that turn about their steering axes at standstill, where the chassis is held by creep alone."""
+
 PRIOR_WEIGHT: Final = 1e-4
 """Of the vehicle file's guesses against the rows, per unit-norm column: only what no row shows is taken from them."""
 
@@ -306,14 +309,15 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
             period=source.period[:: source.factor],
             regions=regions_of(position, rate, acceleration, load),
             features=features_of(position, rate, acceleration, load),
-            tolerance=creep(source, context.geometry) if source.channel is Channel.KINEMATIC else 0.0,
+            tolerance=tolerated_creep(source, context.geometry) if source.channel is Channel.KINEMATIC else 0.0,
         )
 
 
-def creep(source: Source, geometry: Geometry) -> float:
+def tolerated_creep(source: Source, geometry: Geometry) -> float:
     """Speed of the contacts (rms) that creep may take from rolling [m/s]."""
     speed = geometry.wheel_radius * source.inputs[:, rows.SLICES["beta_rate"]]
-    return CREEP * float(np.sqrt(np.mean(speed[source.moving[0]] ** 2)))
+    creep = TURNING_CREEP if source.spec.mode is Mode.ALIGNMENT else CREEP
+    return creep * float(np.sqrt(np.mean(speed[source.moving[0]] ** 2)))
 
 
 def _unit(channel: Channel, coordinate: str) -> str:

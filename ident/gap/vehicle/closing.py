@@ -14,7 +14,7 @@ from ident.estimate.filters import Processing
 from ident.gap.diagnosis import Gap
 from ident.gap.judge import Findings
 from ident.gap.problem import Channel
-from ident.gap.vehicle.build import Source, creep, make_context, sources_of
+from ident.gap.vehicle.build import Source, make_context, sources_of, tolerated_creep
 from ident.gap.vehicle.outcome import outcomes
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
@@ -91,7 +91,7 @@ def _series(
     for source in sources:
         exact = context.formulas.exact(source.channel, source.spec)
         residual = context.filtered(exact(context.inputs(source), *context.constants, np.zeros(0))[..., 0], source)
-        least = creep(source, vehicle.geometry) if source.channel is Channel.KINEMATIC else 0.0
+        least = tolerated_creep(source, vehicle.geometry) if source.channel is Channel.KINEMATIC else 0.0
         for row, name in enumerate(source.coordinates):
             rows = _folded(residual[:, row], source.moving[row][:: source.factor], source.period[:: source.factor])
             yield Series(source.channel, source.step, name, rows, least)
