@@ -16,8 +16,11 @@ DAMPING_RATIO: Final = 0.05
 MOTOR_SHARE: Final = 0.5
 """Share of B_w on the motor's side of a flexible gear: motor inertia matched to its load."""
 
-_STIFFEST: Final = 0.3
-"""Stiffness times step^2 over inertia of either side that explicit integration takes, of 2 at most."""
+_STIFFEST: Final = 1.5
+"""Stiffness times step^2 over inertia of either side that a spring may have; explicit integration takes 2."""
+
+_CONTACT: Final = 0.3
+"""The same of the contact at the end of a play."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class SpringWithPlay:
 
 
 def make_spring(compliance: float, gap: float, inertia: float, step: float, place: str) -> SpringWithPlay:
-    """The spring of a compliance; where there is play alone, as stiff as the step resolves.
+    """The spring of a compliance; where there is play alone, as stiff as the step resolves well.
 
     Args:
         compliance: twist per torque, zero for play alone [rad/Nm].
@@ -60,7 +63,7 @@ def make_spring(compliance: float, gap: float, inertia: float, step: float, plac
         UserError: the spring is stiffer than the step resolves.
     """
     stiffest = _STIFFEST * inertia / step**2
-    stiffness = 1 / compliance if compliance else stiffest
+    stiffness = 1 / compliance if compliance else _CONTACT * inertia / step**2
     if stiffness > stiffest:
         raise UserError(
             f"A compliance of {compliance:g} rad/Nm at {place} is stiffer than a step of {step:g} s resolves.",

@@ -9,7 +9,7 @@ from typing import Final
 from hil.exam.driving import drive
 from hil.exam.noise_units import Noise, SizeInNoise, noise_of, size_in_noise
 from hil.exam.plans import plan_exam
-from hil.exam.probes import CURVED, DRIFTS, SHARE, SIGNED, Probe, all_probes
+from hil.exam.probes import CURVED, DRIFTS, KINEMATIC, SHARE, SIGNED, Probe, all_probes
 from hil.exam.quiet import drive_quietly
 from hil.exam.sealing import effect_of
 from hil.exam.sizes import EffectSize
@@ -117,7 +117,10 @@ def _seen_in(
     probe: Probe, measured: Sequence[tuple[float, SizeInNoise]]
 ) -> tuple[str, tuple[tuple[float, float], ...]]:
     """The channel that shows the effect, and its points there; no points where none does."""
-    for channel in ("drift",) if probe.name in DRIFTS else ("torque", "kinematic"):
+    channels = ["drift"] if probe.name in DRIFTS else ["torque"]
+    if probe.name in KINEMATIC:
+        channels.append("kinematic")
+    for channel in channels:
         points = [(size, float(getattr(units, channel))) for size, units in measured]
         if any(units >= VISIBLE for _, units in points):
             least = NEGLIGIBLE if probe.name in CURVED else CLEAR

@@ -29,6 +29,9 @@ SIGNED: Final = frozenset(
 DRIFTS: Final = frozenset({EffectName.PAYLOAD, EffectName.PARAMETER_CHANGE})
 """Effects that the model's own columns absorb: measured without that."""
 
+KINEMATIC: Final = frozenset({EffectName.WHEEL_RADIUS, EffectName.TIME_DELAY})
+"""Effects that break the rolling constraints, and are measured there where no torque shows them."""
+
 PRACTICAL: Final[Mapping[EffectName, Mapping[str, float]]] = MappingProxyType(
     {
         EffectName.STRIBECK: {"steering": 6.0, "wheel": 2.0, "wheels": 1.0},
