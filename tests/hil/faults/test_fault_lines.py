@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -83,3 +84,10 @@ def test_a_script_holds_one_fault_a_line_and_comments() -> None:
 def test_the_line_of_a_script_that_is_wrong_is_named() -> None:
     with pytest.raises(FaultError, match="Line 3"):
         parse_script("death\n# fine\ndorp@0x181")
+
+
+def test_the_documentation_lists_every_fault_with_its_numbers() -> None:
+    text = (Path(__file__).parents[3] / "docs" / "bench.md").read_text(encoding="utf-8")
+    rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
+    for kind, one in SPECIFICATIONS.items():
+        assert all(f"`{name}`" in rows[kind] for name in one.parameters), kind
