@@ -14,7 +14,7 @@ from ident.gap.generic import Generic, predict_generic
 from ident.gap.probability import Ranked, calibration, rank
 from ident.gap.problem import Candidate, Problem
 from ident.gap.refit import Part, Refit, refit
-from ident.gap.remainder import Floors, held_out_gap, noise_floors, repeated, shares
+from ident.gap.remainder import held_out_gap, noise_floors, repeated, shares
 from ident.gap.rows import make_rows
 from ident.gap.search import Found, Regression, Settings, concluded, least_squares, search
 from ident.gap.whitening import Predictor, Whitener
@@ -216,7 +216,7 @@ class _Judgement:
     def _others(self, index: int) -> tuple[int, ...]:
         return tuple(other for place, other in enumerate(self.found.variants) if place != index)
 
-    def _floors(self) -> Floors:
+    def _floors(self) -> Array:
         stacked = self.rows.stack(list(self.after.blocks))
         return noise_floors(self.rows, self.after.blocks, self.rows.target - stacked - self.rest.prediction)
 

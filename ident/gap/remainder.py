@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,23 +15,10 @@ Array = NDArray[np.float64]
 Series = Sequence[Array]
 
 
-@dataclass(frozen=True)
-class Floors:
+def noise_floors(rows: Rows, models: Series, left: Array) -> Array:
     """Rms of the noise of every block, and of what is tolerated in it, in the unit of its target.
 
-    Attributes:
-        values: one a block.
-        measured: whether it comes from repeats of the same coordinate.
-    """
-
-    values: Array
-    measured: NDArray[np.bool_]
-
-
-def noise_floors(rows: Rows, models: Series, left: Array) -> Floors:
-    """Noise from what differs between repeats, or, without any, from what a smooth function of the states leaves.
-
-    Never below what a block tolerates.
+    It is what differs between repeats, or, without any, what a smooth function of the states leaves.
 
     Args:
         rows: of the blocks.
@@ -45,7 +31,7 @@ def noise_floors(rows: Rows, models: Series, left: Array) -> Floors:
     for label, (variance, freedom) in zip(labels, spreads, strict=True):
         total, count = pooled.get(label, (0.0, 0))
         pooled[label] = (total + variance * freedom, count + freedom)
-    values, measured = [], []
+    values = []
     for (block, _), label, (variance, freedom), place in zip(
         rows.blocks, labels, spreads, rows.block_slices, strict=True
     ):
@@ -53,19 +39,17 @@ def noise_floors(rows: Rows, models: Series, left: Array) -> Floors:
         if freedom == 0:
             variance = total / count if count else float(np.mean(left[place] ** 2)) if left[place].size else 0.0
         values.append(np.hypot(np.sqrt(variance), block.tolerance))
-        measured.append(count > 0)
-    least = [max(block.tolerance, np.finfo(float).tiny) for block, _ in rows.blocks]
-    return Floors(np.maximum(values, least), np.array(measured, dtype=bool))
+    return np.maximum(values, np.finfo(float).tiny)
 
 
-def held_out_gap(rows: Rows, floors: Floors, before: Series, after: Series) -> Gap:
+def held_out_gap(rows: Rows, floors: Array, before: Series, after: Series) -> Gap:
     """Rms over all samples of the confirming blocks, each over its noise."""
     sums, count = np.zeros(3), 0
     for index, (block, kept) in enumerate(rows.blocks):
         if not rows.confirming[rows.block_slices[index]].any():
             continue
         samples = kept.samples.ravel()
-        floor = floors.values[index]
+        floor = floors[index]
         for place, model in enumerate((before[index], after[index])):
             power = float(np.sum(((block.target - model)[samples] / floor) ** 2))
             sums[place] += max(power, len(samples)) if block.tolerance > 0 else power
@@ -75,11 +59,11 @@ def held_out_gap(rows: Rows, floors: Floors, before: Series, after: Series) -> G
     return Gap(float(mean[0]), float(mean[1]), float(mean[2]))
 
 
-def shares(rows: Rows, floors: Floors, before: Series) -> tuple[Share, ...]:
+def shares(rows: Rows, floors: Array, before: Series) -> tuple[Share, ...]:
     """Power of the gap above the noise by coordinate and region; repeats averaged, so that noise counts little."""
     power: dict[tuple[str, str, str, str], float] = {}
     for index, (block, kept) in enumerate(rows.blocks):
-        excess = _excess(block, kept, before[index], floors.values[index])
+        excess = _excess(block, kept, before[index], floors[index])
         for region, mask in _regions(block, kept).items():
             key = (str(block.channel), block.step, block.coordinate, region)
             power[key] = power.get(key, 0.0) + max(float(excess[mask].sum()), 0.0)
@@ -91,13 +75,13 @@ def shares(rows: Rows, floors: Floors, before: Series) -> tuple[Share, ...]:
 ALL = "all"
 
 
-def repeated(rows: Rows, floors: Floors, models: Series) -> Mapping[str, float]:
+def repeated(rows: Rows, floors: Array, models: Series) -> Mapping[str, float]:
     """Rms over the noise of what repeats, by coordinate; only of blocks with repeats."""
     sums: dict[str, tuple[float, int]] = {}
     for index, (block, kept) in enumerate(rows.blocks):
         if len(kept.samples) < 2:
             continue
-        excess = _excess(block, kept, models[index], floors.values[index])
+        excess = _excess(block, kept, models[index], floors[index])
         total, count = sums.get(block.label, (0.0, 0))
         sums[block.label] = (total + float(excess.sum()), count + len(excess))
     return {label: float(np.sqrt(max(total, 0.0) / max(count, 1))) for label, (total, count) in sums.items()}

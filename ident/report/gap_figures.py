@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -61,8 +61,10 @@ def residual_figures(findings: Findings) -> list[tuple[str, str, Figure]]:
     order = np.argsort([-_size(block, model) for block, model in zip(blocks, findings.before.blocks, strict=False)])
     for index in order[:MOST_RESIDUALS].tolist():
         block = blocks[index]
-        models = findings.before.blocks[index], findings.after.blocks[index]
-        drawn.append((f"residual-{index}", f"{block.step} · {block.coordinate}", _residual(block, *models)))
+        models = {"before": findings.before.blocks[index]}
+        if findings.causes:
+            models["with the causes"] = findings.after.blocks[index]
+        drawn.append((f"residual-{index}", f"{block.step} · {block.coordinate}", _residual(block, models)))
     return drawn
 
 
@@ -72,7 +74,7 @@ def _size(block: Block, model: Array) -> float:
     return float(np.sqrt(np.mean(left**2))) / scale if scale > 0 else 0.0
 
 
-def _residual(block: Block, before: Array, after: Array) -> Figure:
+def _residual(block: Block, models: Mapping[str, Array]) -> Figure:
     kept = kept_rows(block)
     step = max(1, math.ceil(kept.samples.shape[1] / MOST_SAMPLES))
     time = (kept.samples[0] * block.sample_time)[::step]
@@ -97,7 +99,6 @@ def _residual(block: Block, before: Array, after: Array) -> Figure:
         "xaxis": {"title": {"text": "time, repeats averaged [s]" if len(kept.samples) > 1 else "time [s]"}},
         "yaxis": {"title": {"text": f"measured - model [{unit_text(block.unit)}]"}, "zeroline": True},
     }
-    return {
-        "data": [line(before, "before", RESIDUAL, 1.2), line(after, "with the causes", MODELLED, 1.6)],
-        "layout": layout,
-    }
+    colours = ((RESIDUAL, 1.2), (MODELLED, 1.6))
+    lines = [line(model, name, *style) for (name, model), style in zip(models.items(), colours, strict=False)]
+    return {"data": lines, "layout": layout}

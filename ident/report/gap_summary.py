@@ -9,7 +9,6 @@ from ident.gap.judge import Findings
 from ident.report.digits import percent, significant, unit_text, with_std
 
 MOST_CAUSES: Final = 4
-REGION_NAMES: Final = {"all": ""}
 
 _VERDICTS: Final = {
     Verdict.EFFECT: "The model lacks {names}.",
@@ -43,9 +42,7 @@ def verdict_line(diagnosis: Diagnosis) -> str:
 def cause_line(effect: NamedEffect) -> str:
     """A cause with its probability, its numbers and its rivals."""
     numbers = ", ".join(
-        f"{name} {with_std(quantity.value, quantity.std)} {unit_text(quantity.unit)}".rstrip(" 1").rstrip()
-        if quantity.unit == "1"
-        else f"{name} {with_std(quantity.value, quantity.std)} {unit_text(quantity.unit)}"
+        f"{name} {with_std(quantity.value, quantity.std)} {unit_text(quantity.unit)}".removesuffix(" 1")
         for name, quantity in effect.parameters.items()
     )
     rivals = [plain(name) for name in effect.ambiguity_set if name != effect.name]
