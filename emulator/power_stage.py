@@ -112,8 +112,11 @@ class PowerStage:
         self._at_peak = self._stalled = 0.0
 
     def report(self, trip: Trip) -> None:
-        """Respond to something, unless the protection has responded already."""
-        if self.trip is None:
+        """Respond to something, unless the protection has responded already.
+
+        After an over-temperature the motor still brakes: what happens on the way is responded to as well.
+        """
+        if self.trip is None or (self.trip is Trip.OVER_TEMPERATURE and trip is not self.trip):
             self.trip = trip
             if self._tripped is not None:
                 self._tripped(trip)
@@ -137,7 +140,8 @@ class PowerStage:
         if load <= 1.0:
             self._at_peak = self._stalled = 0.0
             return self._voltage_trip()
-        return self._overload_trip(abs(torque), abs(speed)) or self._voltage_trip()
+        # The over-temperature stays while the motor brakes, and must not hide what comes on top of it.
+        return self._voltage_trip() or self._overload_trip(abs(torque), abs(speed))
 
     def _overload_trip(self, torque: float, speed: float) -> Trip | None:
         peak_time, stall_time = self._limits

@@ -90,6 +90,10 @@ class Emergency:
         self._history.clear()
         self._waiting.clear()
 
+    def reset_communication(self) -> None:
+        """The communication starts afresh, without errors; those of the device and the history stay."""
+        self._communication.clear()
+
     def register(self) -> int:
         """Object 1001h."""
         value = ErrorRegister.NONE

@@ -145,6 +145,7 @@ class Node:
     def _initialise(self, application: bool) -> None:
         self.object_dictionary.restore(0x1000, 0xFFFF if application else 0x1FFF, self._storage.stored())
         self._sdo.reset()
+        self.emergency.reset_communication()
         if application:
             self.emergency.reset()
         self.pdos.load()

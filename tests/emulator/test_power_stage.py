@@ -115,3 +115,17 @@ def test_a_trip_is_reported_once_until_it_is_cleared() -> None:
     power_stage.clear()
     power_stage.report(Trip.BLOCKED)
     assert seen == [Trip.ENCODER, Trip.BLOCKED]
+
+
+def test_a_drive_that_brakes_because_it_is_hot_is_still_protected() -> None:
+    power_stage, seen = stage(), []
+    power_stage.watch(seen.append)
+    _, trip = run(power_stage, 2.0, 100.0, 30.0)
+    assert trip is Trip.OVER_TEMPERATURE
+    power_stage.report(trip)
+    for _ in range(100):
+        trip = power_stage.advance(-2.0, 1000.0)
+        if trip is not None:
+            power_stage.report(trip)
+    assert power_stage.thermal_load > 1.05
+    assert seen == [Trip.OVER_TEMPERATURE, Trip.OVER_VOLTAGE]

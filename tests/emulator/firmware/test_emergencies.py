@@ -106,6 +106,16 @@ def test_a_reset_of_the_node_ends_all_errors(wire) -> None:
     assert (wire.read(1, 0x1001), wire.read(1, 0x1003)) == (0, 0)
 
 
+def test_a_reset_of_the_communication_ends_its_errors_and_they_are_told_when_they_come_again(wire) -> None:
+    for _ in range(2):
+        wire.write(5, 0x1016, 1, struct.pack("<I", 0x7F0000 | 100))
+        wire.send(0x77F, b"\x05")
+        assert messages(wire.wait(0.2), 0x085) == [(0x8130, 0x11, 0x7F)]
+        wire.nmt(0x82, 5)
+        assert wire.read(5, 0x1001) == 0
+    assert wire.read(5, 0x1003) == 2
+
+
 def test_an_rpdo_that_stays_away_is_missed_and_welcomed_back(wire) -> None:
     wire.write(2, 0x1400, 5, struct.pack("<H", 20))
     wire.nmt(0x01, 2)
