@@ -22,6 +22,8 @@ from hil.buses import UnixBus
 pytestmark = pytest.mark.bench
 
 CYCLES, ROUNDS = 5000, 6
+WANTED = 6000
+"""[cycles/s]"""
 BUSY = 0.7
 """Load of the machine from which on cycles a second say nothing about us."""
 
@@ -133,7 +135,7 @@ def rate(cycles: float, seconds: float) -> float:
 def test_between_processes_six_thousand_cycles_a_second_pass_and_no_frame_is_lost(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """On a busy machine at least at 40 % of the speed of a hand loop that only moves the bytes."""
+    """On a busy machine, where waiting for a core decides, at least their CPU has to allow it: they take turns."""
     load = os.getloadavg()[0]
     with (
         process(SERVER, tmp_path / "bus") as told,
@@ -160,6 +162,6 @@ def test_between_processes_six_thousand_cycles_a_second_pass_and_no_frame_is_los
             f"{statistics.median(ratios):.2f} of bare sockets; {ROUNDS * CYCLES * 13} frames, none lost; "
             f"CPU of a cycle {servers * 1e6:.0f} us in the emulator, {own / ROUNDS / CYCLES * 1e6:.0f} us in the master"
         )
-    assert statistics.median(ratios) > 0.4
+    assert servers + own / ROUNDS / CYCLES < 1 / WANTED
     if load < BUSY:
-        assert statistics.median(rates) > 6000
+        assert statistics.median(rates) > WANTED
