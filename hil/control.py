@@ -29,8 +29,8 @@ class Injection(Protocol):
     def add(self, fault: str) -> int:
         """Inject a fault; gives its number."""
 
-    def remove(self, number: int) -> None:
-        """End a fault."""
+    def remove(self, number: int) -> bool:
+        """End a fault; whether there was one."""
 
     def clear(self) -> None:
         """End all faults."""
@@ -123,7 +123,8 @@ class ControlServer:
     def _remove(self, argument: str) -> str:
         if not argument.isdigit():
             raise UserError(f"{argument!r} is no number of a fault.", "List them first.")
-        self._faults.remove(int(argument))
+        if not self._faults.remove(int(argument)):
+            raise UserError(f"There is no fault {argument} that lasts or is still to come.", "List them first.")
         return f"fault {argument} ended"
 
 

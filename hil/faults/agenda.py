@@ -11,10 +11,10 @@ class Agenda:
     """A heap of calls; whoever moves time runs them."""
 
     def __init__(self) -> None:
-        self._heap: list[tuple[float, int, Callable[[], None]]] = []
+        self._heap: list[tuple[float, int, Callable[[], object]]] = []
         self._serial = count()
 
-    def at(self, instant: float, call: Callable[[], None]) -> None:
+    def at(self, instant: float, call: Callable[[], object]) -> None:
         """Call at `instant` [s]; an infinite one never comes."""
         if instant != float("inf"):
             heapq.heappush(self._heap, (round(instant, 9), next(self._serial), call))

@@ -100,12 +100,12 @@ class FaultInjector:
         self._agenda.at(now + fault.end, lambda: self.remove(number))
         return number
 
-    def remove(self, number: int) -> None:
-        """End a fault now, if it has not ended."""
-        self._injected.pop(number, None)
+    def remove(self, number: int) -> bool:
+        """End a fault now; whether it had not ended yet."""
         end = self._running.pop(number, None)
         if end is not None:
             end()
+        return self._injected.pop(number, None) is not None
 
     def clear(self) -> None:
         """End all faults now."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -64,7 +64,7 @@ def emergency(role: str, code: int = _ANY_ERROR) -> Condition:
         role: of the node, such as `drive_fl`.
         code: its error code, any but "error reset" unless given.
     """
-    wanted = Role(role)
+    wanted = _role(role, list(Role))
 
     def codes(world: World, since: int) -> list[int]:
         can_id = 0x80 + world.network.node(wanted).node_id
@@ -84,7 +84,7 @@ def emergency(role: str, code: int = _ANY_ERROR) -> Condition:
 
 def heartbeat_state(role: str, state: str) -> Condition:
     """A heartbeat of a node, from now on, that says `operational`, `pre-operational`, `stopped` or `boot-up`."""
-    wanted = Role(role)
+    wanted = _role(role, list(Role))
     if state not in _NMT_STATES.values():
         raise UserError(f"There is no NMT state {state!r}.", f"Use one of {', '.join(_NMT_STATES.values())}.")
 
@@ -102,7 +102,7 @@ def heartbeat_state(role: str, state: str) -> Condition:
 
 def drive(role: str, state: str) -> Condition:
     """A drive in a state of CiA 402, such as `operation enabled`."""
-    return _drives((Role(role),), state, f"{role} to be {state}")
+    return _drives((_role(role, DRIVES),), state, f"{role} to be {state}")
 
 
 def all_drives(state: str) -> Condition:
@@ -149,6 +149,12 @@ def _drives(roles: tuple[Role, ...], state: str, text: str) -> Condition:
         return ", ".join(f"{role} is {_label(world.drive_state(role))}" for role in roles)
 
     return Condition(text, lambda world, _: all(world.drive_state(role) is wanted for role in roles), found)
+
+
+def _role(name: str, known: Sequence[Role]) -> Role:
+    if name not in known:
+        raise UserError(f"There is no {name!r} to expect that of.", f"Use one of {', '.join(known)}.")
+    return Role(name)
 
 
 def _state(label: str) -> DriveState:

@@ -11,6 +11,7 @@ from typing import Final
 import can
 
 from hil.network import Network
+from ident.errors import UserError
 
 _HEARTBEAT_LOST: Final = 0x8130
 _LOST_AFTER: Final = 3.0
@@ -26,6 +27,17 @@ class Symptom(StrEnum):
     UNANSWERED_SDO = "unanswered SDO"
     LOST_HEARTBEAT = "lost heartbeat"
     SDO_ABORT = "SDO abort"
+
+
+def symptom(name: str) -> Symptom:
+    """The symptom of this name.
+
+    Raises:
+        UserError: there is none.
+    """
+    if name not in list(Symptom):
+        raise UserError(f"There is no symptom {name!r}.", f"Use one of {', '.join(Symptom)}.")
+    return Symptom(name)
 
 
 @dataclass(frozen=True)

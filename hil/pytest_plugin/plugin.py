@@ -27,9 +27,8 @@ _WORLD: Final[pytest.StashKey[World]] = pytest.StashKey()
 _ARTIFACTS: Final[pytest.StashKey[Artifacts]] = pytest.StashKey()
 _ALLOWED: Final[pytest.StashKey[set[Symptom]]] = pytest.StashKey()
 _FAILED: Final[pytest.StashKey[bool]] = pytest.StashKey()
-_MARKER: Final = (
-    "hil(prototype='prototype', network=None, seed=1, delays=False, noise=1.0): what the fixture `bench` is built of"
-)
+_CHOICES: Final = {"prototype": "prototype", "network": None, "seed": 1, "delays": False, "noise": 1.0}
+"""What the marker can say, and what holds where it does not."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -43,7 +42,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Make the marker known."""
-    config.addinivalue_line("markers", _MARKER)
+    choices = ", ".join(f"{name}={value!r}" for name, value in _CHOICES.items())
+    config.addinivalue_line("markers", f"hil({choices}): what the fixture `bench` is built of")
 
 
 @pytest.hookimpl(wrapper=True)
@@ -53,9 +53,10 @@ def pytest_runtest_makereport(
     """Attach recording and timeline to the report of a test that failed."""
     report = yield
     world = item.stash.get(_WORLD, None)
-    if world is None or report.when == "setup":
+    if world is None:
         return report
-    if report.when == "call":
+    if report.when != "teardown":
+        # A fixture that drives, and fails, is a test that has failed.
         item.stash[_FAILED] = report.failed
     keep = item.config.getoption("--hil-keep") == "all" and report.when == "call"
     if report.failed or keep:
@@ -70,9 +71,8 @@ def vehicle(request: pytest.FixtureRequest) -> Iterator[EmulatedVehicle]:
     from emulator.vehicle import EmulatedVehicle
 
     asked = _asked(request)
-    prototype = load_prototype(str(asked.get("prototype", "prototype")))
-    noise = float(asked.get("noise", 1.0))
-    with EmulatedVehicle(prototype, seed=int(asked.get("seed", 1)), noise_scale=noise) as emulated:
+    prototype = load_prototype(str(asked["prototype"]))
+    with EmulatedVehicle(prototype, seed=int(asked["seed"]), noise_scale=float(asked["noise"])) as emulated:
         yield emulated
 
 
@@ -87,8 +87,8 @@ def bench(request: pytest.FixtureRequest, vehicle: EmulatedVehicle) -> Iterator[
     from hil.pytest_plugin.world import World
 
     asked = _asked(request)
-    seed, delays = int(asked.get("seed", 1)), bool(asked.get("delays", False))
-    network = Path(asked.get("network") or network_file_of(str(asked.get("prototype", "prototype"))))
+    seed, delays = int(asked["seed"]), bool(asked["delays"])
+    network = Path(asked["network"] or network_file_of(str(asked["prototype"])))
     with LockstepBench(vehicle, network, ground=Ground(vehicle.engine), seed=seed, delays=delays) as lockstep:
         world = World(lockstep, vehicle, load_network(network))
         request.node.stash[_WORLD] = world
@@ -128,19 +128,24 @@ def expect(bench: World) -> Expect:
 @pytest.fixture
 def allow(request: pytest.FixtureRequest) -> Callable[..., None]:
     """Symptoms that this test provokes on purpose: `allow("lost heartbeat", "error frames")`."""
-    from hil.pytest_plugin.health import Symptom
+    from hil.pytest_plugin.health import symptom
 
     allowed = request.node.stash.setdefault(_ALLOWED, set())
 
     def allow_symptoms(*symptoms: str) -> None:
-        allowed.update(Symptom(symptom) for symptom in symptoms)
+        allowed.update(map(symptom, symptoms))
 
     return allow_symptoms
 
 
 def _asked(request: pytest.FixtureRequest) -> dict[str, Any]:
+    from ident.errors import UserError
+
     marker = request.node.get_closest_marker("hil")
-    return {} if marker is None else dict(marker.kwargs)
+    given = {} if marker is None else dict(marker.kwargs)
+    for wrong in [*map(repr, marker.args if marker else ()), *(name for name in given if name not in _CHOICES)]:
+        raise UserError(f"The marker hil takes no {wrong}.", f"Use NAME=VALUE with one of {', '.join(_CHOICES)}.")
+    return {**_CHOICES, **given}
 
 
 def _file_name(node_id: str) -> str:

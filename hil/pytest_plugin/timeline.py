@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from hil.pytest_plugin.world import Sample, World
 
 _WIDTH, _LEFT, _RIGHT, _ROW, _CURVE = 1000, 130, 20, 22, 90
 _LOAD_WINDOW: Final = 0.02
+_TICKS: Final = 10
+"""Marks that the axis of time has at most."""
 _NAMES_FROM: Final = 60
 """A bar at least this long [px] carries its name."""
 
@@ -69,6 +72,8 @@ def timeline(world: World, title: str) -> str:
     for height, part in rows:
         parts.append(f'<g transform="translate(0,{y})">{part}</g>')
         y += height + 4
+    parts += _ticks(axis, y)
+    y += 14
     notes = "".join(_notes(world, axis, y))
     height = y + 16 * (len(world.notes) + 1) + 10
     return (
@@ -148,6 +153,16 @@ def _curve(points: Sequence[tuple[float, float]], axis: _Axis, name: str, show: 
     frame = f'<rect x="{_LEFT}" y="6" width="{_WIDTH - _LEFT - _RIGHT}" height="{_CURVE - 14}" fill="#fafafa"/>'
     line = f'<polyline points="{path}" fill="none" stroke="#2c5f8a" stroke-width="1.2"/>'
     return frame + line + _label(name) + _text(8, 30, f"max {show(top)}", "s")
+
+
+def _ticks(axis: _Axis, y: int) -> Iterator[str]:
+    """Marks at round instants, down through all rows."""
+    power = 10.0 ** math.floor(math.log10((axis.end - axis.begin) / _TICKS))
+    step = next(power * factor for factor in (1, 2, 5, 10) if (axis.end - axis.begin) / (power * factor) <= _TICKS)
+    for k in range(math.floor(axis.begin / step), math.floor(axis.end / step + 1e-9) + 1):
+        x = axis.x(k * step)
+        yield f'<line x1="{x}" x2="{x}" y1="28" y2="{y - 4}" stroke="#000" stroke-opacity="0.12"/>'
+        yield f'<text x="{x}" y="{y + 8}" class="s" text-anchor="middle">{k * step:g} s</text>'
 
 
 def _notes(world: World, axis: _Axis, y: int) -> Iterator[str]:

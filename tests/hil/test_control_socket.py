@@ -55,7 +55,14 @@ def test_faults_are_injected_listed_and_ended(tell: Callable[[str], str]) -> Non
 
 
 @pytest.mark.parametrize(
-    ("text", "named"), [("dance", "dance"), ("add vanish@0x1", "vanish"), ("remove all", "number"), ("", "no command")]
+    ("text", "named"),
+    [
+        ("dance", "dance"),
+        ("add vanish@0x1", "vanish"),
+        ("remove all", "number"),
+        ("remove 7", "no fault 7"),
+        ("", "no command"),
+    ],
 )
 def test_what_cannot_be_done_is_refused_with_a_remedy(tell: Callable[[str], str], text: str, named: str) -> None:
     with pytest.raises(UserError) as caught:

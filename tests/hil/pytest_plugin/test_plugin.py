@@ -94,12 +94,54 @@ def test_a_failure_says_what_was_expected_and_found_and_leaves_recording_and_pic
         "trip@drive_fl",
         "FAILED: emergency 7121h",
         "speed",
+        "0 s",
     ):
         assert word in words
     known = properties(project.path / "junit.xml")
     assert known["hil_recording"] == [str(Path("kept") / recording.name)]
     assert known["hil_timeline"] == [str(Path("kept") / picture.name)]
     assert re.search(r"timeline: \S+\.svg", result.stdout.str())
+
+
+def test_a_fixture_that_fails_while_it_drives_leaves_recording_and_picture_and_one_error(
+    project: pytest.Pytester,
+) -> None:
+    project.makepyfile(
+        """
+        import pytest
+
+        @pytest.fixture
+        def driving(bench, faults):
+            faults.add("bus_off@drive_fl")
+            bench.run(0.1)
+            raise RuntimeError("it does not drive")
+
+        def test_drive(driving):
+            pass
+        """
+    )
+    result = project.runpytest("--junitxml=junit.xml")
+    result.assert_outcomes(errors=1)
+    recording, picture = sorted((project.path / "hil-artifacts").iterdir())
+    assert properties(project.path / "junit.xml")["hil_recording"] == [f"hil-artifacts/{recording.name}"]
+    assert "bus_off" in picture.read_text()
+
+
+MISSPELLED = {
+    "a choice of the marker": ("@pytest.mark.hil(prototyp='compact')\ndef test(bench): pass", "prototype, network"),
+    "a node": ("def test(expect): expect(drive('drive_xy', 'fault'))", "drive_rr"),
+    "a drive that is none": ("def test(expect): expect(drive('encoder_left', 'fault'))", "drive_rr"),
+    "the sender of an emergency": ("def test(expect): expect(emergency('drive'))", "encoder_right"),
+    "a symptom": ("def test(bench, allow): allow('lost hartbeat')", "lost heartbeat"),
+}
+
+
+@pytest.mark.parametrize(("test", "known"), MISSPELLED.values(), ids=MISSPELLED)
+def test_what_is_misspelled_is_told_with_what_there_is(project: pytest.Pytester, test: str, known: str) -> None:
+    project.makepyfile(f"import pytest\nfrom hil.testing import drive, emergency\n\n{test}\n")
+    result = project.runpytest()
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.re_match_lines([rf"E .*UserError: .*Use .*{known}"])
 
 
 def test_recordings_of_all_tests_are_kept_when_asked_for(project: pytest.Pytester) -> None:
