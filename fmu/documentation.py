@@ -45,8 +45,7 @@ def documentation_page(source: ModelSource, table: VariableTable, inputs: Inputs
         inputs=inputs,
         variables=rows,
         provenance={**source.provenance, **versions},
-        effects=[_effect_text(effect) for effect in source.in_model],
-        left_out=[str(effect) for effect in source.left_out],
+        effects=[_effect_text(effect) for effect in source.effects],
         documents=sorted(source.documents),
     )
 

@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fmu.model.generate import generate_core
-from fmu.table import neutral_effects, variable_table
+from fmu.table import neutral_effects, parameters_of, variable_table
 from fmu.variables import Inputs, VariableTable
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.effect_terms import TERMS
-from ident.vehicle.effects import Effect, EffectName
+from ident.vehicle.effects import Effect
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 
@@ -33,22 +32,12 @@ class ModelSource:
     documents: Mapping[str, bytes]
 
     @property
-    def in_model(self) -> tuple[Effect, ...]:
-        """The confirmed effects that the model has equations for."""
-        return tuple(effect for effect in self.effects if effect.name in TERMS or effect.name is EffectName.SLIP)
-
-    @property
-    def left_out(self) -> tuple[Effect, ...]:
-        """The confirmed effects that it has none for: delay, backlash, elasticity."""
-        return tuple(effect for effect in self.effects if effect not in self.in_model)
-
-    @property
     def standard_deviations(self) -> Mapping[str, float]:
         """Of the FMU's parameters, by name, where they are known."""
         known = {name: self.parameters.std_of(name) for name in PARAMETER_NAMES}
-        for effect in self.in_model:
+        for effect in self.effects:
             for name, quantity in effect.parameters.items():
-                known[f"{effect.name}.{effect.where}.{name}"] = quantity.std
+                known.update(dict.fromkeys(parameters_of(effect, name), quantity.std))
         return {name: std for name, std in known.items() if std > 0}
 
 
@@ -68,8 +57,8 @@ class Model:
 
 
 def make_model(source: ModelSource, inputs: Inputs) -> Model:
-    """The model with every effect that it has equations for; those that are not confirmed have size zero."""
-    effects = _with_neutral(source.in_model)
+    """The model with the confirmed effects, and with those of size zero that take no states of their own."""
+    effects = _with_neutral(source.effects)
     table = variable_table(source.vehicle, source.parameters, effects, inputs)
     core = generate_core(table, effects, inputs)
     return Model(table, core.files, core.dependencies)

@@ -4,8 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
+from fmu.effect_states import (
+    DAMPING_RATIO,
+    MOTOR_SHARE,
+    STIFFEST,
+    AddedState,
+    Memories,
+    coupled_states,
+    memories_of,
+    other_states,
+)
 from fmu.variables import Block, Causality, Inputs, Variability, Variable, VariableTable, numbered
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effect_terms import TERMS
@@ -54,6 +65,8 @@ _STICTION: Final = {
     "lag": "Lagged load on the friction of {}",
 }
 
+_NEVER_NEGATIVE: Final = (EffectName.BACKLASH, EffectName.ELASTICITY)
+
 _GEOMETRY: Final = {
     "wheelbase": "Between front and rear steering axes (l)",
     "track_width": "Between left and right steering axes (b)",
@@ -75,10 +88,11 @@ def variable_table(
         effects: each adds its parameters; those of `slip` are start values of the friction limits.
         inputs: motor torques, or wheel speeds with the drives' inner loop.
     """
-    states = _states(inputs)
+    memories = memories_of(effects)
+    states = _states(inputs, memories)
     derivatives = [_derivative(state) for state in states]
     parameter_rows = _parameters(vehicle, parameters, effects, inputs)
-    return numbered([[_time()], states, derivatives, _inputs(inputs), parameter_rows, _outputs(), [_mode()]])
+    return numbered([[_time()], states, derivatives, _inputs(inputs), parameter_rows, _outputs(memories), [_mode()]])
 
 
 def _time() -> Variable:
@@ -90,8 +104,8 @@ def _mode() -> Variable:
     return Variable("mode", text, Causality.OUTPUT, Variability.DISCRETE, Block.MODE, "1", minimum=1, maximum=4)
 
 
-def _states(inputs: Inputs) -> list[Variable]:
-    """Rates first, which the equations couple; then what follows from them."""
+def _states(inputs: Inputs, memories: Memories) -> list[Variable]:
+    """Rates first, which the equations couple, with those of effects; then what follows from them."""
     rates = [
         _state("x_dot", "Velocity of the chassis forward, in the chassis frame", "m/s", 0.1),
         _state("y_dot", "Velocity of the chassis to the left, in the chassis frame", "m/s", 0.1),
@@ -114,7 +128,12 @@ def _states(inputs: Inputs) -> list[Variable]:
         _state("pose_x", "Position of the chassis in the world, along x", "m", 0.1),
         _state("pose_y", "Position of the chassis in the world, along y", "m", 0.1),
     ]
-    return rates + _hidden_states(inputs) + angles
+    coupled, others = (_added(states(memories)) for states in (coupled_states, other_states))
+    return rates + coupled + _hidden_states(inputs) + others + angles
+
+
+def _added(states: Sequence[AddedState]) -> list[Variable]:
+    return [_state(row.name, row.text, row.unit, row.nominal, Causality.LOCAL) for row in states]
 
 
 def _hidden_states(inputs: Inputs) -> list[Variable]:
@@ -181,7 +200,9 @@ def _parameters(
     ]
     drives = _drives(vehicle) if inputs is Inputs.SPEED else []
     of_effects = [row for effect in effects for row in _effect_parameters(effect)]
-    return dynamic + geometry + _regularisation() + _friction_limits(vehicle, effects) + drives + of_effects
+    springs = _springs(memories_of(effects))
+    limits = _friction_limits(vehicle, effects)
+    return dynamic + geometry + _regularisation() + limits + drives + springs + of_effects
 
 
 def _parameter(
@@ -211,13 +232,12 @@ def _regularisation() -> list[Variable]:
 
 
 def _friction_limits(vehicle: VehicleDescription, effects: Sequence[Effect]) -> list[Variable]:
-    limits = dict.fromkeys(WHEELS, vehicle.limits.floor_friction)
+    limits = {f"friction_limit_{wheel}": vehicle.limits.floor_friction for wheel in WHEELS}
     for effect in effects:
         if effect.name is EffectName.SLIP:
-            wheels = WHEELS if effect.where in CHASSIS else (WHEELS[WHEEL_PLACES.index(effect.where)],)
-            limits.update(dict.fromkeys(wheels, effect.size))
+            limits.update(dict.fromkeys(parameters_of(effect, "friction"), effect.size))
     text = "Largest contact force of wheel {} over its load"
-    return [_positive(f"friction_limit_{wheel}", text.format(wheel), "1", limit) for wheel, limit in limits.items()]
+    return [_positive(name, text.format(name.rpartition("_")[2]), "1", limit) for name, limit in limits.items()]
 
 
 def _drives(vehicle: VehicleDescription) -> list[Variable]:
@@ -232,9 +252,32 @@ def _drives(vehicle: VehicleDescription) -> list[Variable]:
     ]
 
 
+def _springs(memories: Memories) -> list[Variable]:
+    if not memories.flexible:
+        return []
+    share = "Share of B_w on the motor's side of a flexible gear"
+    stiffest = "Stiffness of a gear or coupling that has play and no compliance"
+    damping = "Of the free vibration of both sides of a gear or coupling on its spring"
+    rows = [
+        _positive("spring_stiffness", stiffest, "Nm/rad", STIFFEST),
+        _not_negative("spring_damping_ratio", damping, "1", DAMPING_RATIO),
+    ]
+    if memories.gears:
+        rows.append(replace(_positive("motor_share", share, "1", MOTOR_SHARE), minimum=0.01, maximum=0.99))
+    return rows
+
+
 def effect_parameter(effect: Effect, parameter: str) -> str:
     """Name in the table of a parameter of an effect."""
     return f"{effect.name}.{effect.where}.{parameter}"
+
+
+def parameters_of(effect: Effect, parameter: str) -> tuple[str, ...]:
+    """Names in the table that a parameter of an effect has: its own, or the friction limits that `slip` is."""
+    if effect.name is not EffectName.SLIP:
+        return (effect_parameter(effect, parameter),)
+    wheels = WHEELS if effect.where in CHASSIS else (WHEELS[WHEEL_PLACES.index(effect.where)],)
+    return tuple(f"friction_limit_{wheel}" for wheel in wheels)
 
 
 def _effect_parameters(effect: Effect) -> list[Variable]:
@@ -247,6 +290,7 @@ def _effect_parameters(effect: Effect) -> list[Variable]:
             f"{effect}: {entry.meaning}",
             spec.unit(entry.name, effect.where),
             effect[entry.name],
+            minimum=0.0 if effect.name in _NEVER_NEGATIVE else None,
         )
         for entry in spec.parameters
     ]
@@ -287,7 +331,13 @@ _PER_WHEEL: Final = {
 }
 
 
-def _outputs() -> list[Variable]:
+_AT_MOTOR: Final = {
+    "_reported": ("Rolling angle of wheel {} as the encoder of its motor reports it", "rad"),
+    "_dot_reported": ("Rolling rate of wheel {} as the encoder of its motor reports it", "rad/s"),
+}
+
+
+def _outputs(memories: Memories) -> list[Variable]:
     reported = "Steering angle as its encoder reports it, {}"
     return [
         *(_output(f"alpha_{side}_reported", reported.format(text), "rad") for side, text in _SIDES.items()),
@@ -297,4 +347,9 @@ def _outputs() -> list[Variable]:
             for wheel in WHEELS
         ),
         *(_output(name, text, unit) for name, (text, unit) in _GENERALIZED_TORQUES.items()),
+        *(
+            _output(f"beta_{WHEELS[wheel]}{name}", text.format(WHEELS[wheel]), unit)
+            for wheel in memories.gears
+            for name, (text, unit) in _AT_MOTOR.items()
+        ),
     ]

@@ -98,8 +98,8 @@ def simulate(fmu: Path, segment: Segment, spec: RowsOfStep, geometry: Geometry) 
     reported = np.empty((len(segment), 6))
     with FmuInstance(fmu, _start(fmu, segment, spec, geometry)) as instance:
         commanded = instance.port([f"torque_{wheel}" for wheel in WHEELS])
-        names = [f"beta_{wheel}" for wheel in WHEELS] + [f"alpha_{side}_reported" for side in _SIDES]
-        watched = instance.port(names)
+        states = [f"beta_{wheel}" for wheel in WHEELS] + [f"alpha_{side}" for side in _SIDES]
+        watched = instance.port([instance.reported(state) for state in states])
         reported[0] = instance.read(watched)
         for sample, torque in enumerate(torques.tolist(), start=1):
             instance.write(commanded, torque)

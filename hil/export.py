@@ -75,6 +75,4 @@ def export_run(run: Path, out: Path, order: Order, console: Console) -> Exported
 
         content = build_fmu(source, order, compiler, done)
     write_fmu(content, out)
-    for effect in source.left_out:
-        console.print(f"[yellow]{effect} is not part of the model: it has no equations for it.[/yellow]")
     return Exported(out, len(content), time.monotonic() - start)

@@ -61,6 +61,11 @@ class FmuInstance:
         """Of all variables."""
         return tuple(self._variables)
 
+    def reported(self, state: str) -> str:
+        """What sensors report in place of a state: `<state>_reported` where that is a variable, else the state."""
+        name = f"{state}_reported"
+        return name if name in self._variables else state
+
     def port(self, names: Sequence[str]) -> Port:
         """What is needed to read or write variables.
 

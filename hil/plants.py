@@ -65,8 +65,8 @@ class _Joints:
 _SENSED: Final = (
     *(f"beta_{wheel}" for wheel in WHEELS),
     *(f"beta_{wheel}_dot" for wheel in WHEELS),
-    "alpha_l_reported",
-    "alpha_r_reported",
+    "alpha_l",
+    "alpha_r",
 )
 
 
@@ -114,7 +114,7 @@ class FmuVehicle:
         self._grip = list(self._floor)
         self._lifted = False
         self._payload = self.instance.port(["payload"])
-        self._sensed = self.instance.port(_SENSED)
+        self._sensed = self.instance.port([self.instance.reported(state) for state in _SENSED])
         self._steps = 0
         self._owed = 0.0
 

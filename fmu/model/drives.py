@@ -16,20 +16,21 @@ _SHARPNESS: Final = 4
 """Of the limit: at half of it 1.5 % of the torque is missing."""
 
 
-def _torque_inputs(x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
+def _torque_inputs(rates: Expression, x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
     return u.wheels("torque_{}"), ca.SX.zeros(0)
 
 
-def _speed_loops(x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
+def _speed_loops(rates: Expression, x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
     """Proportional and integral action with a smooth limit; at the limit the integral follows the torque."""
-    error = u.wheels("speed_{}") - x.wheels("beta_{}_dot")
+    error = u.wheels("speed_{}") - rates
     wanted = p["drive_gain"] * error + x.wheels("integral_{}")
     limit = p["drive_torque_limit"]
     torque = wanted / (1 + (wanted / limit) ** _SHARPNESS) ** (1 / _SHARPNESS)
     return torque, p["drive_integral_gain"] * error - (wanted - torque) / p["drive_unwind_time"]
 
 
-DRIVES: Final[Mapping[Inputs, Callable[[Symbols, Symbols, Symbols], tuple[Expression, Expression]]]] = MappingProxyType(
-    {Inputs.TORQUE: _torque_inputs, Inputs.SPEED: _speed_loops}
-)
-"""By the inputs: from states, inputs and parameters to torques (4,) [Nm] and rates of the integral states [Nm/s]."""
+_Drive = Callable[[Expression, Symbols, Symbols, Symbols], tuple[Expression, Expression]]
+
+DRIVES: Final[Mapping[Inputs, _Drive]] = MappingProxyType({Inputs.TORQUE: _torque_inputs, Inputs.SPEED: _speed_loops})
+"""By the inputs: from rates (4,) of the motors at the wheels, states, inputs and parameters to torques (4,) [Nm] and
+rates of the integral states [Nm/s]."""

@@ -7,10 +7,20 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from fmu.effect_states import coupled_states, memories_of
+from fmu.model.delays import filter_rates, late_angles, late_torques
 from fmu.model.drives import DRIVES
 from fmu.model.motion import acceleration, motion_of, motor_wrench
 from fmu.model.stiction import memory_rates
-from fmu.model.symbols import Symbols, bound
+from fmu.model.symbols import Symbols, bound, dynamic_parameters
+from fmu.model.transmissions import (
+    Springs,
+    at_motors,
+    couplings_of,
+    gears_of,
+    transmitted_torques,
+    twist_accelerations,
+)
 from fmu.table import effect_parameter
 from fmu.variables import Block, Inputs, VariableTable
 from ident.vehicle import effect_terms
@@ -29,6 +39,7 @@ class Equations:
         y: outputs.
         z: event indicators (4,); the mode is 4 where z[0] < 0, else 3 where z[1] < 0, else 2 where z[2] and z[3] are
             negative, else 1.
+        coupled: how many of the first states, the rates, the equations couple; the solver eliminates the others.
     """
 
     x: Expression
@@ -37,27 +48,44 @@ class Equations:
     xd: Expression
     y: Expression
     z: Expression
+    coupled: int
 
 
 def equations(table: VariableTable, effects: Sequence[Effect], inputs: Inputs) -> Equations:
     """The equations for a table of variables, and the effects and inputs that it was made for."""
     x, u, p = (Symbols(block.value, table.block(block)) for block in (Block.STATE, Block.INPUT, Block.PARAMETER))
     terms = _terms(effects, u, p)
-    motion = motion_of(x, p, terms)
-    alpha, beta, rates = motion.state.alpha, motion.state.beta, motion.state.rates
-    torques, integral_rates = DRIVES[inputs](x, u, p)
-    shaft = effect_terms.shaft_torques(terms, torques, beta)
+    memories, springs = memories_of(effects), Springs(effects, p)
+    parameters = effect_terms.changed_parameters(terms, dynamic_parameters(p))
+    couplings = couplings_of(x, springs, memories, parameters)
+    gears = gears_of(x, springs, memories, parameters)
+    motion = motion_of(x, p, terms, parameters, couplings)
+    alpha, rates = motion.state.alpha, motion.state.rates
+    motor_angles = at_motors(gears, motion.state.beta, "twist")
+    motor_rates = at_motors(gears, rates[5:], "rate")
+    torques, integral_rates = DRIVES[inputs](motor_rates, x, u, p)
+    shaft = effect_terms.shaft_torques(terms, late_torques(x, p, memories, torques), motor_angles)
+    accelerations = acceleration(motion, p, transmitted_torques(gears, shaft), gears)
+    slope_rates, filtered_rates = filter_rates(x, p, memories, torques, rates[3:5])
     xd = ca.vertcat(
-        acceleration(motion, p, shaft),
+        accelerations,
+        twist_accelerations(gears, shaft, accelerations[5:9]),
+        slope_rates,
         memory_rates(x, p, rates),
         integral_rates,
+        *(coupling.rate for coupling in couplings),
+        *(gear.rate for gear in gears),
+        filtered_rates,
         rates[3:],
         _pose_rate(motion.state.heading, rates),
     )
-    reported = 2 * alpha - effect_terms.true_steering(terms, alpha)
+    reported = late_angles(x, p, memories, 2 * alpha - effect_terms.true_steering(terms, alpha))
     slip = motion.slip
-    y = ca.vertcat(reported, torques, slip[4:], slip[:4], motor_wrench(motion, shaft))
-    return Equations(x.vector, u.vector, p.vector, bound(xd, p), bound(y, p), bound(_mode_distances(alpha, p), p))
+    at_shafts = (angle for gear in gears for angle in (motor_angles[gear.wheel], motor_rates[gear.wheel]))
+    y = ca.vertcat(reported, torques, slip[4:], slip[:4], motor_wrench(motion, shaft), *at_shafts)
+    distances = bound(_mode_distances(alpha, p), p)
+    coupled = rates.numel() + len(coupled_states(memories))
+    return Equations(x.vector, u.vector, p.vector, bound(xd, p), bound(y, p), distances, coupled)
 
 
 def _terms(effects: Sequence[Effect], u: Symbols, p: Symbols) -> list[EffectTerm]:

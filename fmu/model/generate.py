@@ -19,9 +19,6 @@ from fmu.variables import Block, Inputs, Variable, VariableTable
 from ident.vehicle.effects import Effect
 from ident.vehicle.symbolic import Expression
 
-COUPLED: Final = 9
-"""The first states, the rates, are those that the equations couple; the solver eliminates the others."""
-
 TOLERANCE: Final = 1e-4
 """Of the solver, where nobody sets one."""
 
@@ -74,7 +71,7 @@ def generate_core(table: VariableTable, effects: Sequence[Effect], inputs: Input
     routines, jacobian_size = _routines(model)
     written = {name: (resources.files("fmu.model") / name).read_text(encoding="utf-8") for name in _WRITTEN}
     generated = {
-        "qo_sizes.h": _sizes(table, jacobian_size, model.z.numel()),
+        "qo_sizes.h": _sizes(table, jacobian_size, model),
         "qo_table.c": _table(table),
         "qo_equations.h": _prototypes(routines),
         "qo_equations.c": _definitions(routines),
@@ -90,7 +87,7 @@ def _routines(model: Equations) -> tuple[list[_Routine], int]:
         _Routine("outputs", point, {"y": model.y}),
         _Routine("mode_distances", point, {"z": model.z}),
         _Routine("jacobian", point, {"jacobian": _nonzeros(jacobian)}),
-        *_eliminations(jacobian.sparsity()),
+        *_eliminations(jacobian.sparsity(), model.coupled),
         *_directional(model, point),
     ]
     return routines, jacobian.nnz()
@@ -100,15 +97,15 @@ def _nonzeros(matrix: Expression) -> Expression:
     return ca.vertcat(*matrix.nonzeros())
 
 
-def _eliminations(pattern: Any) -> list[_Routine]:
+def _eliminations(pattern: Any, count: int) -> list[_Routine]:
     """The system (shift I - J) k = right, reduced to its coupled states: its matrix by rows, its side, its solution.
 
     The others do not couple among each other beyond a triangle, so what they add is written out, without a loop.
     """
     values, shift = ca.SX.sym("jacobian", pattern.nnz()), ca.SX.sym("shift")
-    right, coupled = ca.SX.sym("right", pattern.size1()), ca.SX.sym("coupled", COUPLED)
+    right, coupled = ca.SX.sym("right", pattern.size1()), ca.SX.sym("coupled", count)
     matrix = shift * ca.SX.eye(pattern.size1()) - ca.SX(pattern, values)
-    first, rest = slice(None, COUPLED), slice(COUPLED, None)
+    first, rest = slice(None, count), slice(count, None)
     reduced = matrix[first, first] - matrix[first, rest] @ ca.solve(matrix[rest, rest], matrix[rest, first])
     side = right[first] - matrix[first, rest] @ ca.solve(matrix[rest, rest], right[rest])
     others = ca.solve(matrix[rest, rest], right[rest] - matrix[rest, first] @ coupled)
@@ -194,14 +191,14 @@ def _definition(routine: _Routine) -> str:
     return "\n".join([_signature(routine), "{", body, *unused, "}", ""])
 
 
-def _sizes(table: VariableTable, jacobian_size: int, indicators: int) -> str:
+def _sizes(table: VariableTable, jacobian_size: int, model: Equations) -> str:
     sizes = {
         "NX": len(table.block(Block.STATE)),
         "NU": len(table.block(Block.INPUT)),
         "NP": len(table.block(Block.PARAMETER)),
         "NY": len(table.block(Block.OUTPUT)),
-        "NZ": indicators,
-        "NV": COUPLED,
+        "NZ": model.z.numel(),
+        "NV": model.coupled,
         "NJ": jacobian_size,
     }
     lines = [f"#define QO_{name} {size}" for name, size in sizes.items()]

@@ -55,19 +55,13 @@ def vehicle(burdened: Path) -> Any:
     instance.references = {row.name: row.valueReference for row in description.modelVariables}
     random = np.random.default_rng(3)
     for row in description.modelVariables:
-        if row.causality == "input" or (row.causality == "output" and row.start is not None):
+        if row.causality == "input" or (row.causality in ("output", "local") and row.start is not None):
             instance.setReal([row.valueReference], [float(random.uniform(0.05, 0.4))])
     return instance
 
 
-def test_every_effect_with_equations_is_there_with_its_numbers(vehicle: Any, source: ModelSource) -> None:
-    confirmed = replace(source, effects=every_effect())
-    assert {effect.name for effect in confirmed.left_out} == {
-        EffectName.TIME_DELAY,
-        EffectName.BACKLASH,
-        EffectName.ELASTICITY,
-    }
-    for effect in confirmed.in_model:
+def test_every_effect_is_there_with_its_numbers(vehicle: Any) -> None:
+    for effect in every_effect():
         if effect.name is not EffectName.SLIP:
             for name in effect.parameters:
                 reference = vehicle.references[f"{effect.name}.{effect.where}.{name}"]
