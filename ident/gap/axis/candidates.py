@@ -58,7 +58,8 @@ class AxisModel:
         sample_time: [s].
         filtered: passes (N,) or (N, k) through the filter of the rows.
         inertia: M of a first estimate [kg or kg m²].
-        effort: (N,) of that estimate, unfiltered [N or Nm].
+        effort: (N,) of that estimate, from the smoothed motion [N or Nm].
+        absorbed: (N,) the same, of the columns of the baseline itself.
         speed: of which the axis is seldom faster [m/s or rad/s].
         reach: range of its position [m or rad].
         others: name and motion of the other axes.
@@ -73,6 +74,7 @@ class AxisModel:
     filtered: Filter
     inertia: float
     effort: Array
+    absorbed: Array
     speed: float
     reach: float
     others: tuple[tuple[str, AxisMotion], ...]
@@ -126,13 +128,13 @@ def _torque_bias(axis: AxisModel) -> Candidate:
 
 def _torque_gain(axis: AxisModel) -> Candidate:
     parameter = EffectParameter("error", "1", "effort is (1 + error) times the effort reported")
-    return _linear(axis, EffectName.TORQUE_GAIN, [parameter], -axis.effort)
+    return _linear(axis, EffectName.TORQUE_GAIN, [parameter], -axis.absorbed)
 
 
 def _payload(axis: AxisModel) -> Candidate:
     unit = "kg" if axis.kind is AxisKind.LINEAR else "kg m^2"
     parameter = EffectParameter("mass", unit, "inertia that the model does not have")
-    return _linear(axis, EffectName.PAYLOAD, [parameter], axis.motion.acceleration)
+    return _linear(axis, EffectName.PAYLOAD, [parameter], axis.motion.linear[:, 0])
 
 
 def _quadratic_drag(axis: AxisModel) -> Candidate:

@@ -198,6 +198,7 @@ def _of_record(signals: _Signals, reference: Reference) -> tuple[list[Block], li
 
 def _model(signals: _Signals, index: int, scale: Scale) -> AxisModel:
     axis, motion = signals.record.axes[index], signals.motions[index]
+    places, raw = _baseline(signals.motions, index)
     return AxisModel(
         place=place_of(axis),
         block=index,
@@ -208,6 +209,7 @@ def _model(signals: _Signals, index: int, scale: Scale) -> AxisModel:
         filtered=signals.filtered,
         inertia=float(scale.values[0]),
         effort=_first_estimate(signals, index, scale),
+        absorbed=np.asarray(raw[:, places] @ scale.values),
         speed=scale.speed,
         reach=scale.reach,
         others=tuple((o.name, m) for o, m in zip(signals.record.axes, signals.motions, strict=True) if m is not motion),

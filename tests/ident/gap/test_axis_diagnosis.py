@@ -95,6 +95,15 @@ def test_other_rates_and_units_change_nothing(machine: Make) -> None:
     assert findings.causes[0].candidate.effect == "asymmetric_viscous"
 
 
+def test_a_slow_noisy_record_names_nothing_that_the_baseline_absorbs(machine: Make) -> None:
+    record = machine(asymmetry=8.0, rate=100.0, substeps=40, repeats=1, duration=30.0, noise=2.0, encoder=1e-5).drive(
+        11
+    )
+    findings = diagnose_axis([record], [], seed=1)
+    assert [str(cause.candidate.effect) for cause in findings.causes] == ["asymmetric_viscous"]
+    assert {"payload", "torque_gain", "torque_bias"} <= set(findings.invisible)
+
+
 def _changed(record: AxisRecord, **series: Any) -> AxisRecord:
     return replace(record, axes=tuple(replace(axis, **series) for axis in record.axes))
 
