@@ -32,7 +32,7 @@ CLEAR: Final = 0.8
 differ as much between two runs as the effect makes them."""
 
 NEGLIGIBLE: Final = 0.1
-"""The same for effects that are not proportional to their size, whose small points shape the curve."""
+"""Noise units that stand for none, for effects that begin at a threshold."""
 
 VISIBLE: Final = 1.0
 """Noise units that an effect must reach at its largest size to be one that these campaigns show."""
@@ -123,9 +123,15 @@ def _seen_in(
     for channel in channels:
         points = [(size, float(getattr(units, channel))) for size, units in measured]
         if any(units >= VISIBLE for _, units in points):
-            least = NEGLIGIBLE if probe.name in CURVED else CLEAR
-            return channel, _ascending([point for point in points if point[1] > least])
+            clear = [point for point in points if point[1] > CLEAR]
+            return channel, _ascending([*_foot(points), *clear] if probe.name in CURVED else clear)
     return "torque", ()
+
+
+def _foot(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The last size that does nothing yet, from which a threshold rises."""
+    idle = [(size, NEGLIGIBLE) for size, units in points if units < NEGLIGIBLE]
+    return idle[-1:]
 
 
 def _ascending(points: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
