@@ -94,7 +94,7 @@ def _pairs(memories: Memories) -> Iterator[tuple[AddedState, AddedState]]:
     for wheel in memories.gears:
         yield _twist(f"gear_{WHEELS[wheel]}", "Angle of the motor, at the wheel, minus that of the wheel, drive")
     for wheel in memories.drives:
-        yield _filter(f"torque_{WHEELS[wheel]}", "Nm", 0.1)
+        yield _filter(f"torque_{WHEELS[wheel]}", "Nm", 1.0)
     for side in memories.encoders:
         yield _filter(f"alpha_{SIDES[side]}", "rad/s", 0.1)
 
