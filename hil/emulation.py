@@ -17,6 +17,7 @@ from hil.bench import LockstepBench
 from hil.buses import open_served_bus
 from hil.clock import Clock
 from hil.faults import Fault, parse_fault, parse_script
+from hil.faults.fault import FaultError
 from hil.network import Network
 from hil.plants import FmuVehicle
 from hil.serving import VehicleServer
@@ -118,8 +119,14 @@ def server(
 
     Args:
         storage: folder where the nodes store parameters.
+
+    Raises:
+        OSError: the folder cannot be made.
     """
     ground = Ground(emulated.engine) if isinstance(emulated, EmulatedVehicle) else emulated
+    if storage is not None:
+        # Now, and not when a master stores for the first time, it shows whether that is possible.
+        storage.mkdir(parents=True, exist_ok=True)
     memory = None if storage is None else FolderMemory(storage)
     return VehicleServer(emulated, bus, clock, network, lockstep, ground, seed, delays, memory)
 
@@ -133,5 +140,10 @@ def read_faults(texts: Sequence[str]) -> list[Fault]:
     faults: list[Fault] = []
     for text in texts:
         path = Path(text)
-        faults += parse_script(path.read_text(encoding="utf-8")) if path.is_file() else [parse_fault(text)]
+        if path.is_file():
+            faults += parse_script(path.read_text(encoding="utf-8", errors="replace"))
+        elif path.suffix and not {"@", ":"} & set(text):
+            raise FaultError(f"{text} does not exist.", "Name a file with one fault a line, or write KIND@PLACE.")
+        else:
+            faults.append(parse_fault(text))
     return faults

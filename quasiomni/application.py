@@ -41,7 +41,17 @@ def main() -> None:
     try:
         app()
     except UserError as error:
-        label = "bus" if isinstance(error, BusError) else "error"
-        errors.print(f"[bold red]{label}:[/bold red] {escape(error.what)}", highlight=False)
-        errors.print(f"[bold]remedy:[/bold] {escape(error.remedy)}", highlight=False)
+        tell(error)
         sys.exit(2)
+    except OSError as error:
+        if error.filename is None:
+            raise
+        tell(UserError(f"{error.filename}: {error.strerror}.", "Name a file or folder that can be used."))
+        sys.exit(2)
+
+
+def tell(error: UserError) -> None:
+    """Print what is wrong and the remedy, two lines."""
+    label = "bus" if isinstance(error, BusError) else "error"
+    errors.print(f"[bold red]{label}:[/bold red] {escape(error.what)}", highlight=False)
+    errors.print(f"[bold]remedy:[/bold] {escape(error.remedy)}", highlight=False)

@@ -15,9 +15,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from hil import control
-from hil.socketcan import build_library, environment
+from hil.socketcan import build_library, environment, is_served
 from ident.errors import BusError
-from quasiomni.application import app, console
+from quasiomni.application import app, console, tell
 from quasiomni.options import NetworkOption, VehicleOption
 
 can_app = typer.Typer(help="The CAN bus: unmodified SocketCAN programs on it, faults, load.", no_args_is_help=True)
@@ -34,8 +34,11 @@ def execute(
     interface: Annotated[str, typer.Option(help="Name under which the program finds the bus.")] = "can0",
 ) -> None:
     """Run an unmodified SocketCAN program on a `unix:` bus: `quasiomni can exec -- candump can0`."""
-    library = build_library()
-    found = environment(os.environ, library, {interface: hub_path(bus)})
+    library, path = build_library(), hub_path(bus)
+    found = environment(os.environ, library, {interface: path})
+    if not is_served(path):
+        # No refusal: the program may start the emulator itself, or wait for it.
+        tell(BusError(f"Nobody serves {bus} yet.", f"Start the emulator first: quasiomni emulate --bus {bus}."))
     try:
         os.execvpe(command[0], command, found)
     except OSError as error:
@@ -99,7 +102,11 @@ def load(
     from hil.bus_schedule import schedule
     from hil.campaign.folder import network_file_of
     from hil.network import load_network
+    from ident.vehicle.description import load_vehicle
 
+    if network is None:
+        # A misspelled name must not be taken for a vehicle with the default network.
+        load_vehicle(vehicle)
     found = schedule(load_network(network or network_file_of(vehicle)), bit_rate, cycle)
     table = Table("COB-ID", "sender", "bytes", "bits", "every", "longest wait", box=box.SIMPLE_HEAD)
     for frame in found.frames:

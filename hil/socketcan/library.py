@@ -6,6 +6,7 @@ import hashlib
 import importlib.util
 import os
 import shutil
+import socket
 import subprocess
 import sys
 import tempfile
@@ -71,6 +72,16 @@ def environment(environ: Mapping[str, str], library: Path, interfaces: Mapping[s
     preloaded = [str(library), *filter(None, [environ.get("LD_PRELOAD")])]
     named = ",".join(f"{name}={path.absolute()}" for name, path in interfaces.items())
     return {**environ, "LD_PRELOAD": ":".join(preloaded), "QUASIOMNI_CAN": named}
+
+
+def is_served(hub: Path) -> bool:
+    """Whether the hub of a `unix:` bus is there."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as probe:
+        try:
+            probe.connect(str(hub))
+        except OSError:
+            return False
+    return True
 
 
 def _any_compiler() -> list[str]:

@@ -45,6 +45,11 @@ MISTAKES = {
     "no place for commands": (("can", "fault", "death", "--bus", "socketcan:can0"), "--control"),
     "another bus": (("can", "exec", "--bus", "socketcan:can0", "--", "true"), "not on this machine"),
     "no such program": (("can", "exec", "--", "no-such-program"), "no-such-program cannot be run"),
+    "a vehicle that is none": (("can", "load", "--vehicle", "nix"), "There is no 'nix'"),
+    "a file that is none": (("emulate", "--bus", "unix:/tmp/never", "--fault", "bad_day.txt"), "bad_day.txt does not"),
+    "a script that is no text": (("emulate", "--bus", "unix:/tmp/never", "--fault", sys.executable), "Line 1"),
+    "a place that cannot be written": (("dbc", "--out", "/nowhere/x.dbc"), "/nowhere/x.dbc: No such file"),
+    "a folder that cannot be made": (("eds", "--out", "/proc/x"), "/proc/x: No such file"),
     "a fault that is none": (("emulate", "--bus", "unix:/tmp/never", "--fault", "vanish@0x1"), "vanish"),
 }
 
@@ -55,6 +60,14 @@ def test_mistakes_are_two_lines_with_a_remedy(quasi: Callable, arguments: tuple[
     assert answer.code == 2
     assert named in answer.error
     assert "remedy:" in answer.error
+
+
+def test_a_program_on_a_bus_that_nobody_serves_is_told_so(tmp_path: Path) -> None:
+    bus = f"unix:{tmp_path / 'bus'}"
+    done = subprocess.run(quasiomni("can", "exec", "--bus", bus, "--", "true"), capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "Nobody serves" in done.stderr
+    assert "quasiomni emulate" in " ".join(done.stderr.split())
 
 
 def test_an_emulator_takes_faults_from_a_script_and_live_and_candump_sees_them(tmp_path: Path) -> None:
