@@ -53,5 +53,5 @@ def main() -> None:
 def tell(error: UserError) -> None:
     """Print what is wrong and the remedy, two lines."""
     label = "bus" if isinstance(error, BusError) else "error"
-    errors.print(f"[bold red]{label}:[/bold red] {escape(error.what)}", highlight=False)
-    errors.print(f"[bold]remedy:[/bold] {escape(error.remedy)}", highlight=False)
+    errors.print(f"[bold red]{label}:[/bold red] {escape(error.what)}", highlight=False, soft_wrap=True)
+    errors.print(f"[bold]remedy:[/bold] {escape(error.remedy)}", highlight=False, soft_wrap=True)
