@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fmu.model.generate import generate_core
-from fmu.table import neutral_effects, parameters_of, variable_table
+from fmu.parameter_rows import parameters_of
+from fmu.table import neutral_effects, variable_table
 from fmu.variables import Inputs, VariableTable
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import Effect

@@ -4,76 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
 
 from fmu.effect_states import (
-    DAMPING_RATIO,
-    MOTOR_SHARE,
-    STIFFEST,
     AddedState,
     Memories,
     coupled_states,
     memories_of,
     other_states,
 )
-from fmu.variables import Block, Causality, Inputs, Variability, Variable, VariableTable, numbered
+from fmu.parameter_rows import parameter_rows
+from fmu.variables import DEGREES, Block, Causality, Inputs, Variability, Variable, VariableTable, numbered
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effect_terms import TERMS
-from ident.vehicle.effects import ALL_WHEELS, CHASSIS, EFFECTS, WHEEL_PLACES, Effect, EffectName, make_effect
-from ident.vehicle.geometry import GEOMETRY_UNITS, WHEELS
-from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_UNITS, Parameters
-
-DRIVE_GAIN: Final = 0.5
-"""Proportional gain of the drives' speed loops before anyone tunes them, motor torque per wheel rate [Nm s/rad]."""
-
-DRIVE_INTEGRAL_GAIN: Final = 2.0
-"""Integral gain of the drives' speed loops before anyone tunes them [Nm/rad]."""
-
-DRIVE_UNWIND_TIME: Final = 0.05
-"""In which the integral of a speed loop follows a torque at its limit [s]."""
-
-CREEP_STIFFNESS: Final = 1e7
-"""Contact force per slip velocity [N s/m]: under 100 N a wheel slips by 10 micrometres a second."""
-
-STICK_TIME: Final = 0.06
-"""How long motion below stiction goes on before it is held [s]; chosen in docs/adr/0008."""
-
-MODE_TOLERANCE: Final = 0.02
-"""Of the steering angles in (9), as `ident.vehicle.modes.detect_mode` has it [rad]."""
+from ident.vehicle.effects import ALL_WHEELS, EFFECTS, Effect, EffectName, make_effect
+from ident.vehicle.geometry import WHEELS
+from ident.vehicle.parameters import Parameters
 
 _SIDES: Final = {"l": "left", "r": "right"}
-_DEGREES: Final = {"rad": "deg", "rad/s": "deg/s"}
 _PER_SECOND: Final = {"m": "m/s", "rad": "rad/s", "m/s": "m/s^2", "rad/s": "rad/s^2", "1": "1/s", "Nm": "Nm/s"}
-
-_DYNAMIC: Final = {
-    "C_l": "Inertia of both units of the left side about their steering axes",
-    "d_vl": "Viscous friction of the left steering",
-    "d_cl": "Coulomb friction of the left steering",
-    "C_r": "Inertia of both units of the right side about their steering axes",
-    "d_vr": "Viscous friction of the right steering",
-    "d_cr": "Coulomb friction of the right steering",
-    "m_ch": "Mass of the vehicle, steering units included",
-    "C_ch": "Yaw inertia without C_l and C_r",
-    "d_vw": "Viscous friction of one wheel drive, at the wheel",
-    "d_cw": "Coulomb friction of one wheel drive, at the wheel",
-    "B_w": "Inertia of one wheel drive, at the wheel",
-}
 
 _STICTION: Final = {
     "stick": "Creep of {} that its friction remembers, over epsilon times stick_time",
     "lag": "Lagged load on the friction of {}",
-}
-
-_NEVER_NEGATIVE: Final = (EffectName.BACKLASH, EffectName.ELASTICITY)
-
-_GEOMETRY: Final = {
-    "wheelbase": "Between front and rear steering axes (l)",
-    "track_width": "Between left and right steering axes (b)",
-    "wheel_offset": "From steering axis to wheel contact along the axle (a)",
-    "wheel_radius": "Radius of the wheels (r)",
-    "gear_ratio": "Motor turns per wheel turn (i_G)",
-    "steering_limit": "Mechanical stops of the steering angles, either side",
 }
 
 
@@ -91,8 +44,8 @@ def variable_table(
     memories = memories_of(effects)
     states = _states(inputs, memories)
     derivatives = [_derivative(state) for state in states]
-    parameter_rows = _parameters(vehicle, parameters, effects, inputs)
-    return numbered([[_time()], states, derivatives, _inputs(inputs), parameter_rows, _outputs(memories), [_mode()]])
+    tunable = parameter_rows(vehicle, parameters, effects, inputs)
+    return numbered([[_time()], states, derivatives, _inputs(inputs), tunable, _outputs(memories), [_mode()]])
 
 
 def _time() -> Variable:
@@ -157,7 +110,7 @@ def _hidden_states(inputs: Inputs) -> list[Variable]:
 
 
 def _state(name: str, text: str, unit: str, nominal: float, causality: Causality = Causality.OUTPUT) -> Variable:
-    display = _DEGREES.get(unit, "")
+    display = DEGREES.get(unit, "")
     kind = (causality, Variability.CONTINUOUS, Block.STATE)
     return Variable(name, text, *kind, unit, display_unit=display, start=0.0, nominal=nominal)
 
@@ -183,117 +136,9 @@ def _inputs(inputs: Inputs) -> list[Variable]:
 
 
 def _input(name: str, text: str, unit: str, minimum: float | None = None, maximum: float | None = None) -> Variable:
-    display = _DEGREES.get(unit, "")
+    display = DEGREES.get(unit, "")
     kind = (Causality.INPUT, Variability.CONTINUOUS, Block.INPUT)
     return Variable(name, text, *kind, unit, display_unit=display, start=0.0, minimum=minimum, maximum=maximum)
-
-
-def _parameters(
-    vehicle: VehicleDescription, parameters: Parameters, effects: Sequence[Effect], inputs: Inputs
-) -> list[Variable]:
-    dynamic = [
-        (_positive if unit.startswith("kg") else _not_negative)(name, _DYNAMIC[name], unit, parameters[name])
-        for name, unit in PARAMETER_UNITS.items()
-    ]
-    geometry = [
-        _positive(name, text, GEOMETRY_UNITS[name], getattr(vehicle.geometry, name)) for name, text in _GEOMETRY.items()
-    ]
-    drives = _drives(vehicle) if inputs is Inputs.SPEED else []
-    of_effects = [row for effect in effects for row in _effect_parameters(effect)]
-    springs = _springs(memories_of(effects))
-    limits = _friction_limits(vehicle, effects)
-    return dynamic + geometry + _regularisation() + limits + drives + springs + of_effects
-
-
-def _parameter(
-    name: str, text: str, unit: str, start: float, minimum: float | None = None, positive: bool = False
-) -> Variable:
-    display = _DEGREES.get(unit, "")
-    kind = (Causality.PARAMETER, Variability.TUNABLE, Block.PARAMETER)
-    return Variable(name, text, *kind, unit, display_unit=display, start=start, minimum=minimum, positive=positive)
-
-
-def _positive(name: str, text: str, unit: str, start: float) -> Variable:
-    return _parameter(name, text, unit, start, minimum=0.0, positive=True)
-
-
-def _not_negative(name: str, text: str, unit: str, start: float) -> Variable:
-    return _parameter(name, text, unit, start, minimum=0.0)
-
-
-def _regularisation() -> list[Variable]:
-    coulomb = "Rate at which Coulomb friction has reached 76 %, epsilon of (16)"
-    return [
-        _positive("epsilon", coulomb, "rad/s", COULOMB_EPSILON),
-        _positive("stick_time", "How long motion below stiction goes on before it is held", "s", STICK_TIME),
-        _positive("creep_stiffness", "Contact force per slip velocity of a wheel", "N s/m", CREEP_STIFFNESS),
-        _positive("mode_tolerance", "Of the steering angles, for the mode", "rad", MODE_TOLERANCE),
-    ]
-
-
-def _friction_limits(vehicle: VehicleDescription, effects: Sequence[Effect]) -> list[Variable]:
-    limits = {f"friction_limit_{wheel}": vehicle.limits.floor_friction for wheel in WHEELS}
-    for effect in effects:
-        if effect.name is EffectName.SLIP:
-            limits.update(dict.fromkeys(parameters_of(effect, "friction"), effect.size))
-    text = "Largest contact force of wheel {} over its load"
-    return [_positive(name, text.format(name.rpartition("_")[2]), "1", limit) for name, limit in limits.items()]
-
-
-def _drives(vehicle: VehicleDescription) -> list[Variable]:
-    gain = "Proportional gain of the speed loops, motor torque per wheel rate"
-    limit = "Largest motor torque of the speed loops"
-    unwind = "In which the integral of a speed loop follows a torque at its limit"
-    return [
-        _not_negative("drive_gain", gain, "Nm s/rad", DRIVE_GAIN),
-        _not_negative("drive_integral_gain", "Integral gain of the speed loops", "Nm/rad", DRIVE_INTEGRAL_GAIN),
-        _positive("drive_torque_limit", limit, "Nm", vehicle.limits.peak_torque),
-        _positive("drive_unwind_time", unwind, "s", DRIVE_UNWIND_TIME),
-    ]
-
-
-def _springs(memories: Memories) -> list[Variable]:
-    if not memories.flexible:
-        return []
-    share = "Share of B_w on the motor's side of a flexible gear"
-    stiffest = "Stiffness of a gear or coupling that has play and no compliance"
-    damping = "Of the free vibration of both sides of a gear or coupling on its spring"
-    rows = [
-        _positive("spring_stiffness", stiffest, "Nm/rad", STIFFEST),
-        _not_negative("spring_damping_ratio", damping, "1", DAMPING_RATIO),
-    ]
-    if memories.gears:
-        rows.append(replace(_positive("motor_share", share, "1", MOTOR_SHARE), minimum=0.01, maximum=0.99))
-    return rows
-
-
-def effect_parameter(effect: Effect, parameter: str) -> str:
-    """Name in the table of a parameter of an effect."""
-    return f"{effect.name}.{effect.where}.{parameter}"
-
-
-def parameters_of(effect: Effect, parameter: str) -> tuple[str, ...]:
-    """Names in the table that a parameter of an effect has: its own, or the friction limits that `slip` is."""
-    if effect.name is not EffectName.SLIP:
-        return (effect_parameter(effect, parameter),)
-    wheels = WHEELS if effect.where in CHASSIS else (WHEELS[WHEEL_PLACES.index(effect.where)],)
-    return tuple(f"friction_limit_{wheel}" for wheel in wheels)
-
-
-def _effect_parameters(effect: Effect) -> list[Variable]:
-    if effect.name is EffectName.SLIP:
-        return []
-    spec = EFFECTS[effect.name]
-    return [
-        _parameter(
-            effect_parameter(effect, entry.name),
-            f"{effect}: {entry.meaning}",
-            spec.unit(entry.name, effect.where),
-            effect[entry.name],
-            minimum=0.0 if effect.name in _NEVER_NEGATIVE else None,
-        )
-        for entry in spec.parameters
-    ]
 
 
 def neutral_effects() -> tuple[Effect, ...]:
@@ -313,7 +158,7 @@ def neutral_effects() -> tuple[Effect, ...]:
 
 def _output(name: str, text: str, unit: str) -> Variable:
     kind = (Causality.OUTPUT, Variability.CONTINUOUS, Block.OUTPUT)
-    return Variable(name, text, *kind, unit, display_unit=_DEGREES.get(unit, ""))
+    return Variable(name, text, *kind, unit, display_unit=DEGREES.get(unit, ""))
 
 
 _GENERALIZED_TORQUES: Final = {

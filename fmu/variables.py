@@ -9,6 +9,10 @@ from __future__ import annotations
 import enum
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
+
+DEGREES: Final = {"rad": "deg", "rad/s": "deg/s"}
+"""SI units that people like to read in others."""
 
 
 class Causality(enum.StrEnum):

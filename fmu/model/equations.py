@@ -21,7 +21,7 @@ from fmu.model.transmissions import (
     transmitted_torques,
     twist_accelerations,
 )
-from fmu.table import effect_parameter
+from fmu.parameter_rows import effect_parameter
 from fmu.variables import Block, Inputs, VariableTable
 from ident.vehicle import effect_terms
 from ident.vehicle.effect_terms import TERMS, EffectTerm
