@@ -8,6 +8,7 @@ import sys
 import uuid
 import zipfile
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
 from importlib.metadata import version
@@ -112,6 +113,8 @@ def write_fmu(content: bytes, path: Path) -> None:
         part.write_bytes(content)
         part.replace(path)
     except OSError as error:
+        with suppress(OSError):
+            part.unlink()
         raise UserError(f"{path} cannot be written: {error.strerror}.", "Name another file (-o).") from error
 
 

@@ -258,13 +258,16 @@ qo_answer qo_serialize(qo_instance *me, const void *state, char bytes[], size_t 
     return QO_ANSWER_OK;
 }
 
-/* Bytes may come from anywhere: a snapshot that no instance can have written is refused. */
+/* Bytes may come from anywhere: a snapshot that no instance can have written is refused, and what it claims to have
+ * computed is computed again. */
 static int is_sound(qo_snapshot *snapshot)
 {
-    const int mode = snapshot->mode;
+    const int mode = snapshot->mode, k = snapshot->model.mode;
+    const double tolerance = snapshot->model.tolerance;
     snapshot->model.message[QO_MESSAGE_SIZE - 1] = '\0';
+    snapshot->known = 0;
     return mode > 0 && (mode & QO_ANY_MODE) == mode && (mode & (mode - 1)) == 0 && is_finite(snapshot->time) &&
-           qo_check(&snapshot->model) == QO_OK;
+           k >= 1 && k <= 4 && tolerance > 0.0 && tolerance < 1.0 && qo_check(&snapshot->model) == QO_OK;
 }
 
 qo_answer qo_deserialize(qo_instance *me, const char bytes[], size_t size, void **state)

@@ -140,7 +140,7 @@ qo_answer qo_output_derivatives(qo_instance *me, const unsigned references[], si
     unknowns_of_model response;
     qo_answer answer;
     size_t i;
-    if (!given(me, references, n, values, n_values) || (n > 0 && orders == NULL)) {
+    if (!given(me, references, n, values, n_values) || !given(me, references, n, orders, n)) {
         return QO_ANSWER_ERROR;
     }
     answer = qo_trial(me, qo_derivatives(&me->now.model, rates));

@@ -12,7 +12,7 @@
 /* Share of a step that is left over by rounding alone. */
 #define SPLINTER 1e-12
 
-/* Internal steps of one communication step; qo_step has the same limit. */
+/* Internal steps of one communication step, with those of the search for its event. */
 #define MOST_STEPS 50000
 
 static double rounding(double time)

@@ -139,7 +139,7 @@ static qo_answer settle(qo_instance *me, const qo_variable *last)
 {
     int changed;
     const qo_answer answer = qo_pass(me, qo_check(&me->now.model));
-    if (answer == QO_ANSWER_OK && me->now.mode == QO_INITIALIZATION &&
+    if (answer == QO_ANSWER_OK && (me->now.mode & SETTABLE_STATES) &&
         qo_update_discrete(&me->now.model, &changed) != QO_OK) {
         return qo_tell(me, QO_ANSWER_ERROR, "%s cannot be %g: %s", last->name, *place(&me->now, last),
                        me->now.model.message);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -171,6 +172,21 @@ def test_saved_bytes_that_were_changed_are_refused(torque_fmu: Path, opened: Ope
     assert "saved state" in vehicle.refused(lambda: restore(bytes(content)))
 
 
+def test_saved_bytes_cannot_bring_in_results_that_are_not_finite(torque_fmu: Path, opened: Open) -> None:
+    """Every number of a saved state that is an output is replaced by one that is not finite."""
+    vehicle = opened(torque_fmu).begin(x_dot=0.1)
+    vehicle.instance.doStep(0.0, STEP)
+    (output,) = vehicle.read("slip_long_fl")
+    instance = vehicle.instance
+    state = (instance.getFMUState if vehicle.is_new else instance.getFMUstate)()
+    content = bytes((instance.serializeFMUState if vehicle.is_new else instance.serializeFMUstate)(state))
+    assert struct.pack("d", output) in content
+    changed = content.replace(struct.pack("d", output), struct.pack("d", math.nan))
+    state = (instance.deserializeFMUState if vehicle.is_new else instance.deSerializeFMUstate)(changed)
+    (instance.setFMUState if vehicle.is_new else instance.setFMUstate)(state)
+    assert vehicle.read("slip_long_fl") == [output]
+
+
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("inputs", list(Inputs))
 def test_directional_derivatives_are_those_of_finite_differences(
@@ -274,6 +290,17 @@ def test_the_mode_follows_the_steering_angles(torque_fmu: Path, opened: Open) ->
         assert vehicle.mode() == expected[name]
         vehicle.instance.doStep(0.0, STEP)
         assert vehicle.mode() == expected[name]
+
+
+def test_the_mode_can_be_read_while_initializing_whenever_the_angles_were_set(torque_fmu: Path, opened: Open) -> None:
+    vehicle = opened(torque_fmu)
+    vehicle.write("alpha_l", MODES["lateral"][0])
+    vehicle.write("alpha_r", MODES["lateral"][1])
+    assert vehicle.mode() == 3
+    if not vehicle.is_new:
+        vehicle.instance.setupExperiment()
+    vehicle.instance.enterInitializationMode()
+    assert vehicle.mode() == 3
 
 
 def turn_left_side(vehicle: Vehicle) -> None:
