@@ -18,7 +18,7 @@ MOTOR_SHARE: Final = 0.5
 DAMPING_RATIO: Final = 0.05
 """Of the free vibration of both sides of a spring, where nobody sets one; the order of magnitude of a steel gear."""
 
-STIFFEST: Final = 1e6
+STIFFEST: Final = 1e5
 """Stiffness of a gear or coupling that has play alone, where nobody sets one [Nm/rad]."""
 
 SIDES: Final = ("l", "r")

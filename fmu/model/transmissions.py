@@ -21,8 +21,8 @@ from ident.vehicle.geometry import WHEELS
 from ident.vehicle.parameters import PARAMETER_NAMES
 from ident.vehicle.symbolic import LENGTHS, Expression
 
-_ROUNDING: Final = 1e-6
-"""w [rad]: the stiffest spring takes up its load over half a newton metre; a gap of 2 mrad passes 0.2 mNm."""
+_ROUNDING: Final = 3e-5
+"""w [rad]: 0.3 mrad before its flank a spring of 10⁵ Nm/rad gives 0.08 Nm, less than any friction here."""
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ def need() -> Callable[[str], str]:
 
 @pytest.fixture(scope="session")
 def source() -> ModelSource:
-    """The prototype with its prior parameters, and an effect of each kind: with equations, and without."""
+    """The prototype with its prior parameters, and an effect of each kind: without states of its own, and with them."""
     vehicle = load_vehicle()
     parameters = Parameters(vehicle.prior.values, np.full(len(PARAMETER_NAMES), 0.01))
     effects = (

