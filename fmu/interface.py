@@ -15,8 +15,7 @@ MODEL_IDENTIFIER: Final = "quasiomni"
 LOG_CATEGORIES: Final[Mapping[str, str]] = {
     "logStatusError": "Calls that are refused, with the variable at fault; always written",
     "logStatusDiscard": "Steps and derivatives that the model cannot compute; always written",
-    "logStatusWarning": "What an importer should know and can do without",
-    "logEvents": "Events",
+    "logEvents": "Changes of the motion mode k of (9)",
 }
 """In the order of `fmu/wrapper/instance.h`."""
 

@@ -10,8 +10,7 @@
 
 #define MESSAGE_SIZE 512
 
-const char *const qo_category_names[QO_CATEGORIES] = {"logStatusError", "logStatusDiscard", "logStatusWarning",
-                                                      "logEvents"};
+const char *const qo_category_names[QO_CATEGORIES] = {"logStatusError", "logStatusDiscard", "logEvents"};
 
 static const struct {
     qo_mode mode;
@@ -65,7 +64,6 @@ static qo_category category_of(qo_answer answer)
 {
     switch (answer) {
     case QO_ANSWER_OK: return QO_LOG_EVENTS;
-    case QO_ANSWER_WARNING: return QO_LOG_WARNING;
     case QO_ANSWER_DISCARD: return QO_LOG_DISCARD;
     default: return QO_LOG_ERROR;
     }
@@ -88,6 +86,11 @@ qo_answer qo_tell(const qo_instance *me, qo_answer answer, const char *format, .
     va_end(arguments);
     me->write(me, answer, qo_category_names[index], message);
     return answer;
+}
+
+qo_answer qo_tell_event(const qo_instance *me)
+{
+    return qo_tell(me, QO_ANSWER_OK, "The motion mode is %d from %.9g s on.", me->now.model.mode, me->now.time);
 }
 
 qo_answer qo_pass(const qo_instance *me, qo_status status)

@@ -29,9 +29,9 @@ typedef enum {
 #define QO_ANY_MODE (QO_INSTANTIATED | QO_INITIALIZATION | QO_EVENT | QO_CONTINUOUS_TIME | QO_STEP | QO_TERMINATED)
 #define QO_RUNNING (QO_EVENT | QO_CONTINUOUS_TIME | QO_STEP)
 
-typedef enum { QO_LOG_ERROR = 1, QO_LOG_DISCARD = 2, QO_LOG_WARNING = 4, QO_LOG_EVENTS = 8 } qo_category;
+typedef enum { QO_LOG_ERROR = 1, QO_LOG_DISCARD = 2, QO_LOG_EVENTS = 4 } qo_category;
 
-#define QO_CATEGORIES 4
+#define QO_CATEGORIES 3
 extern const char *const qo_category_names[QO_CATEGORIES];
 
 typedef struct qo_instance qo_instance;
@@ -77,6 +77,9 @@ void qo_free(qo_instance *me);
 
 /* Tells the importer; `answer` is returned, so that a function can end with it. */
 qo_answer qo_tell(const qo_instance *me, qo_answer answer, const char *format, ...);
+
+/* Tells that k of (9) is another one. */
+qo_answer qo_tell_event(const qo_instance *me);
 
 /* What the model answers, told to the importer. */
 qo_answer qo_pass(const qo_instance *me, qo_status status);

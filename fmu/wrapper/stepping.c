@@ -104,5 +104,5 @@ qo_answer qo_do_step(qo_instance *me, double time, double size, qo_step_end *end
     }
     me->now.time = end->time;
     me->now.known = QO_KNOWN_OUTPUTS;
-    return QO_ANSWER_OK;
+    return me->now.model.mode == before.mode ? QO_ANSWER_OK : qo_tell_event(me);
 }

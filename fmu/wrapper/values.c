@@ -178,8 +178,10 @@ qo_answer qo_set(qo_instance *me, const unsigned references[], size_t n, const d
 
 qo_answer qo_update(qo_instance *me, int *changed)
 {
+    qo_answer answer;
     *changed = 0;
-    return qo_pass(me, qo_update_discrete(&me->now.model, changed));
+    answer = qo_pass(me, qo_update_discrete(&me->now.model, changed));
+    return answer == QO_ANSWER_OK && *changed ? qo_tell_event(me) : answer;
 }
 
 static int solver_fits(const qo_instance *me, const char *what, const void *values, size_t n, size_t expected)

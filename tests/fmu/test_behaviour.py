@@ -308,6 +308,15 @@ def turn_left_side(vehicle: Vehicle) -> None:
     vehicle.write("torque_rl", 1.2)
 
 
+@pytest.mark.parametrize("logging", [True, False])
+def test_a_change_of_the_mode_is_told_where_logging_is_on(torque_fmu: Path, opened: Open, logging: bool) -> None:
+    vehicle = opened(torque_fmu, debug_logging=logging).begin()
+    turn_left_side(vehicle)
+    vehicle.instance.doStep(0.0, 0.5)
+    assert vehicle.mode() == 1
+    assert vehicle.messages == (["The motion mode is 1 from 0.5 s on."] if logging else [])
+
+
 def test_a_step_ends_at_the_event_where_early_return_is_allowed(build: Build, opened: Open) -> None:
     """Straight wheels that turn leave mode 2 when the angle passes the tolerance; found to a microsecond."""
     path = build(FmiVersion.FMI3, Inputs.TORQUE)
