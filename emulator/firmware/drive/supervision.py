@@ -12,11 +12,12 @@ _SPEED_MARGIN: Final = 2.0
 _SHAFT_MARGIN: Final = 0.02
 """Revolutions on top of it [-]."""
 
-_STUCK_TIME: Final = 0.02
+_STUCK_TIME: Final = 0.05
 """Time for which a count may be exactly the same under torque [s]: the last digit of a living encoder flickers."""
 
-_STUCK_TORQUE: Final = 500
-"""Torque demand from which on it must not [per mille of rated torque]."""
+_STUCK_TORQUE: Final = 1000
+"""Torque demand from which on it must not [per mille of rated torque]: up to it a blocked shaft is no fault, and may
+hold its count by chance."""
 
 
 class EncoderWatch:
