@@ -163,11 +163,11 @@ class ParameterStorage:
         self._replace(first, last, {})
 
     def _replace(self, first: int, last: int, values: Values) -> None:
-        kept = {key: value for key, value in self.stored().items() if not first <= key[0] <= last}
         new = {key: value for key, value in values.items() if first <= key[0] <= last and self._fits(key)}
         try:
+            kept = {key: value for key, value in self.stored().items() if not first <= key[0] <= last}
             self._memory.save(self._node_id, self._device, kept | new)
-        except OSError as error:
+        except (OSError, DataFileError) as error:
             raise AbortError(AbortCode.CANNOT_STORE) from error
 
 

@@ -146,3 +146,9 @@ def test_a_memory_that_cannot_be_written_is_told_to_the_client(wire, tmp_path: P
     (tmp_path / "file").write_text("")
     broken = type(wire)(FolderMemory(tmp_path / "file" / "folder"))
     assert broken.write(1, 0x1010, 1, SAVE) == 0x08000020
+
+
+def test_a_memory_that_is_spoilt_while_it_runs_is_told_to_the_client(wire, tmp_path: Path) -> None:
+    running = type(wire)(FolderMemory(tmp_path))
+    (tmp_path / "node_1.json").write_text("{")
+    assert running.write(1, 0x1010, 1, SAVE) == 0x08000020
