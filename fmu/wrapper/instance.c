@@ -224,8 +224,13 @@ qo_answer qo_save(qo_instance *me, void **state)
 qo_answer qo_restore(qo_instance *me, const void *state)
 {
     const saved *copy = state;
+    const qo_mode foreign = me->interface == QO_CO_SIMULATION ? QO_CONTINUOUS_TIME : QO_STEP;
     if (!is_saved(me, copy)) {
         return QO_ANSWER_ERROR;
+    }
+    if (copy->snapshot.mode == (int)foreign) {
+        return qo_tell(me, QO_ANSWER_ERROR, "That state was saved in %s.",
+                       foreign == QO_STEP ? "co-simulation" : "model exchange");
     }
     memcpy(&me->now, &copy->snapshot, sizeof me->now);
     return QO_ANSWER_OK;
