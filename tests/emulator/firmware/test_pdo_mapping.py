@@ -163,9 +163,7 @@ def test_the_identifier_of_an_existing_pdo_cannot_change(wire) -> None:
 
 
 @pytest.mark.parametrize("transmission_type", [241, 251, 252, 253])
-def test_reserved_types_and_those_for_forbidden_remote_frames_are_refused(
-    wire, transmission_type: int
-) -> None:
+def test_reserved_types_and_those_for_forbidden_remote_frames_are_refused(wire, transmission_type: int) -> None:
     assert wire.write(1, 0x1800, 2, bytes((transmission_type,))) == 0x06090030
 
 
