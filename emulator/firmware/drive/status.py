@@ -11,7 +11,12 @@ _WARNING: Final = 1 << 7
 _REMOTE: Final = 1 << 9
 _INTERNAL_LIMIT: Final = 1 << 11
 
-_POWERED: Final = (State.SWITCHED_ON, State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
+_POWERED: Final = (
+    State.SWITCHED_ON,
+    State.OPERATION_ENABLED,
+    State.QUICK_STOP_ACTIVE,
+    State.FAULT_REACTION_ACTIVE,
+)
 
 
 def compose(state: State, *, remote: bool, warns: bool, limited: bool, of_mode: int) -> int:

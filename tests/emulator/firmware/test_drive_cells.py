@@ -37,7 +37,7 @@ PATTERN = {
     "SWITCHED_ON": 0x33,
     "OPERATION_ENABLED": 0x37,
     "QUICK_STOP_ACTIVE": 0x17,
-    "FAULT_REACTION_ACTIVE": 0x0F,
+    "FAULT_REACTION_ACTIVE": 0x1F,
     "FAULT": 0x08,
 }
 """Bits 0-3, 5, 6, and bit 4 (voltage enabled) where the power stage is on."""
