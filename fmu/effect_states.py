@@ -12,15 +12,6 @@ from typing import Final
 from ident.vehicle.effects import DRIVES, ENCODERS, STEERING, Effect, EffectName
 from ident.vehicle.geometry import WHEELS
 
-MOTOR_SHARE: Final = 0.5
-"""Share of B_w on the motor's side of a flexible gear, where nobody sets one: a motor matched to its load."""
-
-DAMPING_RATIO: Final = 0.05
-"""Of the free vibration of both sides of a spring, where nobody sets one; the order of magnitude of a steel gear."""
-
-STIFFEST: Final = 1e5
-"""Stiffness of a gear or coupling that has play alone, where nobody sets one [Nm/rad]."""
-
 SIDES: Final = ("l", "r")
 """Letters of the steering sides in the names of the table."""
 

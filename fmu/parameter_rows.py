@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from fmu.effect_states import DAMPING_RATIO, MOTOR_SHARE, STIFFEST, Memories, memories_of
+from fmu.effect_states import Memories, memories_of
 from fmu.variables import DEGREES, Block, Causality, Inputs, Variability, Variable
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import CHASSIS, EFFECTS, WHEEL_PLACES, Effect, EffectName
 from ident.vehicle.geometry import GEOMETRY_UNITS, WHEELS
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_UNITS, Parameters
+from ident.vehicle.springs import DAMPING_RATIO, MOTOR_SHARE, STIFFEST
 
 DRIVE_GAIN: Final = 0.5
 """Proportional gain of the drives' speed loops before anyone tunes them, motor torque per wheel rate [Nm s/rad]."""

@@ -1,16 +1,12 @@
 """Gears and couplings that give way: a spring with play between motor and wheel, or between two steering units.
 
-    K(θ, θ̇) = k (r(θ - h) - r(-θ - h)) + d θ̇ (r'(θ - h) + r'(-θ - h)),    r(x) = (x + sqrt(x² + w²))/2
-
-θ is the twist, 2 h the play, k the stiffness, d = 2 ζ sqrt(k μ) with the reduced inertia μ of both sides. Without play
-it is k θ + d θ̇, exactly. k follows from the compliance c and the stiffest spring k₀ as 1/sqrt(c² + 1/k₀²).
+The law of the spring is that of `ident.vehicle.springs`, its numbers parameters of the table.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import casadi as ca
 
@@ -19,10 +15,8 @@ from fmu.model.symbols import Symbols
 from ident.vehicle.effects import DRIVES, STEERING, Effect, EffectName
 from ident.vehicle.geometry import WHEELS
 from ident.vehicle.parameters import PARAMETER_NAMES
+from ident.vehicle.springs import damping_of, spring_torque, stiffness_of
 from ident.vehicle.symbolic import LENGTHS, Expression
-
-_ROUNDING: Final = 3e-5
-"""w [rad]: 0.3 mrad before its flank a spring of 10⁵ Nm/rad gives 0.08 Nm, less than any friction here."""
 
 
 @dataclass(frozen=True)
@@ -73,21 +67,14 @@ class Springs:
     def torque(self, place: str, twist: Expression, rate: Expression, reduced_inertia: Expression) -> Expression:
         """K of a place."""
         compliance = self._size(EffectName.ELASTICITY, place, "compliance")
-        half = self._size(EffectName.BACKLASH, place, "gap") / 2
-        stiffness = 1 / ca.sqrt(compliance**2 + 1 / self.p["spring_stiffness"] ** 2)
-        damping = 2 * self.p["spring_damping_ratio"] * ca.sqrt(stiffness * reduced_inertia)
-        forward, forward_touch = _beyond(twist - half)
-        backward, backward_touch = _beyond(-twist - half)
-        return stiffness * (forward - backward) + damping * rate * (forward_touch + backward_touch)
+        gap = self._size(EffectName.BACKLASH, place, "gap")
+        stiffness = stiffness_of(compliance, self.p["spring_stiffness"])
+        damping = damping_of(stiffness, reduced_inertia, self.p["spring_damping_ratio"])
+        return spring_torque(twist, rate, stiffness, gap, damping)
 
     def _size(self, name: EffectName, place: str, parameter: str) -> Expression:
         there = any(effect.name is name and effect.where == place for effect in self.effects)
         return self.p[f"{name}.{place}.{parameter}"] if there else ca.SX(0)
-
-
-def _beyond(distance: Expression) -> tuple[Expression, Expression]:
-    root = ca.sqrt(distance**2 + _ROUNDING**2)
-    return (distance + root) / 2, (1 + distance / root) / 2
 
 
 def couplings_of(x: Symbols, springs: Springs, memories: Memories, parameters: Expression) -> tuple[Coupling, ...]:

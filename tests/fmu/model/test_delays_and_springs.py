@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fmu.effect_states import DAMPING_RATIO, MOTOR_SHARE
 from fmu.table import variable_table
 from fmu.variables import Block, Inputs
 from ident.vehicle.description import load_vehicle
 from ident.vehicle.effects import EFFECTS, Effect, EffectName, make_effect
+from ident.vehicle.springs import DAMPING_RATIO, MOTOR_SHARE
 
 Array = NDArray[np.float64]
 
