@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.abc
 import importlib.machinery
 import json
+import math
 import sys
 import tempfile
 import time
@@ -17,10 +18,11 @@ from hil.exam.folder import RECORDS, ExamFolder, read_exam, write_atomically
 from hil.exam.record_bytes import record_from_bytes
 from hil.exam.workers import run_all
 from ident.errors import UserError
-from ident.gap.vehicle.diagnose import diagnose_vehicle
+from ident.gap.alone import closed_alone
+from ident.gap.vehicle.diagnose import VehicleDiagnosis, diagnose_vehicle
 from ident.vehicle.description import load_vehicle
 from ident.vehicle.effects import EffectName
-from ident.vehicle.parameters import read_parameters
+from ident.vehicle.extended import read_model
 
 FORBIDDEN: Final = ("emulator", "pybullet")
 """Packages that would know the answers."""
@@ -110,7 +112,10 @@ def diagnose_exam(
 def diagnose_case(
     identifier: str, fit: bytes, confirm: bytes, vehicle: str, model: str, removed: str | None
 ) -> tuple[str, bytes]:
-    """Diagnosis of one case as JSON, with the processor time that it took [s]; runs in a worker.
+    """Diagnosis of one case as JSON; runs in a worker.
+
+    Beside the diagnosis it holds `seconds`, the processor time that it took, and `alone`, what every name of the
+    library would close in place of the answer (`closed_alone`), not for a library that lacks one.
 
     Args:
         identifier: of the case.
@@ -123,14 +128,23 @@ def diagnose_case(
         files = [Path(scratch) / name for name in ("vehicle.toml", "model.toml")]
         for file, text in zip(files, (vehicle, model), strict=True):
             file.write_text(text, encoding="utf-8")
-        described, parameters = load_vehicle(files[0]), read_parameters(files[1])
+        described, judged = load_vehicle(files[0]), read_model(files[1])
     started = time.process_time()
     records = [record_from_bytes(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
     effects = [name for name in EffectName if name != removed]
     try:
-        found = diagnose_vehicle(records[:1], records[1:], described, parameters, effects=effects)
-        content = found.diagnosis.as_json()
+        found = diagnose_vehicle(records[:1], records[1:], described, judged, effects=effects)
+        content = {**found.diagnosis.as_json(), "seconds": time.process_time() - started}
+        content |= {} if removed else {"alone": _alone(found)}
     except (ArithmeticError, ValueError, UserError) as error:
         # One case that fails must not end an exam of hours; it counts as a wrong answer.
-        content = {**_FAILED, "error": repr(error)}
-    return identifier, json.dumps({**content, "seconds": time.process_time() - started}).encode()
+        content = {**_FAILED, "seconds": time.process_time() - started, "error": repr(error)}
+    return identifier, json.dumps(content).encode()
+
+
+def _alone(found: VehicleDiagnosis) -> list[dict[str, Any]]:
+    keys = [cause.candidate.key for cause in found.findings.causes]
+    return [
+        {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in vars(one).items()}
+        for one in closed_alone(found.findings, found.problems, keys)
+    ]

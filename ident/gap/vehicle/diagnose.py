@@ -27,10 +27,12 @@ class VehicleDiagnosis:
     Attributes:
         findings: everything that reports show.
         next_experiment: for people; None where nothing would tell more.
+        problems: to fit and to confirm, with all candidates, changed parameters included.
     """
 
     findings: Findings
     next_experiment: str | None
+    problems: tuple[Problem, Problem]
 
     @property
     def diagnosis(self) -> Diagnosis:
@@ -75,7 +77,8 @@ def diagnose_vehicle(
         findings = with_drift(findings, _free(fitted), _free(confirming), fitted.nominal)
     invisible = tuple(str(name) for name in effects if name in hidden or name in findings.invisible)
     findings = replace(findings, invisible=invisible)
-    return VehicleDiagnosis(findings, next_experiment(findings, [block.step for block in fitted.blocks]))
+    advice = next_experiment(findings, [block.step for block in fitted.blocks])
+    return VehicleDiagnosis(findings, advice, (fitted, confirming))
 
 
 def _problem(
