@@ -13,13 +13,13 @@ import typer
 from hil.campaign.folder import network_file_of
 from hil.exam.cases import Composition
 from hil.exam.folder import ExamFolder, write_atomically
-from hil.exam.score_names import PERMUTED, WITHOUT_TRUE
-from hil.exam.score_report import reliability_svg, score_json, score_markdown, summary_lines
-from hil.exam.scoring import modesty, permuted, read_answers, removable, score
-from hil.exam.sizes import SIZES_FILE, load_sizes, table_text
-from hil.exam.statistics import Rate
+from hil.exam.score_figures import confusion_svg, reliability_svg
+from hil.exam.score_report import score_exam, score_json, score_markdown, summary_lines
+from hil.exam.scoring import removable
+from hil.exam.sizes import SIZES_FILE, load_rows, load_sizes, replaced, table_text
 from hil.network import load_network
 from hil.workflow import progress
+from ident.errors import UserError
 from quasiomni.application import app, console
 from quasiomni.options import load_emulation
 
@@ -85,38 +85,41 @@ def diagnose(
 @exam.command()
 def calibrate(
     out: Annotated[Path, typer.Option(help="Table of sizes to write.")] = SIZES_FILE,
+    effect: Annotated[
+        list[str] | None, typer.Option(help="Measure this one anew, and keep the other rows of the table.")
+    ] = None,
+    jobs: JobsOption = 2,
 ) -> None:
     """Measure what size each effect has in noise units, from pairs of runs that differ by the effect alone."""
     load_emulation()
-    from hil.exam.calibration import calibrate
+    from hil.exam.calibration import EVERY, calibrate
 
+    strangers = sorted(set(effect or ()) - EVERY)
+    if strangers:
+        raise UserError(f"No effect is called {strangers[0]}.", f"Name some of {', '.join(sorted(EVERY))}.")
+    kept = load_rows(out) if effect else None
     cycle = load_network(network_file_of("prototype")).cycle_period
     with _bar("measuring") as shown:
-        rows = calibrate("prototype", cycle, shown)
+        rows = calibrate("prototype", cycle, jobs, shown, effect or EVERY)
+    rows = rows if kept is None else replaced(kept, rows)
     write_atomically(out, table_text(rows).encode())
     console.print(f"Written: {out}")
 
 
 @exam.command("score")
 def score_command(folder: FolderArgument) -> None:
-    """Open the sealed answer and score; writes score.md, score.json and reliability.svg."""
-    opened = ExamFolder(folder)
-    answers = read_answers(opened)
-    result, chance = score(answers), score(permuted(answers, np.random.default_rng(0)))
-    extra: dict[str, Rate] = {PERMUTED: chance.rates["top-1 or in the set"]}
-    if (folder / "diagnoses_without").is_dir():
-        extra[WITHOUT_TRUE] = modesty(read_answers(opened, removed=True))
-    for line in summary_lines(result):
-        console.print(line, highlight=False)
-    for name, rate in extra.items():
-        console.print(f"{name:<44} {rate}", highlight=False)
+    """Open the sealed answer and score; writes score.md, score.json, reliability.svg and confusion.svg."""
+    report = score_exam(ExamFolder(folder), np.random.default_rng(0))
+    for line in summary_lines(report):
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
     for name, text in (
-        ("score.md", score_markdown(result, "Exam", extra)),
-        ("score.json", score_json(result, extra)),
-        ("reliability.svg", reliability_svg(result.bins)),
+        ("score.md", score_markdown(report, "Exam")),
+        ("score.json", score_json(report)),
+        ("reliability.svg", reliability_svg(report.score.bins)),
+        ("confusion.svg", confusion_svg(report.score.confusion, report.score.wished)),
     ):
         write_atomically(folder / name, text.encode())
-    console.print(f"Written: {folder / 'score.md'}, score.json, reliability.svg")
+    console.print(f"Written: {folder / 'score.md'}, score.json, reliability.svg, confusion.svg", soft_wrap=True)
 
 
 @contextmanager

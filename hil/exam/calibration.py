@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Final
 
 from hil.exam.driving import drive
 from hil.exam.noise_units import Noise, SizeInNoise, noise_of, size_in_noise
 from hil.exam.plans import plan_exam
-from hil.exam.probes import CURVED, DRIFTS, KINEMATIC, SHARE, SIGNED, Probe, all_probes
+from hil.exam.probes import DRIFTS, KINEMATIC, SHARES, SIGNED, THRESHOLDS, Probe, all_probes
 from hil.exam.quiet import drive_quietly
 from hil.exam.sealing import effect_of
-from hil.exam.sizes import EffectSize
+from hil.exam.sizes import EffectSize, physical_size
+from hil.exam.workers import run_all
 from hil.truth import truth_of
 from ident.campaign.plan import Plan
 from ident.errors import UserError
 from ident.records.record import Record
 from ident.vehicle.description import load_vehicle
-from ident.vehicle.effects import EffectName
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import Parameters
 
@@ -37,6 +39,18 @@ NEGLIGIBLE: Final = 0.1
 VISIBLE: Final = 1.0
 """Noise units that an effect must reach at its largest size to be one that these campaigns show."""
 
+AIM: Final = 1.5
+"""Noise units near which every effect is measured: the sizes of an exam lie just below."""
+
+APPROACHES: Final = 4
+"""Drives at most that look for the size of `AIM`."""
+
+EVERY: Final = frozenset(str(probe.name) for probe in all_probes())
+"""Names of all effects that have a size."""
+
+Points = tuple[tuple[float, float], ...]
+"""(size, noise units), ascending in noise units."""
+
 
 @dataclass(frozen=True)
 class Bench:
@@ -50,28 +64,57 @@ class Bench:
     prototype: str
 
 
-def calibrate(prototype: str, cycle: float, progress: Callable[[int, int], None]) -> list[EffectSize]:
-    """The table of sizes of a prototype.
+def calibrate(
+    prototype: str,
+    cycle: float,
+    jobs: int,
+    progress: Callable[[int, int], None],
+    names: Container[str] = EVERY,
+) -> list[EffectSize]:
+    """The table of sizes of a prototype, or the rows of some effects.
 
     Args:
         prototype: of the emulator, by name.
         cycle: T_s [s].
-        progress: called with probes measured and in all.
+        jobs: processes on this machine.
+        progress: called with effects measured and in all.
+        names: of the effects.
     """
+    probes = [probe for probe in all_probes() if probe.name in names]
+    stand_ins = {_key(probe): probe for probe in probes}
+    tasks = [(prototype, cycle, probe) for probe in stand_ins.values()]
+    measured: dict[tuple[str, str], tuple[str, Points]] = {}
+    progress(0, len(tasks))
+    for key, channel, points in run_all(measure, tasks, jobs=jobs, scheduler=None):
+        measured[key] = channel, points
+        progress(len(measured), len(tasks))
+    return [_row(probe, *measured[_key(probe)]) for probe in probes]
+
+
+def measure(prototype: str, cycle: float, probe: Probe) -> tuple[tuple[str, str], str, Points]:
+    """Key of a probe, the channel that shows it and its points there, no points where none does; runs in a worker."""
     bench = _bench(prototype, cycle)
-    probes = list(all_probes())
-    measured: dict[tuple[str, str], tuple[tuple[float, SizeInNoise], ...]] = {}
-    rows = []
-    for done, probe in enumerate(probes):
-        progress(done, len(probes))
-        key = (probe.name, probe.measured_at)
-        if key not in measured:
-            measured[key] = tuple(_measure(probe, bench))
-        rows.append(_row(probe, measured[key]))
-    progress(len(probes), len(probes))
-    return rows
+    found = {size: units for share in SHARES if (units := _units(probe, size := _of_share(probe, share), bench))}
+    channel = _shown_in(probe, list(found.values()))
+    if channel is None:
+        return _key(probe), "torque", ()
+    for _ in range(APPROACHES):
+        points = _points(probe, {size: float(getattr(units, channel)) for size, units in found.items()})
+        if any(CLEAR < units < 2 * AIM for _, units in points):
+            break
+        size = physical_size(points, AIM)
+        units = _units(probe, size, bench)
+        if units is None:
+            break
+        found[size] = units
+    return _key(probe), channel, _points(probe, {size: float(getattr(at, channel)) for size, at in found.items()})
 
 
+def _key(probe: Probe) -> tuple[str, str]:
+    return str(probe.name), probe.measured_at
+
+
+@lru_cache(maxsize=1)
 def _bench(prototype: str, cycle: float) -> Bench:
     vehicle = load_vehicle(prototype)
     plan, truth = plan_exam(vehicle, PLAN_SEED, cycle).fit, truth_of(prototype)
@@ -80,17 +123,13 @@ def _bench(prototype: str, cycle: float) -> Bench:
     return Bench(once, noise, drive_quietly(once, prototype, ()), truth, vehicle.geometry, prototype)
 
 
-def _measure(probe: Probe, bench: Bench) -> list[tuple[float, SizeInNoise]]:
-    """Size of the probe at some shares of its largest; those that the vehicle cannot drive with are left out."""
-    found = []
-    for share in CURVED.get(EffectName(probe.name), (SHARE,)) if probe.known else (SHARE,):
-        size = _of_share(probe, share)
-        try:
-            record = drive_quietly(bench.plan, bench.prototype, [effect_of(probe.injected(size))])
-        except UserError:
-            break
-        found.append((size, size_in_noise(bench.noise, bench.plain, record, bench.truth.values, bench.geometry)))
-    return found
+def _units(probe: Probe, size: float, bench: Bench) -> SizeInNoise | None:
+    """Noise units of a size; None where the vehicle cannot be driven with it."""
+    try:
+        record = drive_quietly(bench.plan, bench.prototype, [effect_of(probe.injected(size))])
+    except UserError:
+        return None
+    return size_in_noise(bench.noise, bench.plain, record, bench.truth.values, bench.geometry)
 
 
 def _of_share(probe: Probe, share: float) -> float:
@@ -98,8 +137,7 @@ def _of_share(probe: Probe, share: float) -> float:
     return probe.largest / share if probe.name == "slip" else probe.largest * share
 
 
-def _row(probe: Probe, measured: Sequence[tuple[float, SizeInNoise]]) -> EffectSize:
-    channel, points = _seen_in(probe, measured)
+def _row(probe: Probe, channel: str, points: Points) -> EffectSize:
     return EffectSize(
         name=str(probe.name),
         where=probe.where,
@@ -113,31 +151,20 @@ def _row(probe: Probe, measured: Sequence[tuple[float, SizeInNoise]]) -> EffectS
     )
 
 
-def _seen_in(
-    probe: Probe, measured: Sequence[tuple[float, SizeInNoise]]
-) -> tuple[str, tuple[tuple[float, float], ...]]:
-    """The channel that shows the effect, and its points there; no points where none does."""
+def _shown_in(probe: Probe, measured: Sequence[SizeInNoise]) -> str | None:
+    """The channel that shows the effect best at the first size; None where it shows too little at any."""
     channels = ["drift"] if probe.name in DRIFTS else ["torque"]
     if probe.name in KINEMATIC:
         channels.append("kinematic")
-    for channel in channels:
-        points = [(size, float(getattr(units, channel))) for size, units in measured]
-        if any(units >= VISIBLE for _, units in points):
-            clear = [point for point in points if point[1] > CLEAR]
-            return channel, _ascending([*_foot(points), *clear] if probe.name in CURVED else clear)
-    return "torque", ()
+    best = max(channels, key=lambda name: float(getattr(measured[0], name)))
+    return best if any(getattr(units, best) >= VISIBLE for units in measured) else None
 
 
-def _foot(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The last size that does nothing yet, from which a threshold rises."""
-    idle = [(size, NEGLIGIBLE) for size, units in points if units < NEGLIGIBLE]
-    return idle[-1:]
-
-
-def _ascending(points: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """Points whose noise units grow from one to the next."""
-    kept: list[tuple[float, float]] = []
-    for point in points:
-        if not kept or point[1] > kept[-1][1]:
-            kept.append(point)
-    return tuple(kept)
+def _points(probe: Probe, measured: Mapping[float, float]) -> Points:
+    """Clear points in ascending order, and the foot that a threshold rises from."""
+    clear = sorted(((size, units) for size, units in measured.items() if units > CLEAR), key=lambda point: point[1])
+    idle = [size for size, units in measured.items() if units <= CLEAR]
+    if probe.name not in THRESHOLDS or not idle:
+        return tuple(clear)
+    foot = min(idle, key=lambda size: abs(math.log(size / clear[0][0])))
+    return ((foot, NEGLIGIBLE), *clear)

@@ -3,8 +3,8 @@
 Two runs differ by the effect alone. What the eleven columns of the model can absorb of the difference is no gap; the
 rest, rms over moving samples, is taken in the coordinate where it is largest against its noise, and divided by the
 period-to-period rms of that coordinate. Effects that move no torque but break the rolling constraints have the same
-measure there, over the rms of what odometry leaves of the constraints without any effect: the last bits of an
-alignment repeat in every period, but not in the next campaign.
+measure there, over the rms of what odometry leaves of the constraints without any effect and of the creep that rolling
+wheels are granted: it repeats in every period, but not in the next campaign nor on another floor.
 
 The two runs are driven without noise, so that they differ by nothing else: with it, an alignment more or less shifts
 all noise that follows. The noise is that of a third run.
@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from ident.estimate.equations import Equations, motion_of, usable_equations
 from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.estimate.noise import noise_floor
-from ident.records.record import Record, Segment
+from ident.gap.vehicle.build import CREEP, TURNING_CREEP
+from ident.records.record import Record, Segment, Step, base_step
 from ident.vehicle import kinematics
 from ident.vehicle.geometry import Geometry
 
@@ -36,7 +37,7 @@ class Noise:
 
     Attributes:
         torques: period-to-period rms of each generalized torque, by step and coordinate [Nm or N].
-        slips: rms of what odometry leaves of the eight constraints, by step (8,) [m/s].
+        slips: rms of what odometry leaves of the eight constraints, and of creep, by step (8,) [m/s].
     """
 
     torques: Mapping[tuple[str, str], float]
@@ -134,4 +135,7 @@ def _slip_size(plain: Segment, changed: Segment, noise: Array, geometry: Geometr
 
 def _slip_noise(segment: Segment, geometry: Geometry) -> Array:
     slips, moving = _slips(segment, geometry)
-    return np.asarray(np.sqrt(np.mean(slips[moving] ** 2, axis=0)))
+    speed = geometry.wheel_radius * motion_of(segment, geometry, _PROCESSING).rates[moving, 5:]
+    steering = base_step(segment.step) in (Step.STEERING_LEFT, Step.STEERING_RIGHT)
+    creep = (TURNING_CREEP if steering else CREEP) * _rms(speed)
+    return np.asarray(np.hypot(np.sqrt(np.mean(slips[moving] ** 2, axis=0)), creep))

@@ -81,13 +81,11 @@ UNKNOWN_PRACTICAL: Final[Mapping[UnlibrariedName, float]] = MappingProxyType(
 )
 """The same of effects that have no candidate."""
 
-SHARE: Final = 0.6
-"""Of the largest size, at which an effect is driven that is proportional to its size, or nearly so."""
+SHARES: Final = (0.6, 1.0)
+"""Of the largest size, at which every effect is driven first; nearer to the noise after that."""
 
-CURVED: Final[Mapping[EffectName, tuple[float, ...]]] = MappingProxyType(
-    {EffectName.SLIP: (0.4, 0.6, 0.8), EffectName.BACKLASH: (0.2, 0.6)}
-)
-"""Shares of the effects that are not: a threshold, a play that is smaller than a stroke."""
+THRESHOLDS: Final = frozenset({EffectName.SLIP})
+"""Effects that do nothing at all up to some size."""
 
 
 @dataclass(frozen=True)

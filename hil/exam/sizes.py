@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from ident.errors import DataFileError
 
 SIZES_FILE: Final = Path(__file__).parent / "data" / "sizes.json"
@@ -40,15 +42,18 @@ class EffectSize:
     known: bool
 
     def physical(self, noise_units: float) -> float:
-        """Size that amounts to so many noise units: straight lines through the points, both axes logarithmic."""
-        points = [(math.log(units), math.log(size)) for size, units in self.points]
-        target = math.log(noise_units)
-        if len(points) == 1:
-            (x, y), slope = points[0], 1.0
-            return math.exp(y + slope * (target - x))
-        upper = next((index for index in range(1, len(points)) if target <= points[index][0]), len(points) - 1)
-        (x0, y0), (x1, y1) = points[upper - 1], points[upper]
-        return math.exp(y0 + (y1 - y0) / (x1 - x0) * (target - x0))
+        """Size that amounts to so many noise units."""
+        return physical_size(self.points, noise_units)
+
+
+def physical_size(points: Sequence[tuple[float, float]], noise_units: float) -> float:
+    """Straight lines through (size, noise units), both axes logarithmic; in proportion beyond the points."""
+    sizes, units = zip(*points, strict=True)
+    if noise_units <= units[0]:
+        return float(sizes[0] * noise_units / units[0])
+    if noise_units >= units[-1]:
+        return float(sizes[-1] * noise_units / units[-1])
+    return float(np.exp(np.interp(math.log(noise_units), np.log(units), np.log(sizes))))
 
 
 @dataclass(frozen=True)
@@ -77,17 +82,32 @@ def load_sizes(path: Path = SIZES_FILE) -> SizeTable:
     Raises:
         DataFileError: the file is missing or malformed.
     """
-    try:
-        rows = [_row(entry) for entry in json.loads(path.read_text(encoding="utf-8"))]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DataFileError(
-            f"{path} is no table of sizes: {error}.", "Write one: quasiomni exam calibrate --out FILE."
-        ) from error
+    rows = load_rows(path)
     return SizeTable(
         visible=tuple(row for row in rows if row.known and row.points),
         invisible=tuple(row for row in rows if row.known and not row.points),
         unknown=tuple(row for row in rows if not row.known),
     )
+
+
+def load_rows(path: Path) -> list[EffectSize]:
+    """The rows of a table, in order.
+
+    Raises:
+        DataFileError: the file is missing or malformed.
+    """
+    try:
+        return [_row(entry) for entry in json.loads(path.read_text(encoding="utf-8"))]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataFileError(
+            f"{path} is no table of sizes: {error}.", "Write one: quasiomni exam calibrate --out FILE."
+        ) from error
+
+
+def replaced(rows: Sequence[EffectSize], anew: Sequence[EffectSize]) -> list[EffectSize]:
+    """Rows, those measured anew in the place of what they were."""
+    changed = {(row.name, row.where): row for row in anew}
+    return [changed.get((row.name, row.where), row) for row in rows]
 
 
 def _row(entry: dict[str, Any]) -> EffectSize:
