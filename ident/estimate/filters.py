@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +36,12 @@ class Processing:
 
 def zero_phase(values: Array, cutoff: float, sample_time: float) -> Array:
     """Butterworth low-pass forwards and backwards along axis 0, cutoff in rad/s."""
-    sections = signal.butter(FILTER_ORDER, cutoff / (2 * math.pi), fs=1 / sample_time, output="sos")
-    return np.asarray(signal.sosfiltfilt(sections, values, axis=0))
+    return np.asarray(signal.sosfiltfilt(_sections(cutoff, sample_time), values, axis=0))
+
+
+@lru_cache(maxsize=32)
+def _sections(cutoff: float, sample_time: float) -> Array:
+    return np.asarray(signal.butter(FILTER_ORDER, cutoff / (2 * math.pi), fs=1 / sample_time, output="sos"))
 
 
 def differentiate(values: Array, sample_time: float) -> Array:

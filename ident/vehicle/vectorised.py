@@ -6,7 +6,7 @@ instructions numpy is about ten times faster.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -45,12 +45,23 @@ _OPERATIONS: Final[Mapping[int, Callable[..., Any]]] = MappingProxyType(
     }
 )
 
+CHUNK: Final = 8192
+"""Samples at a time: so many that calling numpy costs little, so few that they stay in the processor's cache."""
+
+_Instruction = tuple[int, tuple[int, ...], tuple[int, ...], float]
+"""CasADi's code of the operation, where its operands are, where its result goes, value of a constant."""
+
 
 class Vectorised:
     """A CasADi function of one output, ready for arrays.
 
     Args:
-        function: of SX expressions, its output dense.
+        function: of SX expressions.
+
+    Attributes:
+        shape: rows and columns of its output.
+        places: rows (E,) and columns (E,) of the entries of its output that are no structural zeros.
+        inputs: (argument, element) of all that its output depends on.
 
     Raises:
         ValueError: it holds an operation that has no numpy counterpart here.
@@ -58,26 +69,38 @@ class Vectorised:
 
     def __init__(self, function: Any) -> None:
         self.shape: tuple[int, int] = function.size_out(0)
-        self._inputs = [function.nnz_in(index) for index in range(function.n_in())]
-        self._program = [
-            (
-                function.instruction_id(index),
-                function.instruction_input(index),
-                function.instruction_output(index),
-                function.instruction_constant(index) if function.instruction_id(index) == ca.OP_CONST else 0.0,
-            )
-            for index in range(function.n_instructions())
-        ]
+        pattern = function.sparsity_out(0)
+        self.places = (np.array(pattern.row(), dtype=np.int64), np.array(pattern.get_col(), dtype=np.int64))
+        self._program = [_instruction(function, index) for index in range(function.n_instructions())]
+        self.inputs = frozenset(sources for code, sources, *_ in self._program if code == ca.OP_INPUT)
         unknown = {code for code, *_ in self._program} - _OPERATIONS.keys() - {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST}
         if unknown:
             raise ValueError(f"no numpy counterpart of the CasADi operations {sorted(unknown)}")
 
     def __call__(self, *arguments: Array) -> Array:
         """Outputs (N, rows, columns) for arguments (N, n), or (n,) where they are the same for all samples."""
-        samples = next(len(argument) for argument in arguments if argument.ndim == 2)
-        columns = [list(argument.T if argument.ndim == 2 else argument) for argument in arguments]
+        return self.matrices(self.entries(*arguments))
+
+    def matrices(self, entries: Array) -> Array:
+        """Outputs (N, rows, columns) made of their entries (E, N)."""
         rows, width = self.shape
-        result = np.zeros((rows * width, samples))
+        if len(entries) == rows * width:
+            return entries.reshape(width, rows, entries.shape[1]).transpose(2, 1, 0)
+        whole = np.zeros((width, rows, entries.shape[1]))
+        whole[self.places[1], self.places[0]] = entries
+        return whole.transpose(2, 1, 0)
+
+    def entries(self, *arguments: Array) -> Array:
+        """The outputs that are no structural zeros, (E, N) at `places`; arguments as for the call."""
+        samples = next(len(argument) for argument in arguments if argument.ndim == 2)
+        columns = [np.ascontiguousarray(argument.T) for argument in arguments]
+        result = np.empty((len(self.places[0]), samples))
+        for start in range(0, samples, CHUNK):
+            part = slice(start, start + CHUNK)
+            self._run([list(values[:, part] if values.ndim == 2 else values) for values in columns], result[:, part])
+        return result
+
+    def _run(self, columns: Sequence[Sequence[Any]], result: Array) -> None:
         work: dict[int, Any] = {}
         for code, sources, targets, constant in self._program:
             if code == ca.OP_INPUT:
@@ -86,6 +109,13 @@ class Vectorised:
                 work[targets[0]] = constant
             elif code == ca.OP_OUTPUT:
                 result[targets[1]] = work[sources[0]]
+            elif len(sources) == 1:
+                work[targets[0]] = _OPERATIONS[code](work[sources[0]])
             else:
-                work[targets[0]] = _OPERATIONS[code](*(work[source] for source in sources))
-        return result.reshape(width, rows, samples).transpose(2, 1, 0)
+                work[targets[0]] = _OPERATIONS[code](work[sources[0]], work[sources[1]])
+
+
+def _instruction(function: Any, index: int) -> _Instruction:
+    code = function.instruction_id(index)
+    constant = function.instruction_constant(index) if code == ca.OP_CONST else 0.0
+    return code, tuple(function.instruction_input(index)), tuple(function.instruction_output(index)), constant

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -21,7 +22,7 @@ from ident.gap.vehicle.signals import Signals, decimation, signals_of
 from ident.gap.vehicle.transforms import Setting, TransformCause, transform_cause, transform_causes
 from ident.records.record import Record, Step, base_step
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.effect_terms import TERMS, term_of
+from ident.vehicle.effect_terms import TERMS, EffectTerm, term_of
 from ident.vehicle.effects import Effect, EffectName
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.modes import Mode
@@ -47,6 +48,12 @@ TURNING_CREEP: Final = 1e-3
 
 PRIOR_WEIGHT: Final = 1e-4
 """Of the vehicle file's guesses against the rows, per unit-norm column: only what no row shows is taken from them."""
+
+FORMULAS_KEPT: Final = 4
+"""Libraries of causes, and sets of given effects, whose generated formulas a process keeps."""
+
+AT_ONCE: Final = 16
+"""Columns that pass the filter together: it makes several copies of them."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +132,12 @@ class Context:
 
     def filtered(self, values: Array, source: Source) -> Array:
         """Columns (M, ...) through the filter, thinned to the rows of the source's blocks."""
-        return zero_phase(values, self.processing.cutoff, source.sample_time)[:: source.factor]
+        flat = values.reshape(len(values), -1)
+        thinned = [
+            zero_phase(part, self.processing.cutoff, source.sample_time)[:: source.factor]
+            for part in np.split(flat, range(AT_ONCE, flat.shape[1], AT_ONCE), axis=1)
+        ]
+        return np.hstack(thinned).reshape(-1, *values.shape[1:])
 
 
 def build_problem(
@@ -155,7 +167,7 @@ def build_problem(
     processing = processing or Processing()
     sources = [source for record in records for source in sources_of(record, vehicle.geometry, steps, processing)]
     context = make_context(sources, vehicle, model, given, processing)
-    causes = _causes(effects, model is not None)
+    causes = _causes(tuple(effects), model is not None)
     units = [unit for cause in causes if isinstance(cause, TermCause) for v in cause.variants for unit in v.units]
     tables = [_table(source, context, units) for source in sources]
     blocks = [block for source, table in zip(sources, tables, strict=True) for block in _blocks(source, table, context)]
@@ -177,13 +189,25 @@ def make_context(
     processing: Processing,
 ) -> Context:
     """Context of some sources; without a model, parameters are fitted to them."""
-    terms = rows.Formulas([term_of(effect) for effect in given if effect.name in TERMS])
+    terms = _formulas(tuple(_frozen(term_of(effect)) for effect in given if effect.name in TERMS))
     memories = tuple(
         (transform_cause(effect.name, effect.where), effect.size) for effect in given if effect.name not in TERMS
     )
     context = Context(vehicle.geometry, processing, vehicle.prior.values, terms, memories)
     values = model.values if model else fitted_parameters(sources, vehicle, context)
     return replace(context, parameters=values)
+
+
+_FrozenTerm = tuple[EffectName, str, tuple[tuple[str, float], ...]]
+
+
+def _frozen(term: EffectTerm) -> _FrozenTerm:
+    return term.name, term.where, tuple(term.values.items())
+
+
+@lru_cache(maxsize=FORMULAS_KEPT)
+def _formulas(given: tuple[_FrozenTerm, ...]) -> rows.Formulas:
+    return rows.Formulas([EffectTerm(name, where, dict(values)) for name, where, values in given])
 
 
 def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], processing: Processing) -> list[Source]:
@@ -285,7 +309,8 @@ _COLUMNS: Final = 1 + len(PARAMETER_NAMES)
 def _table(source: Source, context: Context, units: Sequence[rows.UnitTerm]) -> Array:
     """Filtered residual at p = 0, regressor and columns of a source: (N, rows, 12 + units)."""
     function = context.formulas.linearised(source.channel, source.spec, units)
-    return context.filtered(function(context.inputs(source), *context.constants), source)
+    entries = function.entries(context.inputs(source), *context.constants)
+    return function.matrices(context.filtered(entries.T, source).T)
 
 
 def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
@@ -326,9 +351,10 @@ def _unit(channel: Channel, coordinate: str) -> str:
     return "N" if coordinate in ("x", "y") else "Nm"
 
 
-def _causes(effects: Sequence[EffectName], judged: bool) -> list[Cause]:
+@lru_cache(maxsize=FORMULAS_KEPT)
+def _causes(effects: tuple[EffectName, ...], judged: bool) -> tuple[Cause, ...]:
     names = tuple(name for name in effects if judged or name not in DRIFTS)
-    return [*term_causes(names), *transform_causes(names)]
+    return (*term_causes(names), *transform_causes(names))
 
 
 def _candidate(

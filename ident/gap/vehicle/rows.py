@@ -171,9 +171,9 @@ def _on_the_floor(z: _Inputs, alpha: Expression, radii: Expression) -> tuple[Exp
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class UnitTerm:
-    """A term that is linear in one number: what one column of a candidate stands for.
+    """A term that is linear in one number: what one column of a candidate stands for. Equal to none but itself.
 
     Attributes:
         term: with symbols in it.
@@ -194,12 +194,16 @@ class Formulas:
     def __init__(self, given: Sequence[EffectTerm] = ()) -> None:
         self._given = tuple(given)
         self._exact: dict[tuple[Channel, RowsOfStep, EffectName | None, str], Vectorised] = {}
+        self._linearised: dict[tuple[Channel, RowsOfStep, tuple[UnitTerm, ...]], Vectorised] = {}
 
     def linearised(self, channel: Channel, spec: RowsOfStep, units: Sequence[UnitTerm]) -> Vectorised:
         """(z, geometry, ε, p) -> (N, rows, 12 + units): the rows at p = 0, then ∂/∂p, then ∂/∂unit."""
-        z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
-        rows = _rows(channel, spec, z, p, [*(unit.term for unit in units), *self._given])
-        return _linearise(rows, z, p, units)
+        key = (channel, spec, tuple(units))
+        if key not in self._linearised:
+            z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
+            rows = _rows(channel, spec, z, p, [*(unit.term for unit in units), *self._given])
+            self._linearised[key] = _linearise(rows, z, p, units)
+        return self._linearised[key]
 
     def exact(self, channel: Channel, spec: RowsOfStep, name: EffectName | None = None, where: str = "") -> Vectorised:
         """(z, geometry, ε, p, values) -> (N, rows, 1): the rows of a step with one effect more, or with none."""
@@ -236,4 +240,4 @@ def _linearise(rows: Expression, z: _Inputs, p: Expression, units: Sequence[Unit
         ca.substitute(ca.jacobian(rows, symbols), symbols, nothing),
     )
     inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON, p]
-    return Vectorised(ca.Function("rows", inputs, [ca.cse(ca.densify(table))]))
+    return Vectorised(ca.Function("rows", inputs, [ca.cse(ca.sparsify(table))]))
