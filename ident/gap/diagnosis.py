@@ -30,7 +30,7 @@ class NamedEffect:
     Attributes:
         name, where: canonical.
         parameters: value, standard uncertainty and unit by name.
-        probability: that this name is right.
+        probability: that this name is right, or one that is the same in these records.
         ambiguity_set: names that these records do not tell apart from it, itself first.
         gap_closed_held_out: share of the removable gap that this effect closes on records that took no part in the
             fit, given the other effects.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,7 +52,7 @@ class Cause:
         candidate: what and where.
         part: its parameters, all records fitted.
         ranked: what else may stand in its place.
-        probability: that its name is right.
+        probability: that its name is right, or one that is the same in these records.
         log_evidence, log_predictive: of all records, and what the confirming rows add.
         closed: share of the removable held-out gap that it closes, the other effects given.
         biased: how much each parameter of the model shifts when the effect is left out, by name, in standard
@@ -246,7 +246,7 @@ class _Judgement:
 
     def _causes(self) -> tuple[Cause, ...]:
         made = [self._cause(index, variant) for index, variant in enumerate(self.found.variants)]
-        return tuple(sorted(made, key=lambda cause: (-round(cause.probability, 2), -round(cause.closed, 1))))
+        return ordered(made)
 
     def _cause(self, index: int, variant: int) -> Cause:
         slot, settings = self.found.slots[index], calibration()
@@ -256,7 +256,7 @@ class _Judgement:
             candidate=candidate,
             part=self.after.parts[index],
             ranked=ranked,
-            probability=min(ranked.names.get(str(candidate.effect), 0.0), settings.ceiling),
+            probability=min(ranked.probability, settings.ceiling),
             log_evidence=self._log_evidence(index),
             log_predictive=float(slot.evidence.log_predictive[variant]),
             closed=self._closed(index),
@@ -271,6 +271,11 @@ class _Judgement:
         )
         shift = (without.baseline - whole.baseline) / np.maximum(whole.baseline_std, np.finfo(float).tiny)
         return dict(zip(self.problems[0].names, shift.tolist(), strict=True))
+
+
+def ordered(causes: Iterable[Cause]) -> tuple[Cause, ...]:
+    """Most probable first; those that are as probable, to a hundredth, by evidence."""
+    return tuple(sorted(causes, key=lambda cause: (-round(cause.probability, 2), -cause.log_evidence)))
 
 
 def invisible_names(regression: Regression) -> tuple[str, ...]:

@@ -58,6 +58,11 @@ class Ranked:
     names: Mapping[str, float]
     alike: tuple[str, ...]
 
+    @property
+    def probability(self) -> float:
+        """That the name taken is right, or one of a candidate that is the same in these records."""
+        return sum(self.names.get(name, 0.0) for name in {key.split("@")[0] for key in self.alike})
+
     def ambiguity_set(self, name: str, coverage: float) -> tuple[str, ...]:
         """Names up to a probability, and those of candidates that are the same; `name` first."""
         total, chosen, reached = sum(self.names.values()), [name], 0.0

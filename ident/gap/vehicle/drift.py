@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.gap.diagnosis import Verdict
-from ident.gap.judge import Cause, Findings
+from ident.gap.judge import Cause, Findings, ordered
 from ident.gap.probability import Ranked, calibration
 from ident.gap.problem import Candidate, Nominal, Problem
 from ident.gap.refit import Part
@@ -106,8 +106,8 @@ def with_drift(findings: Findings, fit: Problem, confirm: Problem, nominal: Nomi
     causes = _causes(fitted, confirming, nominal.values, std, gap.closed)
     verdict = Verdict.EFFECT if causes and findings.verdict is Verdict.NONE else findings.verdict
     invisible = tuple(name for name in findings.invisible if name not in (EffectName.PAYLOAD,))
-    together = sorted((*findings.causes, *causes), key=lambda cause: -cause.probability)
-    return replace(findings, verdict=verdict, causes=tuple(together), gap=gap, invisible=invisible)
+    together = ordered((*findings.causes, *causes))
+    return replace(findings, verdict=verdict, causes=together, gap=gap, invisible=invisible)
 
 
 def _structure(findings: Findings, rows: Rows) -> list[Array]:
@@ -193,7 +193,7 @@ def _cause(
         candidate=Candidate(change.name, change.where, placed_parameters(change.name, change.where), (), drift=True),
         part=Part(change.key, shift[index] / unit, deviations[index] / abs(unit)),
         ranked=ranked,
-        probability=min(ranked.names[change.name], calibration().ceiling),
+        probability=min(ranked.probability, calibration().ceiling),
         log_evidence=evidence[change],
         log_predictive=confirmed,
         closed=closed,
