@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -169,7 +168,7 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
         scale=scale,
         log_evidence=np.where(competing, 0.5 * ratios / scale - price, -np.inf),
         log_predictive=_predictive(white, layout, found, amplitudes, scale),
-        significance=_significance(tested.max(initial=-np.inf), by_chance.max(axis=1, initial=-np.inf)),
+        significance=significance(tested.max(initial=-np.inf), by_chance.max(axis=1, initial=-np.inf)),
     )
 
 
@@ -192,7 +191,8 @@ def _scatter(found: Directions, amplitudes: Array, variant: int, stretch: NDArra
     return float(max(1.0, np.sum(sums**2) / (place.stop - place.start)))
 
 
-def _significance(found: float, by_chance: Array) -> float:
+def significance(found: float, by_chance: Array) -> float:
+    """Probability of a value as large as the one found, from values (M,) of surrogates."""
     return float((1 + np.sum(by_chance >= found)) / (1 + len(by_chance)))
 
 
@@ -207,48 +207,6 @@ def _predictive(white: White, layout: Sequence[Column], found: Directions, ampli
     fitted = directions(white, layout, ~white.confirming)
     before = fitted.ratios(fitted.basis.T @ fitted.residual)
     return np.asarray(0.5 * (found.ratios(amplitudes) - before) / scale - 0.5 * (found.volume - fitted.volume))
-
-
-@dataclass(frozen=True)
-class PairEvidence:
-    """The best pair of variants, and how probable so good a pair is by chance."""
-
-    first: int
-    second: int
-    log_evidence: float
-    significance: float
-
-
-def best_pair(evidence: Evidence, owners: Sequence[int], rows: int) -> PairEvidence | None:
-    """The pair of variants of two candidates with the largest joint evidence; None where no two are visible."""
-    visible = np.flatnonzero(np.isfinite(evidence.log_evidence))
-    best: tuple[float, int, int] = (-np.inf, -1, -1)
-    by_chance = np.full(len(evidence.surrogates), -np.inf)
-    for first, second in combinations(visible.tolist(), 2):
-        if owners[first] == owners[second]:
-            continue
-        joint, surrogate = _joint(evidence, first, second, rows)
-        best = max(best, (joint, first, second))
-        by_chance = np.maximum(by_chance, surrogate)
-    if best[1] < 0:
-        return None
-    return PairEvidence(best[1], best[2], best[0], _significance(best[0], by_chance))
-
-
-def _joint(evidence: Evidence, first: int, second: int, rows: int) -> tuple[float, Array]:
-    found = evidence.directions
-    picked = np.r_[found.places[first], found.places[second]]
-    basis = found.basis[:, picked]
-    values, vectors = np.linalg.eigh(basis.T @ basis)
-    kept = values > VISIBLE
-    turn = vectors[:, kept] / np.sqrt(values[kept])
-    scale = max(evidence.scale[first], evidence.scale[second])
-    price = 0.5 * int(kept.sum()) * math.log(rows)
-    turned = evidence.amplitudes[picked] @ turn
-    sizes = turn @ turned
-    possible = bool(np.all((sizes >= found.least[picked]) & (np.abs(sizes) >= found.negligible[picked])))
-    joint = 0.5 * float(np.sum(turned**2)) / scale - price if possible else -np.inf
-    return joint, 0.5 * np.sum((evidence.surrogates[:, picked] @ turn) ** 2, axis=1) / scale - price
 
 
 def cosines(evidence: Evidence, index: int) -> Array:

@@ -48,28 +48,41 @@ class Generic:
         return max(self.before - self.after, 0.0)
 
 
-def predict_generic(regression: Regression, whitener: Whitener, taken: tuple[int, ...], seed: int) -> Generic:
-    """Learn the function beside the baseline and the effects taken, on the fitted rows, and try it on the others."""
-    rows = regression.rows
-    design = np.hstack([rows.baseline, regression.columns_of(taken)])
-    functions = _functions(rows, seed)
-    white = whitener.apply(rows, np.column_stack([design, functions, rows.target]))
-    fitted = ~rows.confirming
-    model, extra, target = np.split(white, [design.shape[1], white.shape[1] - 1], axis=1)
-    left = target[:, 0] - model @ least_squares(model[fitted], target[fitted, 0])
-    absorbed = _absorbed(model[fitted], extra[fitted])
-    extra = extra - model @ absorbed
-    weights = _ridge(extra[fitted], left[fitted], regression.stretch[fitted])
-    predicted = extra @ weights
-    confirming = rows.confirming
-    products = _sums(predicted[confirming] * left[confirming], regression.stretch[confirming])
-    spread = float(np.sqrt(np.sum(products**2)))
-    return Generic(
-        before=float(np.sum(left[confirming] ** 2)),
-        after=float(np.sum((left - predicted)[confirming] ** 2)),
-        deviations=float(products.sum()) / spread if spread > 0 else 0.0,
-        prediction=(functions - design @ absorbed) @ weights,
-    )
+class SmoothFunction:
+    """The function of the states beside whatever effects are taken; random by `seed`.
+
+    Args:
+        regression: rows that it is learnt and tried on.
+        whitener: of what the effects found leave.
+        seed: of the cosines.
+    """
+
+    def __init__(self, regression: Regression, whitener: Whitener, seed: int) -> None:
+        self._regression, self._whitener = regression, whitener
+        self._functions = _functions(regression.rows, seed)
+        self._white = whitener.apply(regression.rows, self._functions)
+
+    def beside(self, taken: tuple[int, ...]) -> Generic:
+        """Learn it beside the baseline and the effects taken, on the fitted rows, and try it on the others."""
+        regression, rows = self._regression, self._regression.rows
+        design = np.hstack([rows.baseline, regression.columns_of(taken)])
+        white = self._whitener.apply(rows, np.column_stack([design, rows.target]))
+        fitted = ~rows.confirming
+        model, target = white[:, :-1], white[:, -1]
+        left = target - model @ least_squares(model[fitted], target[fitted])
+        absorbed = _absorbed(model[fitted], self._white[fitted])
+        extra = self._white - model @ absorbed
+        weights = _ridge(extra[fitted], left[fitted], regression.stretch[fitted])
+        predicted = extra @ weights
+        confirming = rows.confirming
+        products = _sums(predicted[confirming] * left[confirming], regression.stretch[confirming])
+        spread = float(np.sqrt(np.sum(products**2)))
+        return Generic(
+            before=float(np.sum(left[confirming] ** 2)),
+            after=float(np.sum((left - predicted)[confirming] ** 2)),
+            deviations=float(products.sum()) / spread if spread > 0 else 0.0,
+            prediction=self._functions @ weights - design @ (absorbed @ weights),
+        )
 
 
 def _functions(rows: Rows, seed: int) -> Array:
@@ -103,22 +116,34 @@ def _absorbed(model: Array, extra: Array) -> Array:
     return np.asarray(np.linalg.lstsq(model / scale, extra, rcond=1e-7)[0] / scale[:, None])
 
 
+@dataclass(frozen=True)
+class _Normal:
+    """Normal equations of some rows: matrix (F, F) and right-hand side (F,)."""
+
+    matrix: Array
+    vector: Array
+
+    def __add__(self, other: _Normal) -> _Normal:
+        return _Normal(self.matrix + other.matrix, self.vector + other.vector)
+
+    def solved(self, ridge: float) -> Array:
+        """Weights (F,)."""
+        return np.asarray(np.linalg.solve(self.matrix + ridge * np.eye(len(self.vector)), self.vector))
+
+
 def _ridge(extra: Array, left: Array, stretch: NDArray[np.int64]) -> Array:
     """Weights of the functions, the ridge by cross-validation over alternating stretches."""
     if extra.shape[1] == 0 or len(left) == 0:
         return np.zeros(extra.shape[1])
     fold = np.unique(stretch, return_inverse=True)[1] // 2 % 2
-    losses = [sum(_loss(extra, left, fold == part, ridge) for part in (0, 1)) for ridge in RIDGES]
-    return _solved(extra, left, RIDGES[int(np.argmin(losses))])
+    halves = [(extra[fold == part], left[fold == part]) for part in (0, 1)]
+    first, second = (_Normal(columns.T @ columns, columns.T @ target) for columns, target in halves)
+    losses = [_loss(*halves[0], second.solved(ridge)) + _loss(*halves[1], first.solved(ridge)) for ridge in RIDGES]
+    return (first + second).solved(RIDGES[int(np.argmin(losses))])
 
 
-def _loss(extra: Array, left: Array, out: NDArray[np.bool_], ridge: float) -> float:
-    weights = _solved(extra[~out], left[~out], ridge)
-    return float(np.sum((left[out] - extra[out] @ weights) ** 2))
-
-
-def _solved(extra: Array, left: Array, ridge: float) -> Array:
-    return np.asarray(np.linalg.solve(extra.T @ extra + ridge * np.eye(extra.shape[1]), extra.T @ left))
+def _loss(extra: Array, left: Array, weights: Array) -> float:
+    return float(np.sum((left - extra @ weights) ** 2))
 
 
 def _sums(values: Array, stretch: NDArray[np.int64]) -> Array:

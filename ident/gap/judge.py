@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ident.gap.diagnosis import Diagnosis, Gap, NamedEffect, Share, Verdict
-from ident.gap.generic import Generic, predict_generic
+from ident.gap.generic import Generic, SmoothFunction
 from ident.gap.probability import Ranked, calibration, rank
 from ident.gap.problem import Candidate, Problem
 from ident.gap.refit import Part, Refit, refit
@@ -145,8 +145,9 @@ class _Judgement:
         self.problems, self.regression, self.found, self.limits = problems, regression, found, limits
         self.rows = regression.rows
         self.weights = _weights(regression, found)
-        self.bare = predict_generic(regression, found.whitener, (), seed)
-        self.rest = predict_generic(regression, found.whitener, found.variants, seed)
+        smooth = SmoothFunction(regression, found.whitener, seed)
+        self.bare = smooth.beside(())
+        self.rest = smooth.beside(found.variants) if found.variants else self.bare
         everything = np.ones(len(self.rows), dtype=bool)
         self.after = refit(problems, regression, found.variants, found.whitener, everything)
         self.before = refit(problems, regression, (), found.whitener, everything)

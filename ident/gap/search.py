@@ -15,7 +15,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.gap.evidence import Directions, Evidence, White, best_pair, directions, gather
+from ident.gap.evidence import Directions, Evidence, White, directions, gather
+from ident.gap.pairs import best_pair
 from ident.gap.problem import Problem
 from ident.gap.rows import Rows
 from ident.gap.whitening import ORDER, Whitener, fit_whitener
