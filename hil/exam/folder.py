@@ -69,6 +69,10 @@ class ExamFolder:
         """What the diagnosing side answered; with the true candidate removed, or with all."""
         return self.path / ("diagnoses_without" if removed else "diagnoses") / f"{identifier}.json"
 
+    def diagnosed(self, removed: bool = False) -> bool:
+        """Whether there is any diagnosis, with the true candidate removed, or with all."""
+        return any(self.diagnosis("any", removed).parent.glob("*.json"))
+
 
 @dataclass(frozen=True)
 class Exam:

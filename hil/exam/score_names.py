@@ -1,4 +1,4 @@
-"""What is asked of the rates of a score."""
+"""Names of the numbers of a score, and what is asked of them."""
 
 from __future__ import annotations
 
@@ -6,21 +6,66 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-WITHOUT_TRUE: Final = "no confident wrong name without the true candidate"
-PERMUTED: Final = "top-1 or in the set, answers permuted"
+CLOSES: Final = 0.8
+"""Share of the removable gap that the right effect is to close."""
+CLOSES_NOT: Final = 0.2
+"""Share that a wrong one must stay below."""
+
+RIGHT_LARGE: Final = "size 0.5 and above: right (first name, or the exact set where no record splits it)"
+RIGHT_APART: Final = "- of them, where the experiment can split: first name"
+RIGHT_SET: Final = "- of them, where it cannot: exact set"
+COVERED_LARGE: Final = "size 0.5 and above: true name in the set, no answer counted as a miss"
+COVERED_NAMED: Final = "- of them, where a name is given"
+SET_SIZE: Final = "size 0.5 and above: mean size of the set"
+RIGHT_SMALL: Final = "size 0.2: right"
+RIGHT: Final = "all sizes: right"
+EXACT: Final = "all sizes: first name, whether or not it can be split"
+NO_MORE: Final = "nothing beside the right name is named"
+PLACE: Final = "place of right names, where it can be split"
+LIKE_PLACE: Final = "place of right names, or one that no record splits from it"
+SIZE: Final = "true size within its 95 % interval"
+FALSE_ALARMS: Final = "false alarms on none"
+REJECTED: Final = "unknown rejected"
+NOT_NAMED: Final = "unknown, not named (rejected, or no gap found)"
+INVISIBLE: Final = "invisible said to be invisible"
+BOTH: Final = "two effects: both named"
+BOTH_COVERED: Final = "two effects: both named or in the set of an entry of their own"
+FAILURES: Final = "diagnoses that ended in an error"
+ECE: Final = "calibration error (ECE) of the first name"
+ECE_ALL: Final = "calibration error of every name"
+CLOSED_RIGHT: Final = "held-out gap closed by the right effect, median"
+CLOSED_RIGHT_LARGE: Final = "- the same at size 0.5 and above"
+CLOSED_RIGHT_RATE: Final = "right effects that close 80 % or more"
+CLOSED_WRONG: Final = "held-out gap closed by a wrong effect in its place, median"
+CLOSED_WORST: Final = "- by the best of the wrong ones of a case, median"
+CLOSED_WRONG_RATE: Final = "cases in which every wrong effect closes less than 20 %"
+CLOSED_MISTAKEN: Final = "held-out gap closed by wrong answers, median"
+SECONDS: Final = "processor time of a diagnosis, mean [s]"
+SECONDS_MOST: Final = "- longest [s]"
+WITHOUT_OPEN: Final = "true candidate removed: `unknown` or a set"
+WITHOUT_MODEST: Final = "- no confident wrong name"
+WITHOUT_MODEST_ALL: Final = "- no confident wrong name, cases with an identical candidate left included"
+WITHOUT_UNKNOWN: Final = "- `unknown`"
+WITHOUT_NONE: Final = "- `none`: no gap found"
+PERMUTED: Final = "answers permuted: right, all sizes"
 
 ASKED: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "top-1 or in the set, size 0.5 and above": "at least 0.90",
-        "set covers the truth where a name is given": "at least 0.95",
-        "place or its side, of right names": "at least 0.90",
-        "size within its 95 % interval": "at least 0.90",
-        "false alarms on none": "at most 0.05",
-        "unknown rejected": "at least 0.80",
-        "invisible said to be invisible": "at least 0.95",
-        "both of two named": "at least 0.70",
-        WITHOUT_TRUE: "at least 0.80",
-        PERMUTED: "chance",
+        RIGHT_LARGE: "at least 0.90",
+        COVERED_LARGE: "at least 0.95",
+        SET_SIZE: "at most 2",
+        RIGHT_SMALL: "at least 0.70",
+        PLACE: "at least 0.90",
+        SIZE: "at least 0.90",
+        FALSE_ALARMS: "at most 0.05",
+        REJECTED: "at least 0.80",
+        INVISIBLE: "at least 0.95",
+        BOTH: "at least 0.70",
+        ECE: "at most 0.05",
+        CLOSED_RIGHT: "at least 0.80",
+        CLOSED_WRONG: "below 0.20",
+        SECONDS: "below 10 for 200 s of record",
+        WITHOUT_OPEN: "at least 0.80",
     }
 )
-"""Name of a rate -> what is asked of it."""
+"""Name of a number -> what is asked of it."""

@@ -1,108 +1,136 @@
-"""A score for people: Markdown with tables, a reliability plot as SVG, and everything as JSON."""
+"""A score for people, as Markdown with tables, and for programs, as JSON."""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
-from typing import Final
+from dataclasses import dataclass
 
-from hil.exam.score_names import ASKED
-from hil.exam.scoring import Score
-from hil.exam.statistics import Bin, Rate
+import numpy as np
 
-_EDGE: Final = 40
-_WIDTH: Final = 300
-
-
-def summary_lines(score: Score) -> list[str]:
-    """One line a rate, for a terminal."""
-    lines = [f"{name:<44} {rate}{_asked(name)}" for name, rate in score.rates.items()]
-    lines.append(f"{'mean size of the set':<44} {score.set_size:.2f}")
-    lines.append(f"{'calibration error':<44} {score.calibration:.3f}")
-    lines.append(f"{'gap closed by right names, by wrong ones':<44} {score.closed_right:.2f}, {score.closed_wrong:.2f}")
-    lines.append(f"{'processor time a diagnosis':<44} {score.seconds:.1f} s")
-    return lines
+from hil.exam.answers import chance, permuted, read_answers
+from hil.exam.folder import ExamFolder
+from hil.exam.score_names import ASKED, PERMUTED, RIGHT
+from hil.exam.scoring import Group, Score, missing_cases, removal_rates, score
+from hil.exam.statistics import Rate
 
 
-def score_markdown(score: Score, title: str, extra: Mapping[str, Rate]) -> str:
-    """The whole score; `extra` are rates of other runs on the same records."""
+@dataclass(frozen=True)
+class ScoreReport:
+    """A score and what stands beside it.
+
+    Attributes:
+        score: of the exam.
+        permuted: of the same answers beside other truths.
+        chance: share that is expected of them, over all permutations.
+        without: rates of the run without the true candidate; empty where there was none.
+    """
+
+    score: Score
+    permuted: Rate
+    chance: float
+    without: Mapping[str, Rate]
+
+    @property
+    def rates(self) -> dict[str, Rate]:
+        """All of them, by name."""
+        return {**self.score.rates, **self.without, PERMUTED: self.permuted}
+
+    def asked(self, name: str) -> str:
+        """What is asked of a number, empty where nothing is."""
+        return f"chance, {self.chance:.3f}" if name == PERMUTED else ASKED.get(name, "")
+
+
+def score_exam(folder: ExamFolder, generator: np.random.Generator) -> ScoreReport:
+    """Open the sealed answer and score all that was diagnosed; `generator` draws one permutation of the answers.
+
+    Raises:
+        UserError: there is no exam, no diagnosis, or the sealed answer is another one.
+    """
+    answers = read_answers(folder)
+    without = folder.diagnosed(removed=True)
+    return ScoreReport(
+        score=score(answers, missing_cases(folder)),
+        permuted=score(permuted(answers, generator)).rates[RIGHT],
+        chance=chance(answers),
+        without=removal_rates(read_answers(folder, removed=True)) if without else {},
+    )
+
+
+def summary_lines(report: ScoreReport) -> list[str]:
+    """One line a number, for a terminal."""
+    texts = {name: str(rate) for name, rate in report.rates.items()}
+    texts |= {name: _text(value) for name, value in report.score.numbers.items()}
+    width = max(len(name) for name in texts)
+    lines = [f"{name:<{width}}  {text:<32}{_wish(report.asked(name))}".rstrip() for name, text in texts.items()]
+    return [f"{report.score.cases} cases scored, {sum(report.score.missing.values())} without an answer.", *lines]
+
+
+def score_markdown(report: ScoreReport, title: str) -> str:
+    """The whole score."""
+    score = report.score
     parts = [f"# {title}", "", f"{score.cases} cases. Rates with Wilson's 95 % interval and counts.", ""]
-    parts += ["| rate | measured | asked |", "|---|---|---|"]
-    parts += [f"| {name} | {rate} | {ASKED.get(name, '')} |" for name, rate in {**score.rates, **extra}.items()]
-    parts += [
-        f"| mean size of the set | {score.set_size:.2f} | at most 2 |",
-        f"| calibration error | {score.calibration:.3f} | at most 0.05 |",
-        f"| gap closed by right names (median) | {score.closed_right:.2f} | at least 0.8 |",
-        f"| gap closed by wrong names (median) | {score.closed_wrong:.2f} | below 0.2 |",
-        f"| processor time of a diagnosis | {score.seconds:.1f} s | |",
-        "",
-        *_rates("size in noise units", score.by_size),
-        *_rates("true effect", score.by_name),
-        "## Confusion",
-        "",
-        *_confusion(score.confusion),
-        "",
-        "## Reliability",
-        "",
-        "| stated probability | right |",
-        "|---|---|",
-        *(f"| {each.stated:.2f} | {each.right} |" for each in score.bins),
-    ]
+    parts += ["| what | measured | asked |", "|---|---|---|"]
+    parts += [f"| {name} | {rate} | {report.asked(name)} |" for name, rate in report.rates.items()]
+    parts += [f"| {name} | {_text(value)} | {report.asked(name)} |" for name, value in score.numbers.items()]
+    parts += ["", *_groups("size in noise units", score.by_size), *_groups("true effect", score.by_name)]
+    parts += ["## Confusion", "", *_confusion(score.confusion), ""]
+    parts += ["## Two effects", "", *_pairs(score.pairs), ""]
+    parts += ["## Reliability", "", "| stated probability | right |", "|---|---|"]
+    parts += [f"| {each.stated:.2f} | {each.right} |" for each in score.bins]
+    parts += ["", "## Cases without an answer", "", *_missing(score.missing)]
     return "\n".join(parts) + "\n"
 
 
-def score_json(score: Score, extra: Mapping[str, Rate]) -> str:
-    """All numbers."""
-
-    def plain(rates: Mapping[str, Rate]) -> dict[str, list[float]]:
-        return {name: [rate.hits, rate.cases, rate.value, *rate.interval] for name, rate in rates.items() if rate.cases}
-
+def score_json(report: ScoreReport) -> str:
+    """All numbers; a rate is hits, cases, value and the ends of its interval."""
+    score = report.score
     content = {
-        "rates": plain({**score.rates, **extra}),
-        "by_size": plain(score.by_size),
-        "by_name": plain(score.by_name),
-        "set_size": score.set_size,
-        "calibration_error": score.calibration,
-        "gap_closed": {"right": score.closed_right, "wrong": score.closed_wrong},
-        "confusion": [[true, said, count] for (true, said), count in sorted(score.confusion.items())],
-        "bins": [[each.stated, each.right.hits, each.right.cases] for each in score.bins],
-        "seconds": score.seconds,
         "cases": score.cases,
+        "rates": {name: _plain(rate) for name, rate in report.rates.items() if rate.cases},
+        "numbers": {name: _finite(value) for name, value in score.numbers.items()},
+        "chance": _finite(report.chance),
+        "asked": {name: report.asked(name) for name in (*report.rates, *score.numbers) if report.asked(name)},
+        "by_size": {size: _plain_group(group) for size, group in score.by_size.items()},
+        "by_name": {name: _plain_group(group) for name, group in score.by_name.items()},
+        "confusion": [[true, said, count] for (true, said), count in sorted(score.confusion.items())],
+        "pairs": [[true, said, count] for (true, said), count in sorted(score.pairs.items())],
+        "bins": [[each.stated, *_plain(each.right)] for each in score.bins],
+        "missing": dict(score.missing),
     }
-    return json.dumps(content, indent=1) + "\n"
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
-def reliability_svg(bins: Sequence[Bin]) -> str:
-    """Share of right names over stated probability, with intervals, beside the diagonal."""
-
-    def place(x: float, y: float) -> tuple[float, float]:
-        return _EDGE + x * _WIDTH, _EDGE + (1 - y) * _WIDTH
-
-    (x0, y0), (x1, y1) = place(0, 0), place(1, 1)
-    size = _WIDTH + 2 * _EDGE
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size} {size}" font-family="sans-serif" font-size="12">',
-        f'<rect x="{x0}" y="{y1}" width="{_WIDTH}" height="{_WIDTH}" fill="none" stroke="#888"/>',
-        f'<line x1="{x0}" y1="{y0}" x2="{x1}" y2="{y1}" stroke="#888" stroke-dasharray="4"/>',
-        f'<text x="{size / 2}" y="{size - 8}" text-anchor="middle">stated probability, 0 to 1</text>',
-        f'<text x="14" y="{size / 2}" text-anchor="middle" transform="rotate(-90 14 {size / 2})">right, 0 to 1</text>',
-    ]
-    for each in bins:
-        low, high = each.right.interval
-        x, y = place(each.stated, each.right.value)
-        bottom, top = place(0, low)[1], place(0, high)[1]
-        parts.append(f'<line x1="{x:.1f}" y1="{bottom:.1f}" x2="{x:.1f}" y2="{top:.1f}" stroke="#2266aa"/>')
-        parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="#2266aa"/>')
-    return "\n".join([*parts, "</svg>", ""])
+def _plain(rate: Rate) -> list[float]:
+    return [rate.hits, rate.cases, rate.value, *rate.interval]
 
 
-def _asked(name: str) -> str:
-    return f"   asked {ASKED[name]}" if name in ASKED else ""
+def _plain_group(group: Group) -> dict[str, list[float] | float | None]:
+    return {
+        name: _plain(value) if isinstance(value, Rate) else _finite(float(value)) for name, value in vars(group).items()
+    }
 
 
-def _rates(what: str, rates: Mapping[str, Rate]) -> list[str]:
-    lines = [f"## Top-1 or in the set, by {what}", "", f"| {what} | right |", "|---|---|"]
-    return [*lines, *(f"| {name} | {rate} |" for name, rate in rates.items()), ""]
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _text(value: float) -> str:
+    return f"{value + 0.0:.2f}" if math.isfinite(value) else "–"
+
+
+def _wish(asked: str) -> str:
+    return f"  asked {asked}" if asked else ""
+
+
+def _groups(what: str, groups: Mapping[str, Group]) -> list[str]:
+    titles = ("right", "in the set", "`none`", "set", "right closes", "wrong closes")
+    lines = [f"## By {what}", "", f"| {what} | {' | '.join(titles)} |", "|---" * (1 + len(titles)) + "|"]
+    for name, group in groups.items():
+        numbers = (_text(value) for value in (group.set_size, group.closed_right, group.closed_wrong))
+        lines.append(f"| {name} | {group.right} | {group.covered} | {group.silent} | {' | '.join(numbers)} |")
+    return [*lines, ""]
 
 
 def _confusion(counts: Mapping[tuple[str, str], int]) -> list[str]:
@@ -112,3 +140,12 @@ def _confusion(counts: Mapping[tuple[str, str], int]) -> list[str]:
         cells = (str(counts.get((true, answer), "")) for answer in said)
         lines.append(f"| {true} | {' | '.join(cells)} |")
     return lines
+
+
+def _pairs(counts: Mapping[tuple[str, str], int]) -> list[str]:
+    rows = [f"| {true} | {said} | {count} |" for (true, said), count in sorted(counts.items())]
+    return ["| truth | named | cases |", "|---|---|---|", *rows] if rows else ["None."]
+
+
+def _missing(missing: Mapping[str, int]) -> Sequence[str]:
+    return [f"- {what}: {count}" for what, count in sorted(missing.items())] or ["None."]

@@ -1,104 +1,37 @@
-"""Scores an exam: opens the sealed answer and compares it with the diagnoses."""
+"""Scores an exam: every number that is reported of the answers."""
 
 from __future__ import annotations
 
-import json
 import math
 import statistics
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
 
-import numpy as np
-
+from hil.exam import score_names as names
+from hil.exam.answers import FAILED, Answer
 from hil.exam.cases import SIZES, Case, Kind
 from hil.exam.folder import ExamFolder, open_answer, read_exam
-from hil.exam.statistics import Z95, Bin, Rate, calibration_error, rate, reliability
-from ident.errors import UserError
-
-CONFIDENT: Final = 0.5
-"""Probability from which on a single name counts as a confident one."""
-
-_SIDES: Final = {"fl": "left", "rl": "left", "fr": "right", "rr": "right"}
+from hil.exam.statistics import Bin, Rate, calibration_error, rate, reliability
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What the diagnosing side said of one case.
+class Group:
+    """Cases with one effect that have something in common.
 
     Attributes:
-        case: with the truth.
-        verdict: `effect`, `none` or `unknown`.
-        effects: as in `diagnosis.json`, most probable first.
-        invisible: names that the records cannot show.
-        closed: share of the removable gap closed by the whole answer.
-        seconds: processor time [s].
+        right, covered: first name or exact set, and true name in the set.
+        silent: no effect found.
+        set_size: mean, where a name is given.
+        closed_right, closed_wrong: median shares of the held-out gap.
     """
 
-    case: Case
-    verdict: str
-    effects: tuple[Mapping[str, Any], ...]
-    invisible: tuple[str, ...]
-    closed: float
-    seconds: float
-
-    @property
-    def named(self) -> str | None:
-        """The name put first."""
-        return str(self.effects[0]["name"]) if self.verdict == "effect" and self.effects else None
-
-    @property
-    def ambiguity_set(self) -> tuple[str, ...]:
-        """Names that the answer does not tell apart."""
-        return tuple(self.effects[0]["ambiguity_set"]) if self.named else ()
-
-    @property
-    def probability(self) -> float:
-        """Of the name put first."""
-        return float(self.effects[0]["probability"]) if self.named else 0.0
-
-    @property
-    def exact(self) -> bool:
-        """The name put first is the true one."""
-        return len(self.case.effects) == 1 and self.named == self.case.effects[0].name
-
-    @property
-    def covered(self) -> bool:
-        """The true name is in the set."""
-        return len(self.case.effects) == 1 and self.case.effects[0].name in (*self.ambiguity_set, self.named)
-
-    @property
-    def place(self) -> bool:
-        """The true place."""
-        return self.exact and self.effects[0]["where"] == self.case.effects[0].where
-
-    @property
-    def side(self) -> bool:
-        """The true place, or the other wheel of its side, whose speed has the same size in every step on the floor."""
-        return self.exact and _side(str(self.effects[0]["where"])) == _side(self.case.effects[0].where)
-
-    @property
-    def size_held(self) -> bool | None:
-        """The true size is in the 95 % interval; None where the answer is of another effect or place."""
-        if not self.side:
-            return None
-        true = self.case.effects[0]
-        stated = self.effects[0]["parameters"].get(true.parameter)
-        if stated is None or stated["value"] is None or stated["std"] is None:
-            return False
-        return bool(abs(stated["value"] - true.size) <= Z95 * stated["std"])
-
-    @property
-    def both(self) -> bool:
-        """All true names of a case with several are named, themselves or in a set."""
-        said = [{effect["name"], *effect["ambiguity_set"]} for effect in self.effects]
-        return self.verdict == "effect" and _matched([effect.name for effect in self.case.effects], said)
-
-    @property
-    def modest(self) -> bool:
-        """No confident single name."""
-        return self.named is None or len(self.ambiguity_set) > 1 or self.probability < CONFIDENT
+    right: Rate
+    covered: Rate
+    silent: Rate
+    set_size: float
+    closed_right: float
+    closed_wrong: float
 
 
 @dataclass(frozen=True)
@@ -106,47 +39,28 @@ class Score:
     """Everything that is reported.
 
     Attributes:
-        rates: by what they are of.
-        by_size: top-1 by size in noise units.
-        by_name: top-1 by true name.
-        set_size: mean number of names in the set.
+        rates: by what they are of (`score_names`).
+        numbers: the same for medians, means and errors.
+        by_size: by size in noise units.
+        by_name: by true name.
         bins: of the reliability plot.
-        calibration: expected calibration error.
-        closed_right, closed_wrong: median share of the removable held-out gap closed.
-        confusion: (true name, answer) -> cases.
-        seconds: mean processor time of a diagnosis [s].
+        confusion: (truth, answer) -> cases with at most one effect.
+        wished: truth -> answer that a perfect diagnosis would give.
+        pairs: (truth, answer) -> cases with two.
         cases: diagnosed.
+        missing: kind and name of cases that were not driven or not diagnosed -> how many.
     """
 
     rates: Mapping[str, Rate]
-    by_size: Mapping[str, Rate]
-    by_name: Mapping[str, Rate]
-    set_size: float
+    numbers: Mapping[str, float]
+    by_size: Mapping[str, Group]
+    by_name: Mapping[str, Group]
     bins: Sequence[Bin]
-    calibration: float
-    closed_right: float
-    closed_wrong: float
     confusion: Mapping[tuple[str, str], int]
-    seconds: float
+    wished: Mapping[str, str]
+    pairs: Mapping[tuple[str, str], int]
     cases: int
-
-
-def read_answers(folder: ExamFolder, *, removed: bool = False) -> list[Answer]:
-    """The answers of the diagnosing side beside the truth.
-
-    Raises:
-        UserError: there is no exam, no diagnosis, or the sealed answer is another one.
-    """
-    exam = read_exam(folder)
-    cases = open_answer(folder, exam.answer_hash)
-    answers = [
-        _answer(case, json.loads(path.read_text(encoding="utf-8")))
-        for case in cases
-        if (path := folder.diagnosis(case.identifier, removed)).is_file()
-    ]
-    if not answers:
-        raise UserError(f"{folder.path} holds no diagnoses.", "Diagnose first: quasiomni exam diagnose FOLDER.")
-    return answers
+    missing: Mapping[str, int]
 
 
 def removable(folder: ExamFolder) -> dict[str, str]:
@@ -155,101 +69,143 @@ def removable(folder: ExamFolder) -> dict[str, str]:
     return {case.identifier: case.effects[0].name for case in cases if case.kind is Kind.EFFECT}
 
 
-def permuted(answers: Sequence[Answer], generator: np.random.Generator) -> list[Answer]:
-    """The same answers beside the truths of other cases."""
-    order = generator.permutation(len(answers))
-    return [
-        Answer(answers[other].case, mine.verdict, mine.effects, mine.invisible, mine.closed, mine.seconds)
-        for mine, other in zip(answers, order.tolist(), strict=True)
-    ]
+def missing_cases(folder: ExamFolder) -> dict[str, int]:
+    """Cases that count nowhere, by what they are and why."""
+
+    def what(case: Case) -> str:
+        truth = " + ".join(sorted(f"{effect.name}@{effect.where}" for effect in case.effects)) or str(case.kind)
+        driven = "not driven" if folder.undriven(case.identifier).is_file() else "not diagnosed"
+        return f"{truth}, size {case.noise_units:g}: {driven}"
+
+    cases = open_answer(folder, read_exam(folder).answer_hash)
+    return dict(Counter(what(case) for case in cases if not folder.diagnosis(case.identifier).is_file()))
 
 
-def score(answers: Sequence[Answer]) -> Score:
+def score(answers: Sequence[Answer], missing: Mapping[str, int] | None = None) -> Score:
     """All numbers of a set of answers."""
     single = _of(answers, Kind.EFFECT)
-    large = [answer for answer in single if answer.case.noise_units >= SIZES[1]]
-    named = [answer for answer in answers if answer.named and answer.case.kind is not Kind.PAIR]
-    right = [answer for answer in single if answer.exact]
-    held = [answer.size_held for answer in single if answer.size_held is not None]
-    rates = {
-        "top-1": rate([answer.exact for answer in single]),
-        "top-1 or in the set": rate([answer.covered for answer in single]),
-        "top-1 or in the set, size 0.5 and above": rate([answer.covered for answer in large]),
-        "top-1, size 0.5 and above": rate([answer.exact for answer in large]),
-        "set covers the truth where a name is given": rate([answer.covered for answer in single if answer.named]),
-        "place, of right names": rate([answer.place for answer in right]),
-        "place or its side, of right names": rate([answer.side for answer in right]),
-        "size within its 95 % interval": rate([bool(one) for one in held]),
-        "false alarms on none": rate([answer.verdict != "none" for answer in _of(answers, Kind.NONE)]),
-        "unknown rejected": rate([answer.verdict == "unknown" for answer in _of(answers, Kind.UNKNOWN)]),
-        "unknown not named": rate([answer.named is None for answer in _of(answers, Kind.UNKNOWN)]),
-        "invisible said to be invisible": rate([_unseen(answer) for answer in _of(answers, Kind.INVISIBLE)]),
-        "both of two named": rate([answer.both for answer in _of(answers, Kind.PAIR)]),
-    }
-    bins = reliability([answer.probability for answer in named], [answer.covered for answer in named])
+    plain = [answer for answer in answers if answer.case.kind is not Kind.PAIR]
+    statements = [answer.statements for answer in answers]
+    first = [stated[0] for stated in statements if stated]
+    bins = _bins(first)
     return Score(
-        rates=rates,
+        rates=_single_rates(single) | _other_rates(answers),
+        numbers=_numbers(answers, single)
+        | {
+            names.ECE: calibration_error(bins),
+            names.ECE_ALL: calibration_error(_bins([one for stated in statements for one in stated])),
+        },
         by_size=_grouped(single, lambda answer: f"{answer.case.noise_units:g}"),
-        by_name=_grouped(single, lambda answer: answer.case.effects[0].name),
-        set_size=_mean([len(answer.ambiguity_set) for answer in single if answer.named]),
+        by_name=_grouped(single, lambda answer: answer.single.name),
         bins=bins,
-        calibration=calibration_error(bins),
-        closed_right=_median([answer.closed for answer in right]),
-        closed_wrong=_median([answer.closed for answer in single if answer.named and not answer.covered]),
-        confusion=Counter((_truth(answer), answer.named or answer.verdict) for answer in answers),
-        seconds=_mean([answer.seconds for answer in answers]),
+        confusion=Counter((answer.truth, answer.named or answer.said.verdict) for answer in plain),
+        wished={answer.truth: answer.wished for answer in plain},
+        pairs=Counter((answer.truth, _all_names(answer)) for answer in _of(answers, Kind.PAIR)),
         cases=len(answers),
+        missing=missing or {},
     )
 
 
-def modesty(answers: Sequence[Answer]) -> Rate:
-    """How often no confident wrong name is given, of answers without the true candidate."""
-    return rate([answer.modest for answer in answers])
+def removal_rates(answers: Sequence[Answer]) -> dict[str, Rate]:
+    """What is said of cases whose true candidate is not in the library."""
+    alone = [answer for answer in answers if answer.splits_name]
+    return {
+        names.WITHOUT_OPEN: rate([answer.open for answer in alone]),
+        names.WITHOUT_MODEST: rate([answer.modest for answer in alone]),
+        names.WITHOUT_MODEST_ALL: rate([answer.modest for answer in answers]),
+        names.WITHOUT_UNKNOWN: rate([answer.rejected for answer in alone]),
+        names.WITHOUT_NONE: rate([answer.said.verdict == "none" for answer in alone]),
+    }
 
 
-def _answer(case: Case, content: Mapping[str, Any]) -> Answer:
-    closed = content["gap"]["closed"]
-    return Answer(
-        case=case,
-        verdict=str(content["verdict"]),
-        effects=tuple(content["effects"]),
-        invisible=tuple(content["invisible"]),
-        closed=math.nan if closed is None else float(closed),
-        seconds=float(content.get("seconds", math.nan)),
-    )
+def _single_rates(single: Sequence[Answer]) -> dict[str, Rate]:
+    large, small = _large(single), [answer for answer in single if answer.case.noise_units == SIZES[0]]
+    apart, alike = [answer for answer in large if answer.splits_name], [a for a in large if not a.splits_name]
+    exact = [answer for answer in single if answer.exact]
+    held = [answer.size_held for answer in single if answer.size_held is not None]
+    closing = [answer for answer in _true(single) if math.isfinite(answer.closed)]
+    wrong = [max(answer.closed_wrong.values()) for answer in single if answer.closed_wrong]
+    return {
+        names.RIGHT_LARGE: rate([answer.right for answer in large]),
+        names.RIGHT_APART: rate([answer.right for answer in apart]),
+        names.RIGHT_SET: rate([answer.right for answer in alike]),
+        names.COVERED_LARGE: rate([answer.covered for answer in large]),
+        names.COVERED_NAMED: rate([answer.covered for answer in large if answer.named]),
+        names.RIGHT_SMALL: rate([answer.right for answer in small]),
+        names.RIGHT: rate([answer.right for answer in single]),
+        names.EXACT: rate([answer.exact for answer in single]),
+        names.NO_MORE: rate([answer.alone_right for answer in single if answer.right]),
+        names.PLACE: rate([answer.place for answer in exact if answer.splits_place]),
+        names.LIKE_PLACE: rate([answer.like_place for answer in exact]),
+        names.SIZE: rate([bool(one) for one in held]),
+        names.CLOSED_RIGHT_RATE: rate([answer.closed >= names.CLOSES for answer in closing]),
+        names.CLOSED_WRONG_RATE: rate([value < names.CLOSES_NOT for value in wrong]),
+    }
+
+
+def _other_rates(answers: Sequence[Answer]) -> dict[str, Rate]:
+    unknown, pairs = _of(answers, Kind.UNKNOWN), _of(answers, Kind.PAIR)
+    return {
+        names.FALSE_ALARMS: rate([answer.said.verdict != "none" for answer in _of(answers, Kind.NONE)]),
+        names.REJECTED: rate([answer.rejected for answer in unknown]),
+        names.NOT_NAMED: rate([answer.named is None and answer.said.verdict != FAILED for answer in unknown]),
+        names.INVISIBLE: rate([answer.unseen for answer in _of(answers, Kind.INVISIBLE)]),
+        names.BOTH: rate([answer.both for answer in pairs]),
+        names.BOTH_COVERED: rate([answer.both_covered for answer in pairs]),
+        names.FAILURES: rate([answer.said.verdict == FAILED for answer in answers]),
+    }
+
+
+def _numbers(answers: Sequence[Answer], single: Sequence[Answer]) -> dict[str, float]:
+    large = _large(single)
+    wrong = [answer.closed_wrong for answer in single]
+    return {
+        names.SET_SIZE: _mean([len(answer.ambiguity_set) for answer in large if answer.named]),
+        names.CLOSED_RIGHT: _median([answer.closed for answer in _true(single)]),
+        names.CLOSED_RIGHT_LARGE: _median([answer.closed for answer in _true(large)]),
+        names.CLOSED_WRONG: _median([value for values in wrong for value in values.values()]),
+        names.CLOSED_WORST: _median([max(values.values()) for values in wrong if values]),
+        names.CLOSED_MISTAKEN: _median([answer.closed for answer in single if answer.named and not answer.covered]),
+        names.SECONDS: _mean([answer.said.seconds for answer in answers]),
+        names.SECONDS_MOST: max((answer.said.seconds for answer in answers), default=math.nan),
+    }
+
+
+def _large(single: Sequence[Answer]) -> list[Answer]:
+    return [answer for answer in single if answer.case.noise_units >= SIZES[1]]
+
+
+def _true(single: Sequence[Answer]) -> list[Answer]:
+    """Cases in which the effect put first is the true one, or one that no record tells from it."""
+    return [answer for answer in single if answer.named in answer.identity.names]
+
+
+def _bins(statements: Sequence[tuple[float, bool]]) -> list[Bin]:
+    return reliability([stated for stated, _ in statements], [right for _, right in statements])
 
 
 def _of(answers: Sequence[Answer], kind: Kind) -> list[Answer]:
     return [answer for answer in answers if answer.case.kind is kind]
 
 
-def _grouped(answers: Sequence[Answer], key: Callable[[Answer], str]) -> dict[str, Rate]:
+def _grouped(answers: Sequence[Answer], key: Callable[[Answer], str]) -> dict[str, Group]:
     keys = sorted({key(answer) for answer in answers})
-    return {each: rate([answer.covered for answer in answers if key(answer) == each]) for each in keys}
+    return {each: _group([answer for answer in answers if key(answer) == each]) for each in keys}
 
 
-def _unseen(answer: Answer) -> bool:
-    name = answer.case.effects[0].name
-    return name in answer.invisible and name not in {effect["name"] for effect in answer.effects}
-
-
-def _truth(answer: Answer) -> str:
-    return " + ".join(sorted(effect.name for effect in answer.case.effects)) or str(answer.case.kind)
-
-
-def _side(place: str) -> str:
-    part, _, end = place.rpartition("_")
-    return f"{part}_{_SIDES.get(end, end)}"
-
-
-def _matched(names: Sequence[str], said: Sequence[set[str]]) -> bool:
-    """Whether every name can be given a set of its own that holds it."""
-    if not names:
-        return True
-    first, *others = names
-    return any(
-        first in each and _matched(others, [*said[:index], *said[index + 1 :]]) for index, each in enumerate(said)
+def _group(answers: Sequence[Answer]) -> Group:
+    return Group(
+        right=rate([answer.right for answer in answers]),
+        covered=rate([answer.covered for answer in answers]),
+        silent=rate([answer.said.verdict == "none" for answer in answers]),
+        set_size=_mean([len(answer.ambiguity_set) for answer in answers if answer.named]),
+        closed_right=_median([answer.closed for answer in _true(answers)]),
+        closed_wrong=_median([value for answer in answers for value in answer.closed_wrong.values()]),
     )
+
+
+def _all_names(answer: Answer) -> str:
+    return " + ".join(sorted(str(effect["name"]) for effect in answer.said.effects)) or answer.said.verdict
 
 
 def _mean(values: Sequence[float]) -> float:

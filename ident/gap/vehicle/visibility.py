@@ -51,8 +51,8 @@ class Sight:
 def sights(problem: Problem) -> Mapping[str, Sight]:
     """What the rows of a problem show of every candidate, by key."""
     rows = make_rows(problem)
-    scale = _noise(rows)
-    baseline = _orthonormal(rows.baseline / scale[:, None])
+    scale = row_noise(rows)
+    baseline = orthonormal(rows.baseline / scale[:, None])
     found = [_left(rows.columns[:, column.place] / scale[:, None], baseline) for column in rows.layout]
     owners = [problem.candidates[column.candidate].key for column in rows.layout]
     return {
@@ -64,8 +64,8 @@ def sights(problem: Problem) -> Mapping[str, Sight]:
     }
 
 
-def _noise(rows: Rows) -> Array:
-    """Noise (n,) of the rows."""
+def row_noise(rows: Rows) -> Array:
+    """Noise (n,) of the rows, that of a vehicle that obeys the model: see NOISE."""
     scale = np.ones(len(rows))
     for (block, _), place in zip(rows.blocks, rows.block_slices, strict=True):
         rms = float(np.sqrt(np.mean(rows.target[place] ** 2))) if place.stop > place.start else 1.0
@@ -73,7 +73,8 @@ def _noise(rows: Rows) -> Array:
     return scale
 
 
-def _orthonormal(columns: Array) -> Array:
+def orthonormal(columns: Array) -> Array:
+    """Basis (n, rank) of the space of some columns, of any scale."""
     norms = np.linalg.norm(columns, axis=0)
     used = columns[:, norms > 0] / norms[norms > 0]
     vectors, singular, _ = np.linalg.svd(used, full_matrices=False)

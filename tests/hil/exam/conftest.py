@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from hil.exam.cases import Case, Composition, draw_cases
-from hil.exam.scoring import Answer
+from hil.exam.answers import Alone, Answer, Said
+from hil.exam.cases import Case, Composition, Kind, draw_cases
+from hil.exam.identity import Identity
 from hil.exam.sizes import SizeTable, load_sizes
 
 
@@ -24,10 +25,10 @@ def cases(table: SizeTable) -> list[Case]:
 
 @pytest.fixture(scope="session")
 def truthful() -> Callable[[Case], Answer]:
-    """The answer of someone who knows."""
+    """The answer of someone who knows, in a world where everything can be told apart."""
 
     def answer(case: Case) -> Answer:
-        known = case.kind in ("effect", "pair")
+        known = case.kind in (Kind.EFFECT, Kind.PAIR)
         effects = tuple(
             {
                 "name": effect.name,
@@ -40,8 +41,19 @@ def truthful() -> Callable[[Case], Answer]:
             for effect in case.effects
             if known
         )
-        verdict = "effect" if known else "unknown" if case.kind == "unknown" else "none"
-        invisible = tuple(effect.name for effect in case.effects if case.kind == "invisible")
-        return Answer(case, verdict, effects, invisible, 0.95, 3.0)
+        verdict = "effect" if known else "unknown" if case.kind is Kind.UNKNOWN else "none"
+        said = Said(
+            verdict=verdict,
+            effects=effects,
+            invisible=tuple(effect.name for effect in case.effects if case.kind is Kind.INVISIBLE),
+            closed=0.95,
+            seconds=3.0,
+            alone=(*(Alone(effect.name, 0.95, 0.95) for effect in case.effects), Alone("another", 0.05, 0.1)),
+        )
+        return Answer(case, said, tuple(identity_of(effect.name, effect.where) for effect in case.effects))
 
     return answer
+
+
+def identity_of(name: str, where: str) -> Identity:
+    return Identity(frozenset({name}), frozenset({where}))

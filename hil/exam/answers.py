@@ -1,0 +1,314 @@
+"""What the diagnosing side said of every case, beside the truth, and what of it is right."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from hil.exam.cases import Case, Injected, Kind
+from hil.exam.folder import ExamFolder, open_answer, read_exam
+from hil.exam.identity import Identities, Identity, exam_identities
+from hil.exam.statistics import Z95
+from ident.errors import UserError
+from ident.gap.vehicle.library import DRIFTS, SHAPES
+
+CONFIDENT: Final = 0.5
+"""Probability from which on a single name counts as a confident one."""
+
+FAILED: Final = "failed"
+"""Verdict of a diagnosis that ended in an error."""
+
+_TURNED: Final = frozenset(str(name) for name, shape in SHAPES.items() if shape.angle is not None)
+"""Effects with a direction or a phase: half a turn of it is the other sign of the size."""
+
+_SPECIAL: Final = MappingProxyType({Kind.INVISIBLE: " (invisible)", Kind.UNKNOWN: " (no candidate)"})
+
+_VERDICTS: Final = MappingProxyType({Kind.NONE: "none", Kind.INVISIBLE: "none", Kind.UNKNOWN: "unknown"})
+
+
+@dataclass(frozen=True)
+class Alone:
+    """What a name closes of the removable held-out gap in place of the answer: `ident.gap.alone`.
+
+    Attributes:
+        name: of the effect.
+        refitted, held: with the parameters of the model refitted, and held at its values; NaN where that says nothing.
+    """
+
+    name: str
+    refitted: float
+    held: float
+
+
+@dataclass(frozen=True)
+class Said:
+    """What the diagnosing side said of one case.
+
+    Attributes:
+        verdict: `effect`, `none`, `unknown` or `failed`.
+        effects: as in `diagnosis.json`, most probable first; none unless the verdict is `effect`.
+        invisible: names that the records cannot show.
+        closed: share of the removable held-out gap that the whole answer closes.
+        seconds: processor time [s].
+        alone: what every name closes by itself.
+    """
+
+    verdict: str
+    effects: tuple[Mapping[str, Any], ...] = ()
+    invisible: tuple[str, ...] = ()
+    closed: float = math.nan
+    seconds: float = math.nan
+    alone: tuple[Alone, ...] = ()
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was said of a case beside its truth.
+
+    Attributes:
+        case: with the truth.
+        said: about it, or, in a permuted exam, about another.
+        identities: of the case's effects: what no record can tell from them.
+    """
+
+    case: Case
+    said: Said
+    identities: tuple[Identity, ...]
+
+    @property
+    def named(self) -> str | None:
+        """The name put first."""
+        return str(self.said.effects[0]["name"]) if self.said.effects else None
+
+    @property
+    def ambiguity_set(self) -> frozenset[str]:
+        """Names that the answer does not tell apart; empty without a name."""
+        return _set(self.said.effects[0]) if self.said.effects else frozenset()
+
+    @property
+    def probability(self) -> float:
+        """Of the name put first."""
+        return float(self.said.effects[0]["probability"]) if self.said.effects else 0.0
+
+    @property
+    def truth(self) -> str:
+        """The true names, with what is special about them, or the kind of a case without any."""
+        names = " + ".join(sorted(effect.name for effect in self.case.effects)) or str(self.case.kind)
+        return names + _SPECIAL.get(self.case.kind, "")
+
+    @property
+    def wished(self) -> str:
+        """What a perfect diagnosis would put first, where the case has at most one effect."""
+        return self.single.name if self.case.kind is Kind.EFFECT else _VERDICTS[self.case.kind]
+
+    @property
+    def single(self) -> Injected:
+        """The one effect of the case."""
+        return self.case.effects[0]
+
+    @property
+    def identity(self) -> Identity:
+        """Of the one effect."""
+        return self.identities[0]
+
+    @property
+    def splits_name(self) -> bool:
+        """Whether the experiment can tell the true name from every other."""
+        return len(self.identity.names) == 1
+
+    @property
+    def splits_place(self) -> bool:
+        """Whether the experiment can tell the true place from every other place of the name."""
+        return len(self.identity.places) == 1
+
+    @property
+    def exact(self) -> bool:
+        """The name put first is the true one."""
+        return self.named == self.single.name
+
+    @property
+    def right(self) -> bool:
+        """The name put first is the true one; where no record can split it from others, the set is exactly those."""
+        return self.exact if self.splits_name else self.ambiguity_set == self.identity.names
+
+    @property
+    def covered(self) -> bool:
+        """The true name is in the set."""
+        return self.single.name in self.ambiguity_set
+
+    @property
+    def alone_right(self) -> bool:
+        """Nothing beside the right name is named."""
+        return self.right and len(self.said.effects) == 1
+
+    @property
+    def where(self) -> str:
+        """Place of the effect put first."""
+        return str(self.said.effects[0]["where"])
+
+    @property
+    def place(self) -> bool:
+        """The true name at the true place."""
+        return self.exact and self.where == self.single.where
+
+    @property
+    def like_place(self) -> bool:
+        """The true name, at a place that no record can split from the true one."""
+        return self.exact and self.where in self.identity.places
+
+    @property
+    def size_held(self) -> bool | None:
+        """The true size is in the 95 % interval; None where the answer is of another effect or place.
+
+        Of an effect with a direction or phase, half a turn of which is the other sign, the amount is compared.
+        """
+        if not self.like_place:
+            return None
+        stated = self.said.effects[0]["parameters"].get(self.single.parameter)
+        if stated is None or stated["value"] is None or stated["std"] is None:
+            return False
+        value, true = float(stated["value"]), self.single.size
+        if self.single.name in _TURNED:
+            value, true = abs(value), abs(true)
+        return abs(value - true) <= Z95 * float(stated["std"])
+
+    @property
+    def both(self) -> bool:
+        """Every effect of the case is named, by an entry of its own: as `right` asks of a single one."""
+        found = [
+            {number for number, identity in enumerate(self.identities) if _names(effect, self.case, number, identity)}
+            for effect in self.said.effects
+        ]
+        return _matched(range(len(self.case.effects)), found)
+
+    @property
+    def both_covered(self) -> bool:
+        """Every effect of the case is named or in the set of an entry of its own."""
+        found = [
+            {number for number, effect in enumerate(self.case.effects) if effect.name in _set(entry)}
+            for entry in self.said.effects
+        ]
+        return _matched(range(len(self.case.effects)), found)
+
+    @property
+    def rejected(self) -> bool:
+        """The answer is that nothing in the library explains the gap."""
+        return self.said.verdict == "unknown"
+
+    @property
+    def unseen(self) -> bool:
+        """The effect is said to be invisible, and not named."""
+        name = self.single.name
+        return name in self.said.invisible and name not in {effect["name"] for effect in self.said.effects}
+
+    @property
+    def open(self) -> bool:
+        """The answer is `unknown`, or every effect named comes as a set."""
+        sets = [len(_set(effect)) > 1 for effect in self.said.effects]
+        return self.rejected or (bool(sets) and all(sets))
+
+    @property
+    def modest(self) -> bool:
+        """No confident single name."""
+        return all(len(_set(effect)) > 1 or effect["probability"] < CONFIDENT for effect in self.said.effects)
+
+    @property
+    def statements(self) -> list[tuple[float, bool]]:
+        """Every probability stated, and whether a true effect has that name."""
+        true = {effect.name for effect in self.case.effects if self.case.kind is not Kind.UNKNOWN}
+        return [(float(effect["probability"]), effect["name"] in true) for effect in self.said.effects]
+
+    @property
+    def closed(self) -> float:
+        """Share of the removable held-out gap that the effect put first closes."""
+        if len(self.said.effects) == 1:
+            return self.said.closed
+        stated = self.said.effects[0]["gap_closed_held_out"] if self.said.effects else None
+        return math.nan if stated is None else float(stated)
+
+    @cached_property
+    def closed_wrong(self) -> Mapping[str, float]:
+        """Share that every name closes which is not the true one, nor identical to it, in place of the answer.
+
+        Where a value of the model has changed, with the parameters held at the model's values, for a refit of all of
+        them would close the gap by itself; otherwise with the parameters refitted.
+        """
+        drift = self.single.name in DRIFTS
+        found = {one.name: one.held if drift else one.refitted for one in self.said.alone}
+        wrong = {name: value for name, value in found.items() if name not in self.identity.names}
+        return MappingProxyType({name: value for name, value in wrong.items() if math.isfinite(value)})
+
+
+def read_answers(folder: ExamFolder, *, removed: bool = False) -> list[Answer]:
+    """The answers of the diagnosing side beside the truth.
+
+    Raises:
+        UserError: there is no exam, no diagnosis, or the sealed answer is another one.
+    """
+    cases = open_answer(folder, read_exam(folder).answer_hash)
+    said = {
+        case.identifier: said_from(json.loads(path.read_text(encoding="utf-8")))
+        for case in cases
+        if (path := folder.diagnosis(case.identifier, removed)).is_file()
+    }
+    if not said:
+        raise UserError(f"{folder.path} holds no diagnoses.", "Diagnose first: quasiomni exam diagnose FOLDER.")
+    known: Identities = exam_identities(folder)
+    return [Answer(case, said[case.identifier], known.of_case(case)) for case in cases if case.identifier in said]
+
+
+def said_from(content: Mapping[str, Any]) -> Said:
+    """What a file of the diagnosing side says."""
+    alone = content.get("alone", ())
+    return Said(
+        verdict=str(content["verdict"]),
+        effects=tuple(content["effects"]),
+        invisible=tuple(content["invisible"]),
+        closed=_number(content["gap"]["closed"]),
+        seconds=_number(content.get("seconds")),
+        alone=tuple(Alone(one["name"], _number(one["refitted"]), _number(one["held"])) for one in alone),
+    )
+
+
+def permuted(answers: Sequence[Answer], generator: np.random.Generator) -> list[Answer]:
+    """The same answers beside the truths of other cases."""
+    order = generator.permutation(len(answers)).tolist()
+    return [Answer(one.case, answers[other].said, one.identities) for one, other in zip(answers, order, strict=True)]
+
+
+def chance(answers: Sequence[Answer]) -> float:
+    """Expected share of right names over all permutations of the answers, of the cases with one effect."""
+    asked = [answer for answer in answers if answer.case.kind is Kind.EFFECT]
+    hits = [Answer(one.case, other.said, one.identities).right for one in asked for other in answers]
+    return sum(hits) / len(hits) if hits else math.nan
+
+
+def _set(effect: Mapping[str, Any]) -> frozenset[str]:
+    return frozenset((effect["name"], *effect["ambiguity_set"]))
+
+
+def _names(effect: Mapping[str, Any], case: Case, number: int, identity: Identity) -> bool:
+    if len(identity.names) == 1:
+        return bool(effect["name"] == case.effects[number].name)
+    return _set(effect) == identity.names
+
+
+def _matched(wanted: Sequence[int], found: Sequence[set[int]]) -> bool:
+    """Whether every number can be given an entry of its own that has it."""
+    if not wanted:
+        return True
+    first, *others = wanted
+    return any(
+        first in each and _matched(others, [*found[:index], *found[index + 1 :]]) for index, each in enumerate(found)
+    )
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)

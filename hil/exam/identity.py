@@ -1,0 +1,192 @@
+"""Which causes no record of an exam can tell apart: equal columns, by the equations, in the motion that is planned.
+
+Two causes are one where what the parameters of the model leave of their columns is the same; nothing of it comes from
+the answers. What is scored of a name or a place depends on whether it can be told from others at all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.exam.cases import Case, Injected
+from hil.exam.folder import ExamFolder, read_exam
+from hil.exam.plans import plans_from_text
+from ident.campaign.plan import Plan
+from ident.campaign.reference import STEERING_LOOPS, sample_times
+from ident.gap.problem import Candidate, Problem
+from ident.gap.rows import Column, make_rows
+from ident.gap.search import least_squares
+from ident.gap.vehicle.build import build_problem
+from ident.gap.vehicle.library import DRIFTS, ONE_SIDED
+from ident.gap.vehicle.visibility import VISIBLE, orthonormal, row_noise
+from ident.records.record import Record, Segment, make_segment
+from ident.vehicle.description import load_vehicle
+from ident.vehicle.effects import EFFECTS, EffectName
+from ident.vehicle.extended import read_model
+from ident.vehicle.parameters import Parameters
+
+Array = NDArray[np.float64]
+
+IDENTICAL: Final = 0.999
+"""Cosine of the angle between what two causes leave, from which no record tells them apart: rank, up to rounding.
+
+In the four steps, causes are either identical to seven digits or below 0.97.
+"""
+
+POSITIVE: Final = (*ONE_SIDED, EffectName.PAYLOAD)
+"""Effects whose size is never negative: they stand for no change in the other direction."""
+
+SIZED: Final = 1e-3
+"""Part of a column that the size of the effect must have; the rest is another of its numbers."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What one effect cannot be told from.
+
+    Attributes:
+        names: of effects that look the same at some place, its own among them.
+        places: at which an effect of its name looks the same, its own among them.
+    """
+
+    names: frozenset[str]
+    places: frozenset[str]
+
+
+class Identities:
+    """Identities by key of a cause and sign of its size."""
+
+    def __init__(self, alike: Mapping[tuple[str, bool], Sequence[str]]) -> None:
+        """`alike`: keys that look the same, by key of the cause and whether its size is positive."""
+        self._alike = alike
+
+    def of(self, effect: Injected) -> Identity:
+        """Identity of an effect; its own name and place alone where the library has no candidate for it."""
+        keys = self._alike.get((f"{effect.name}@{effect.where}", effect.size > 0), ())
+        pairs = [key.split("@") for key in keys]
+        names = frozenset(name for name, _ in pairs)
+        return Identity(
+            names | {effect.name},
+            frozenset(where for name, where in pairs if name == effect.name) | {effect.where},
+        )
+
+    def of_case(self, case: Case) -> tuple[Identity, ...]:
+        """Of every effect of a case."""
+        return tuple(self.of(effect) for effect in case.effects)
+
+
+def exam_identities(folder: ExamFolder) -> Identities:
+    """Identities in the two campaigns of an exam, from its plans, its vehicle and its model."""
+    exam, vehicle, model = read_exam(folder), load_vehicle(folder.vehicle), read_model(folder.model)
+    plans = plans_from_text(exam.plans, vehicle, exam.cycle)
+    records = [planned_record(plan, model.parameters) for plan in (plans.fit, plans.confirm)]
+    return identities(build_problem(records, vehicle, model.parameters, given=model.effects))
+
+
+def planned_record(plan: Plan, parameters: Parameters) -> Record:
+    """One repeat of every step of a plan, driven exactly by a vehicle that obeys the model."""
+    once = replace(plan, periods=1)
+    segments = []
+    for step in plan.steps:
+        reference = once.reference(step, parameters)
+        rates = np.sum([track.velocity[:, None] * track.wheels for track in reference.tracks.values()], axis=0)
+        segment = Segment(
+            step=reference.step,
+            sample_time=plan.cycle,
+            time=sample_times(len(reference), plan.cycle),
+            motor_torques=reference.feed_forward,
+            wheel_angles=np.cumsum(rates, axis=0) * plan.cycle,
+            steering_angles=np.stack([reference.tracks[name].position for name in STEERING_LOOPS], axis=1),
+            period=reference.period,
+        )
+        segments.append(make_segment(segment, "planned"))
+    return Record(segments, "planned")
+
+
+def identities(problem: Problem) -> Identities:
+    """Identities of all causes that a problem shows.
+
+    Structure is compared beside the parameters, which are free there; changed parameters as they are.
+    """
+    rows = make_rows(problem)
+    scale = row_noise(rows)[:, None]
+    baseline, columns = orthonormal(rows.baseline / scale), rows.columns / scale
+    beside = columns - baseline @ (baseline.T @ columns)
+    groups: Mapping[bool, list[_Cause]] = {
+        drift: [
+            cause
+            for number, candidate in enumerate(problem.candidates)
+            if (candidate.effect in DRIFTS) == drift
+            and (cause := _cause(candidate, rows.layout, number, columns if drift else beside, columns)) is not None
+        ]
+        for drift in (False, True)
+    }
+    return Identities(
+        {
+            (cause.key, positive): [
+                other.key for other in group if other is not cause and other.imitates(cause.signal, positive)
+            ]
+            for group in groups.values()
+            for cause in group
+            for positive in (True, False)
+        }
+    )
+
+
+@dataclass(frozen=True)
+class _Cause:
+    """What the rows show of a cause.
+
+    Attributes:
+        key, one_sided: which, and whether its size is never negative.
+        signal: (n,) of unit size, its other numbers as the exam injects them.
+        spaces: (n, k) columns of its variants, the size first.
+    """
+
+    key: str
+    one_sided: bool
+    signal: Array
+    spaces: tuple[Array, ...]
+
+    def imitates(self, signal: Array, positive: bool) -> bool:
+        """Whether some of its sizes leave the same as a signal, or as its negative."""
+        wanted = signal if positive else -signal
+        return any(self._matches(space, wanted) for space in self.spaces)
+
+    def _matches(self, space: Array, wanted: Array) -> bool:
+        values = least_squares(space, wanted)
+        length = float(np.linalg.norm(wanted))
+        if self.one_sided and values[0] * float(np.linalg.norm(space[:, 0])) < SIZED * length:
+            return False
+        return float(np.linalg.norm(wanted - space @ values)) < math.sqrt(1 - IDENTICAL**2) * length
+
+
+def _cause(candidate: Candidate, layout: Sequence[Column], number: int, left: Array, whole: Array) -> _Cause | None:
+    """None where nothing is to be seen of it."""
+    own = [column for column in layout if column.candidate == number and column.place.stop > column.place.start]
+    spaces = [left[:, column.place] for column in own]
+    injected = next((index for index, column in enumerate(own) if _is_injected(candidate, column)), None)
+    if injected is None:
+        return None
+    signal, full = spaces[injected][:, 0], whole[:, own[injected].place.start]
+    if np.linalg.norm(signal) <= VISIBLE * np.linalg.norm(full):
+        return None
+    return _Cause(candidate.key, candidate.effect in POSITIVE, signal, tuple(spaces))
+
+
+def _is_injected(candidate: Candidate, column: Column) -> bool:
+    """Whether a variant's other numbers are those that an effect of an exam has: the defaults."""
+    start = candidate.variants[column.variant].start
+    if start is None:
+        return True
+    values = start(np.eye(column.place.stop - column.place.start)[0])
+    defaults = [parameter.default for parameter in EFFECTS[EffectName(candidate.effect)].parameters]
+    return all(
+        default is None or bool(np.isclose(value, default)) for default, value in zip(defaults, values, strict=True)
+    )
