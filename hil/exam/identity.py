@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from hil.exam.cases import Case, Injected
 from hil.exam.folder import ExamFolder, read_exam
@@ -101,7 +102,7 @@ def planned_record(plan: Plan, parameters: Parameters) -> Record:
             sample_time=plan.cycle,
             time=sample_times(len(reference), plan.cycle),
             motor_torques=reference.feed_forward,
-            wheel_angles=np.cumsum(rates, axis=0) * plan.cycle,
+            wheel_angles=cumulative_trapezoid(rates, dx=plan.cycle, axis=0, initial=0.0),
             steering_angles=np.stack([reference.tracks[name].position for name in STEERING_LOOPS], axis=1),
             period=reference.period,
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -76,11 +77,9 @@ def test_someone_who_knows_scores_everything(answers: list[Answer]) -> None:
 
 def test_permuted_answers_score_at_the_chance_that_is_stated(answers: list[Answer]) -> None:
     hits = [score(permuted(answers, np.random.default_rng(seed))).rates[names.RIGHT].value for seed in range(20)]
-    shares = {}
-    for each in answers:
-        shares[each.named] = shares.get(each.named, 0) + 1 / len(answers)
+    counts = Counter(each.named for each in answers)
     asked = [each for each in answers if each.case.kind is Kind.EFFECT]
-    expected = np.mean([shares[each.single.name] for each in asked])
+    expected = np.mean([counts[each.single.name] / len(answers) for each in asked])
     assert chance(answers) == pytest.approx(expected)
     assert np.mean(hits) == pytest.approx(expected, abs=0.02)
 
@@ -294,7 +293,6 @@ def test_the_pictures_are_well_formed_and_hold_every_case(answers: list[Answer])
     result = score(answers)
     assert reliability_svg(result.bins).count("<circle") == 5
     picture = ElementTree.fromstring(confusion_svg(result.confusion, result.wished))
-    counts = [
-        int(text.text) for text in picture.iter("{http://www.w3.org/2000/svg}text") if (text.text or "").isdigit()
-    ]
-    assert sum(counts) == sum(each.case.kind is not Kind.PAIR for each in answers)
+    texts = [element.text or "" for element in picture.iter("{http://www.w3.org/2000/svg}text")]
+    shown = sum(int(text) for text in texts if text.isdigit())
+    assert shown == sum(each.case.kind is not Kind.PAIR for each in answers)
