@@ -149,5 +149,4 @@ def segment_of(step: str, path: Path, log: DecodedLog, network: Network, plan: P
 def _periods(step: str, samples: int, plan: Plan | None) -> NDArray[np.int64]:
     if plan is None or step not in plan.specs:
         return np.full(samples, -1, dtype=np.int64)
-    planned = plan.reference(step, plan.vehicle.prior).period
-    return np.asarray(planned[:samples], dtype=np.int64)
+    return np.asarray(plan.repeats(step)[:samples], dtype=np.int64)

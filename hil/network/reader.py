@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -112,7 +113,7 @@ def _read_node(entry: Mapping[str, Any], devices: Mapping[str, Any], path: Path)
 
 def _read_eds(path: Path, node_id: int) -> canopen.ObjectDictionary:
     try:
-        return _parse(path, path.read_bytes(), node_id)
+        return _parse(path.suffix, path.read_bytes(), node_id)
     except OSError as error:
         raise DataFileError(f"{path} cannot be read: {error}.", "Name an existing EDS file.") from error
     except (ValueError, KeyError) as error:
@@ -120,9 +121,11 @@ def _read_eds(path: Path, node_id: int) -> canopen.ObjectDictionary:
 
 
 @lru_cache(maxsize=64)
-def _parse(path: Path, _content: bytes, node_id: int) -> canopen.ObjectDictionary:
+def _parse(suffix: str, content: bytes, node_id: int) -> canopen.ObjectDictionary:
     # Parsing takes longer than all the rest of a network file; the result is only read, and new content is parsed anew.
-    return canopen.import_od(str(path), node_id=node_id)
+    file = io.StringIO(content.decode(), newline=None)
+    file.name = f"dictionary{suffix}"
+    return canopen.import_od(file, node_id=node_id)
 
 
 def _read_identity(device: Mapping[str, Any], where: str) -> Identity:

@@ -11,12 +11,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from scipy import optimize
 
 from ident.campaign.axis import Axis
+
+if TYPE_CHECKING:
+    import control
 
 VELOCITY_MARGIN = math.radians(55)
 """Phase margin that the velocity loop is designed for."""
@@ -68,6 +71,8 @@ class LoopDesign:
 
 def design_loop(axis: Axis, cycle: float, rate_cycles: int = 1) -> LoopDesign:
     """Gains of the cascade for an axis sampled every `cycle` seconds, its rate taken over `rate_cycles` cycles."""
+    import control  # takes a second, and who only reads a run designs no loop
+
     dead_time = (HOLD_CYCLES + rate_cycles / 2) * cycle
     plant = _plant(axis.inertia, axis.viscous, dead_time)
     slipping = _plant(axis.slipping_inertia, axis.viscous, dead_time)
@@ -108,6 +113,8 @@ def _crossover(plant: control.TransferFunction, margin: float, cycle: float) -> 
 
 
 def _plant(inertia: float, viscous: float, dead_time: float) -> control.TransferFunction:
+    import control
+
     delay = control.tf(*control.pade(dead_time, 3))
     current_loop = control.tf([1], [1 / CURRENT_LOOP, 1])
     return delay * current_loop * control.tf([1], [inertia, viscous])
@@ -115,6 +122,8 @@ def _plant(inertia: float, viscous: float, dead_time: float) -> control.Transfer
 
 def _velocity_controller(plant: control.TransferFunction, crossover: float) -> control.TransferFunction:
     """PI with its corner at crossover / RESET_RATIO, scaled to cross over where asked."""
+    import control
+
     shape = control.tf([1, crossover / RESET_RATIO], [1, 0])
     gain = 1 / abs((shape * plant)(1j * crossover))
     return gain * shape

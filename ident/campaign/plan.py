@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
@@ -21,8 +21,10 @@ from ident.campaign.reference import (
     LaneChange,
     Reference,
     alignment_reference,
+    excitation_path,
     excitation_reference,
     lane_change_reference,
+    repeats_of,
     turn_reference,
 )
 from ident.campaign.steps import DIAGNOSTIC, DRIVING_ORDER, EXCITATIONS, ORDER, PERIODS, Posture, StepSpec
@@ -103,7 +105,7 @@ class Plan:
         spec = self.specs[step]
         if spec.turn:
             return turn_reference(spec, self.vehicle, parameters, self.cycle)
-        series, periods = self.excitations[spec.like or step].series, math.ceil(self.periods * spec.repeats)
+        series, periods = self.excitations[spec.like or step].series, self._periods(spec)
         reference = excitation_reference(spec, series, periods, self.vehicle, parameters, self.cycle)
         return add_dither(reference, spec, self.vehicle) if spec.dithers else reference
 
@@ -116,10 +118,27 @@ class Plan:
         posture = self.specs[step].posture if step in self.specs else Posture.AHEAD
         return posture.angles(self.vehicle.geometry)
 
+    def repeats(self, step: str) -> NDArray[np.int64]:
+        """Number of the repeat, -1 outside of any, of every sample of an excitation step's reference."""
+        spec = self.specs[step]
+        if spec.turn:
+            return self.reference(step, self.vehicle.prior).period
+        return repeats_of(spec, self._periods(spec), self.cycle)
+
+    def _periods(self, spec: StepSpec) -> int:
+        return math.ceil(self.periods * spec.repeats)
+
+    def _path(self, step: str) -> Array:
+        """Poses (n, 3) that the chassis takes in a step, those of repeats once."""
+        if step == Step.LANE_CHANGE or self.specs[step].turn:
+            return self.reference(step, self.vehicle.prior).path
+        spec = self.specs[step]
+        return excitation_path(spec, self.excitations[spec.like or step].series, self.cycle)
+
     def room(self) -> Room:
         """Floor that the planned steps cover, wheels included (paper, section 6.2)."""
         half = self.vehicle.geometry.footprint[0] / 2
-        reaches = np.vstack([self.reference(step, self.vehicle.prior).path for step in self.steps])
+        reaches = np.vstack([self._path(step) for step in self.steps])
         low, high = reaches.min(axis=0), reaches.max(axis=0)
         return Room(high[0] + half, half - low[0], high[1] + half, half - low[1])
 
@@ -187,7 +206,7 @@ def assemble_plan(
         vehicle=vehicle,
         steps=tuple(step for step in DRIVING_ORDER if step in steps),
         excitations=excitations,
-        designs=_by_loop({step: _design(step, axis, cycle) for step, axis in axes.items()}),
+        designs=_Designs(_by_loop(axes), cycle),
         limits=_by_loop({step: _limits(step, axis) for step, axis in axes.items()}),
         periods=periods,
         cycle=cycle,
@@ -215,9 +234,24 @@ def _excitation(
     return optimise(problem, generator)
 
 
-def _design(step: str, axis: Axis, cycle: float) -> LoopDesign:
-    steered = EXCITATIONS[step].coordinate in STEERING_LOOPS
-    return design_loop(axis, cycle, STEERING_RATE_CYCLES if steered else 1)
+class _Designs(Mapping[str, LoopDesign]):
+    """Designs of the loops by coordinate, each made when it is first asked for: who reads a run needs none."""
+
+    def __init__(self, axes: Mapping[str, Axis], cycle: float) -> None:
+        self._axes, self._cycle = axes, cycle
+        self._made: dict[tuple[Axis, int], LoopDesign] = {}
+
+    def __getitem__(self, loop: str) -> LoopDesign:
+        key = self._axes[loop], STEERING_RATE_CYCLES if loop in STEERING_LOOPS else 1
+        if key not in self._made:
+            self._made[key] = design_loop(key[0], self._cycle, key[1])
+        return self._made[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._axes)
+
+    def __len__(self) -> int:
+        return len(self._axes)
 
 
 def _limits(step: str, axis: Axis) -> LoopLimits:

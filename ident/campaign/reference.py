@@ -90,8 +90,20 @@ def excitation_reference(
     motion = series.evaluate(sample_times(per_period, sample_time))
     rest = round(SETTLING / sample_time)
     position, velocity, acceleration = (_padded(np.tile(values, periods), rest) for values in motion)
-    period = np.concatenate([np.full(rest, -1), np.repeat(np.arange(periods), per_period), np.full(rest, -1)])
+    period = repeats_of(spec, periods, sample_time)
     return _single_motion(spec, (position, velocity, acceleration), period, vehicle, parameters, sample_time)
+
+
+def repeats_of(spec: StepSpec, periods: int, sample_time: float) -> NDArray[np.int64]:
+    """Number of the repeat of every sample of an excitation step, -1 at the standstill before and behind."""
+    rest, repeats = np.full(round(SETTLING / sample_time), -1), np.arange(periods)
+    return np.concatenate([rest, np.repeat(repeats, round(spec.period / sample_time)), rest])
+
+
+def excitation_path(spec: StepSpec, series: FourierSeries, sample_time: float) -> Array:
+    """Poses (n, 3) that the chassis takes in one repeat of an excitation step."""
+    position, _, _ = series.evaluate(sample_times(round(spec.period / sample_time), sample_time))
+    return _path(spec, np.append(position, 0.0))
 
 
 def turn_reference(
@@ -121,10 +133,14 @@ def _single_motion(
     else:
         tracks = _tracks(spec, alpha, position, velocity, vehicle.geometry)
         torques = _feed_forward(spec, alpha, velocity, acceleration, vehicle.geometry, parameters)
+    return Reference(spec.step, spec.coordinate, sample_time, tracks, torques, period, _path(spec, position))
+
+
+def _path(spec: StepSpec, position: Array) -> Array:
     path = np.zeros((len(position), 3))
     if spec.coordinate in ("x", "y", "gamma"):
         path[:, ("x", "y", "gamma").index(spec.coordinate)] = -position if spec.reversed else position
-    return Reference(spec.step, spec.coordinate, sample_time, tracks, torques, period, path)
+    return path
 
 
 def alignment_reference(
