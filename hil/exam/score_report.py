@@ -117,7 +117,7 @@ def _finite(value: float) -> float | None:
 
 
 def _text(value: float) -> str:
-    return f"{value + 0.0:.2f}" if math.isfinite(value) else "–"
+    return f"{round(value, 2) + 0.0:.2f}" if math.isfinite(value) else "–"
 
 
 def _wish(asked: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ident.errors import RecordError
+from ident.errors import DataFileError, RecordError
 from ident.gap.diagnosis import Diagnosis
 from ident.gap.judge import Findings, judge
 from ident.gap.problem import Problem
@@ -17,7 +17,7 @@ from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EffectName
 from ident.vehicle.extended import ExtendedModel
-from ident.vehicle.parameters import Parameters
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,12 @@ def diagnose_vehicle(
 
     Raises:
         RecordError: a record holds none of the steps of a diagnosis, or the confirming records none of those fitted.
+        DataFileError: a parameter of the model is zero.
     """
     if isinstance(model, Parameters):
         model = ExtendedModel(model)
+    if model is not None:
+        _refuse_zero(model.parameters)
     hidden = hidden_effects(segment.step for record in fit for segment in record.segments)
     shown = [name for name in effects if name not in hidden]
     fitted = _problem(fit, vehicle, model, shown)
@@ -93,6 +96,15 @@ def _free(problem: Problem) -> Problem:
     """The search for structure: parameters free, changed values of them no candidates."""
     structural = tuple(candidate for candidate in problem.candidates if not candidate.drift)
     return replace(problem, nominal=None, candidates=structural)
+
+
+def _refuse_zero(parameters: Parameters) -> None:
+    for name, value in zip(PARAMETER_NAMES, parameters.values.tolist(), strict=True):
+        if value == 0:
+            raise DataFileError(
+                f"{name} of the model is zero: a change of it, stated relative to it, would have no size.",
+                "Give the least value that makes sense, with its std, or leave --model out to have all refitted.",
+            )
 
 
 def _refuse_strangers(fitted: Problem, confirming: Problem) -> None:
