@@ -221,9 +221,12 @@ class Answer:
 
     @property
     def statements(self) -> list[tuple[float, bool]]:
-        """Every probability stated, and whether a true effect has that name."""
-        true = {effect.name for effect in self.case.effects if self.case.kind is not Kind.UNKNOWN}
-        return [(float(effect["probability"]), effect["name"] in true) for effect in self.said.effects]
+        """Every probability stated, and whether a true effect has that name, or one that no record tells from it."""
+        known = [] if self.case.kind is Kind.UNKNOWN else [identity.names for identity in self.identities]
+        return [
+            (float(effect["probability"]), any(effect["name"] in names for names in known))
+            for effect in self.said.effects
+        ]
 
     @property
     def closed(self) -> float:

@@ -80,7 +80,7 @@ class Findings:
         gap: held out.
         where: shares of the gap.
         invisible: names of effects that are nowhere visible.
-        before, after: refits of all rows without and with the causes.
+        before, after: of all rows without and with the causes; before is the model that was given, or a refit.
         significance: that the best candidate is there by chance.
         remainder: what a smooth function still predicts.
         repeated_before, repeated_after: rms over noise of what repeats, by step and coordinate.

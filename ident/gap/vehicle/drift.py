@@ -18,8 +18,8 @@ from ident.gap.diagnosis import Verdict
 from ident.gap.judge import Cause, Findings, ordered
 from ident.gap.probability import Ranked, calibration
 from ident.gap.problem import Candidate, Nominal, Problem
-from ident.gap.refit import Part
-from ident.gap.remainder import held_out_gap, noise_floors
+from ident.gap.refit import Part, Refit
+from ident.gap.remainder import held_out_gap, noise_floors, repeated, shares
 from ident.gap.rows import Rows, make_rows
 from ident.gap.vehicle.library import placed_parameters
 from ident.gap.whitening import row_ages
@@ -107,7 +107,16 @@ def with_drift(findings: Findings, fit: Problem, confirm: Problem, nominal: Nomi
     verdict = Verdict.EFFECT if causes and findings.verdict is Verdict.NONE else findings.verdict
     invisible = tuple(name for name in findings.invisible if name not in (EffectName.PAYLOAD,))
     together = ordered((*findings.causes, *causes))
-    return replace(findings, verdict=verdict, causes=together, gap=gap, invisible=invisible)
+    return replace(
+        findings,
+        verdict=verdict,
+        causes=together,
+        gap=gap,
+        where=shares(rows, floors, judged),
+        invisible=invisible,
+        before=Refit(nominal.values, nominal.std, (), tuple(judged)),
+        repeated_before=repeated(rows, floors, judged),
+    )
 
 
 def _structure(findings: Findings, rows: Rows) -> list[Array]:
@@ -207,8 +216,8 @@ def _ranked(evidence: dict[_Change, float], alike: Sequence[str]) -> Ranked:
     found |= {key: found[alike[0]] for key in alike}
     scores = np.array([*found.values(), 0.0])
     weights = np.exp(scores - scores.max())
-    shares = weights[:-1] / weights.sum()
-    probabilities = dict(sorted(zip(found, shares.tolist(), strict=True), key=lambda entry: -entry[1]))
+    parts = weights[:-1] / weights.sum()
+    probabilities = dict(sorted(zip(found, parts.tolist(), strict=True), key=lambda entry: -entry[1]))
     names: dict[str, float] = {}
     for key, probability in probabilities.items():
         name = key.partition("@")[0]

@@ -195,6 +195,11 @@ def test_every_stated_probability_is_a_statement_about_its_name() -> None:
     assert result.numbers[names.ECE_ALL] == pytest.approx(0.5 * 0.2 + 0.5 * 0.6)
 
 
+def test_a_probability_is_that_of_the_name_or_of_one_that_no_record_tells_from_it() -> None:
+    assert answer(entry("asymmetric_coulomb", probability=0.9)).statements == [(0.9, True)]
+    assert answer(entry("asymmetric_coulomb", probability=0.9), identity=apart()).statements == [(0.9, False)]
+
+
 def test_the_right_effect_closes_what_it_closes_and_not_what_others_do() -> None:
     assert answer(entry("torque_bias")).closed == 0.9
     assert answer(entry("torque_bias"), entry("scrub")).closed == 0.4
