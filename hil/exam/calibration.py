@@ -11,10 +11,10 @@ from typing import Final
 from hil.exam.driving import drive
 from hil.exam.noise_units import Noise, SizeInNoise, noise_of, size_in_noise
 from hil.exam.plans import plan_exam
-from hil.exam.probes import DRIFTS, KINEMATIC, SHARES, SIGNED, THRESHOLDS, Probe, all_probes
+from hil.exam.probes import DRIFTS, IDLE, KINEMATIC, SHARES, SIGNED, THRESHOLDS, Probe, all_probes
 from hil.exam.quiet import drive_quietly
 from hil.exam.sealing import effect_of
-from hil.exam.sizes import EffectSize, physical_size
+from hil.exam.sizes import EffectSize
 from hil.exam.workers import run_all
 from hil.truth import truth_of
 from ident.campaign.plan import Plan
@@ -94,20 +94,29 @@ def calibrate(
 def measure(prototype: str, cycle: float, probe: Probe) -> tuple[tuple[str, str], str, Points]:
     """Key of a probe, the channel that shows it and its points there, no points where none does; runs in a worker."""
     bench = _bench(prototype, cycle)
-    found = {size: units for share in SHARES if (units := _units(probe, size := _of_share(probe, share), bench))}
+    shares = (*SHARES, IDLE) if probe.name in THRESHOLDS else SHARES
+    found = {size: units for share in shares if (units := _units(probe, size := _of_share(probe, share), bench))}
     channel = _shown_in(probe, list(found.values()))
     if channel is None:
         return _key(probe), "torque", ()
+    sizes = {size: float(getattr(units, channel)) for size, units in found.items()}
     for _ in range(APPROACHES):
-        points = _points(probe, {size: float(getattr(units, channel)) for size, units in found.items()})
-        if any(CLEAR < units < 2 * AIM for _, units in points):
+        if any(CLEAR < units < 2 * AIM for units in sizes.values()):
             break
-        size = physical_size(points, AIM)
-        units = _units(probe, size, bench)
-        if units is None:
+        nearer = _units(probe, size := _nearer(sizes), bench)
+        if nearer is None:
             break
-        found[size] = units
-    return _key(probe), channel, _points(probe, {size: float(getattr(at, channel)) for size, at in found.items()})
+        sizes[size] = float(getattr(nearer, channel))
+    return _key(probe), channel, _points(probe, sizes)
+
+
+def _nearer(sizes: Mapping[float, float]) -> float:
+    """A size nearer to `AIM`: in proportion, or between the smallest clear one and the next that does too little."""
+    clear = min((size for size, units in sizes.items() if units > CLEAR), key=lambda size: sizes[size])
+    idle = [size for size, units in sizes.items() if units <= CLEAR]
+    if not idle:
+        return clear * AIM / sizes[clear]
+    return math.sqrt(clear * min(idle, key=lambda size: abs(math.log(size / clear))))
 
 
 def _key(probe: Probe) -> tuple[str, str]:

@@ -84,6 +84,9 @@ UNKNOWN_PRACTICAL: Final[Mapping[UnlibrariedName, float]] = MappingProxyType(
 SHARES: Final = (0.6, 1.0)
 """Of the largest size, at which every effect is driven first; nearer to the noise after that."""
 
+IDLE: Final = 0.4
+"""Share at which an effect with a threshold does nothing yet."""
+
 THRESHOLDS: Final = frozenset({EffectName.SLIP})
 """Effects that do nothing at all up to some size."""
 
