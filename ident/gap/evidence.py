@@ -48,6 +48,21 @@ class White:
 
 
 @dataclass(frozen=True)
+class Bounded:
+    """A variant of k columns whose coefficients have a least value.
+
+    Attributes:
+        place: of its directions.
+        turn: (k, directions) amplitudes -> coefficients.
+        least: of all coefficients.
+    """
+
+    place: slice
+    turn: Array
+    least: float
+
+
+@dataclass(frozen=True)
 class Directions:
     """Orthonormal directions that each variant of a candidate adds to the baseline.
 
@@ -55,6 +70,7 @@ class Directions:
         basis: (n, D).
         places: of every variant in the basis; empty where the baseline absorbs it.
         least, negligible: (D,) amplitudes, and sizes of them, below which a direction counts nothing.
+        bounded: variants of several columns whose coefficients have a least value.
         residual: (n,) target minus its projection on the baseline.
         volume: log of the determinant of each variant's columns beside the baseline.
     """
@@ -65,6 +81,7 @@ class Directions:
     negligible: Array
     residual: Array
     volume: Array
+    bounded: tuple[Bounded, ...] = ()
 
     @property
     def sizes(self) -> Array:
@@ -73,7 +90,11 @@ class Directions:
 
     def possible(self, amplitudes: Array) -> Mask:
         """Which amplitudes (..., D) are as large as they must be."""
-        return (amplitudes >= self.least) & (np.abs(amplitudes) >= self.negligible)
+        found = (amplitudes >= self.least) & (np.abs(amplitudes) >= self.negligible)
+        for several in self.bounded:
+            coefficients = amplitudes[..., several.place] @ several.turn.T
+            found[..., several.place] &= np.all(coefficients >= several.least, axis=-1, keepdims=True)
+        return np.asarray(found)
 
     def ratios(self, amplitudes: Array) -> Array:
         """Sums of squared amplitudes (..., D) over the directions of every variant, (..., V)."""
@@ -94,19 +115,24 @@ def directions(white: White, layout: Sequence[Column], rows: Mask | None = None)
     full = np.linalg.norm(white.columns, axis=0)
     parts, places, volumes, end = [np.zeros((len(target), 0))], [], [], 0
     bounds: list[tuple[float, float]] = []
+    bounded: list[Bounded] = []
     for column in layout:
         scale = np.where(full[column.place] > 0, full[column.place], 1.0)
-        vectors, singular, _ = np.linalg.svd(left[:, column.place] / scale, full_matrices=False)
+        vectors, singular, turn = np.linalg.svd(left[:, column.place] / scale, full_matrices=False)
         count = int(np.sum(singular > VISIBLE))
         single = count == 1 and vectors.shape[1] == 1
         length = float(vectors[:, 0] @ left[:, column.place.start]) if single else 1.0
         parts.append(vectors[:, :count] * np.sign(length))
-        bounds += [(column.least * abs(length), column.negligible * abs(length))] * count
+        least = column.least if single else -math.inf
+        bounds += [(least * abs(length), column.negligible * abs(length))] * count
         places.append(slice(end, end + count))
+        if count and not single and math.isfinite(column.least):
+            coefficients = (turn[:count].T / singular[:count]) / scale[:, None]
+            bounded.append(Bounded(places[-1], coefficients, column.least))
         volumes.append(2 * float(np.sum(np.log(np.maximum(singular, VISIBLE)))))
         end += count
-    least, negligible = np.array(bounds).reshape(-1, 2).T
-    return Directions(np.hstack(parts), tuple(places), least, negligible, residual, np.array(volumes))
+    low, small = np.array(bounds).reshape(-1, 2).T
+    return Directions(np.hstack(parts), tuple(places), low, small, residual, np.array(volumes), tuple(bounded))
 
 
 def orthonormal(columns: Array) -> Array:

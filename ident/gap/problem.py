@@ -80,7 +80,8 @@ class Variant:
 
     Attributes:
         columns: one (N, k) a block, None where it does not act; filtered like the block.
-        start: coefficients of the columns (k,) -> values of all parameters of the candidate. None: they are the same.
+        start: coefficients of the columns (k,) -> values of all parameters of the candidate. None: they are the same,
+            those of what may come along behind the parameters.
     """
 
     columns: tuple[Array | None, ...]
@@ -98,9 +99,11 @@ class Candidate:
         variants: at least one; several choices of nonlinear parameters are tried, the best one counts.
         contribution: exact and nonlinear in the parameters, for the refit; None where the columns are all there is.
         drift: it is a changed value of the model, no structure that the model lacks.
-        least: what the coefficient of a single column must reach, 0 for a play or a mass; if the data want it smaller,
+        least: what the coefficients of a variant must reach, 0 for a play or a mass; if the data want one smaller,
             this is not the cause. None: anything is possible.
         negligible: size of the coefficient of a single column up to which it means nothing, in its unit.
+        spread: standard deviations of the parameters that come with the way they are told, beyond the scatter of the
+            rows; empty where there are none.
     """
 
     effect: str
@@ -111,6 +114,7 @@ class Candidate:
     drift: bool = False
     least: float | None = None
     negligible: float = 0.0
+    spread: tuple[float, ...] = ()
 
     @property
     def key(self) -> str:

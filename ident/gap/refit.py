@@ -58,9 +58,14 @@ class Refit:
 
 @dataclass(frozen=True)
 class _Unknown:
-    """The numbers of one effect: coefficients of its columns, or its parameters where it has an exact form."""
+    """The numbers of one effect: coefficients of its columns, or its parameters where it has an exact form.
+
+    The first `stated` of them are its parameters, with `spread` as in `Candidate`; what is behind came along with it.
+    """
 
     key: str
+    stated: int
+    spread: tuple[float, ...]
     place: slice
     exact: Callable[[Array, Array], Series] | None
     columns: tuple[Array | None, ...]
@@ -175,9 +180,11 @@ class _Model:
             blocks = [model if one is None else model + one for model, one in zip(blocks, series, strict=True)]
             turn = _gradient(unknown.finish, own)
             spread = turn @ covariance[unknown.place, unknown.place] @ turn.T
-            parts.append(Part(unknown.key, unknown.finish(own), np.sqrt(np.maximum(np.diag(spread), 0.0))))
-        deviations = np.sqrt(np.diag(covariance)[: self.size])
-        return Refit(values[: self.size], deviations, tuple(parts), tuple(blocks))
+            deviations, stated = np.sqrt(np.maximum(np.diag(spread), 0.0)), slice(unknown.stated)
+            total = np.hypot(deviations[stated], unknown.spread or 0.0)
+            parts.append(Part(unknown.key, unknown.finish(own)[stated], total))
+        baseline_std = np.sqrt(np.diag(covariance)[: self.size])
+        return Refit(values[: self.size], baseline_std, tuple(parts), tuple(blocks))
 
     def _linear(self, variants: Sequence[int]) -> Array:
         design = np.hstack([self.rows.baseline, self.regression.columns_of(variants)])
@@ -218,16 +225,17 @@ def _unknown(
     variant = candidates[0].variants[column.variant]
     finish = variant.start or _same
     columns = tuple(part for candidate in candidates for part in candidate.variants[column.variant].columns)
+    stated, spread = len(candidates[0].parameters), candidates[0].spread
     if candidates[0].contribution is None or not by_form:
         place = slice(first, first + len(coefficients))
-        return _Unknown(candidates[0].key, place, None, columns, finish), coefficients
+        return _Unknown(candidates[0].key, stated, spread, place, None, columns, finish), coefficients
 
     def exact(values: Array, baseline: Array) -> Series:
         forms = [candidate.contribution for candidate in candidates]
         return [one for form in forms if form is not None for one in form(values, baseline)]
 
     start = np.asarray(finish(coefficients), dtype=float)
-    return _Unknown(candidates[0].key, slice(first, first + len(start)), exact, columns, _same), start
+    return _Unknown(candidates[0].key, stated, spread, slice(first, first + len(start)), exact, columns, _same), start
 
 
 def _same(values: Array) -> Array:

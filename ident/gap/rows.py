@@ -49,7 +49,7 @@ class Column:
     Attributes:
         candidate, variant: numbers.
         place: among all columns.
-        least: value that its one coefficient must reach, -inf where there is none such.
+        least: value that all of its coefficients must reach, -inf where there is none such.
         negligible: size that its one coefficient must exceed.
     """
 
@@ -167,9 +167,8 @@ def _candidate_columns(problems: Sequence[Problem], kept: Sequence[Kept]) -> tup
 
 
 def _bounds(candidate: Candidate, width: int) -> tuple[float, float]:
-    if width != 1:
-        return -math.inf, 0.0
-    return -math.inf if candidate.least is None else candidate.least, candidate.negligible
+    least = -math.inf if candidate.least is None else candidate.least
+    return least, candidate.negligible if width == 1 else 0.0
 
 
 def _groups(labels: Sequence[tuple[int, str, str, str]]) -> Indices:

@@ -19,6 +19,7 @@ from ident.gap.vehicle import rows
 from ident.gap.vehicle.library import DRIFTS, ONE_SIDED, SHAPES, TermCause, placed_parameters, term_causes
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
+from ident.gap.vehicle.sliding import ALONG, ALONG_STD, SlidingCause, adhesion, sliding_cause, sliding_causes
 from ident.gap.vehicle.transforms import Setting, TransformCause, transform_cause, transform_causes
 from ident.records.record import Record, Step, base_step
 from ident.vehicle.description import VehicleDescription
@@ -29,7 +30,7 @@ from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES, PARAMETER_UNITS, Parameters
 
 Array = NDArray[np.float64]
-Cause = TermCause | TransformCause
+Cause = TermCause | TransformCause | SlidingCause
 
 DIAGNOSED: Final = tuple(step for step in ROWS if step is not Step.LANE_CHANGE)
 """Steps that causes are looked for in; the lane change is kept for judging what was found."""
@@ -45,6 +46,12 @@ CREEP: Final = 3e-4
 
 TURNING_CREEP: Final = 1e-3
 """The same for wheels that turn about their steering axes at standstill, where the chassis is held by creep alone."""
+
+RATTLING: Final = 1000.0
+"""Bandwidth of the signals [rad/s]: motors on the compliance of their gears' teeth rattle more slowly than that."""
+
+RATTLING_SHARE: Final = 0.64
+"""The same at most, in units of the Nyquist frequency."""
 
 PRIOR_WEIGHT: Final = 1e-4
 """Of the vehicle file's guesses against the rows, per unit-norm column: only what no row shows is taken from them."""
@@ -105,7 +112,7 @@ class Context:
     processing: Processing
     parameters: Array
     formulas: rows.Formulas
-    given: tuple[tuple[TransformCause, float], ...] = ()
+    given: tuple[tuple[TransformCause | SlidingCause, Array], ...] = ()
     kept: dict[int, tuple[bytes, Array]] = field(default_factory=dict)
 
     @property
@@ -113,11 +120,15 @@ class Context:
         """What the formulas take beside the inputs."""
         return self.geometry.as_vector(), np.array([COULOMB_EPSILON]), self.parameters
 
+    def setting(self, source: Source) -> Setting:
+        """What effects with a memory need beside the signals of a source."""
+        return Setting(self.geometry, self.parameters, source.sample_time)
+
     def inputs(self, source: Source) -> Array:
         """Measured signals of a source, the given effects with a memory taken out."""
-        inputs, setting = source.inputs, Setting(self.geometry, self.parameters, source.sample_time)
-        for cause, size in self.given:
-            inputs = cause.transform(inputs, cause.place, size, setting)
+        inputs, setting = source.inputs, self.setting(source)
+        for cause, sizes in self.given:
+            inputs = cause.without(inputs, sizes, setting)
         return inputs
 
     def plain(self, source: Source) -> Array:
@@ -159,12 +170,12 @@ def build_problem(
         given: effects that the model has already.
         effects: that are looked for.
         steps: whose rows are used, variants of them included.
-        processing: filters and thresholds.
+        processing: filters and thresholds; None: those of the estimate, signals as fast as the records allow.
 
     Raises:
         RecordError: none of the steps is in a record.
     """
-    processing = processing or Processing()
+    processing = processing or _processing(records)
     sources = [source for record in records for source in sources_of(record, vehicle.geometry, steps, processing)]
     context = make_context(sources, vehicle, model, given, processing)
     causes = _causes(tuple(effects), model is not None)
@@ -181,6 +192,13 @@ def build_problem(
     )
 
 
+def _processing(records: Sequence[Record]) -> Processing:
+    """Filters of the estimate, but signals that still show a motor that rattles in its gear."""
+    usual = Processing()
+    nyquist = min((np.pi / segment.sample_time for record in records for segment in record.segments), default=0.0)
+    return replace(usual, signal_cutoff=float(np.clip(RATTLING_SHARE * nyquist, usual.signal_cutoff, RATTLING)))
+
+
 def make_context(
     sources: Sequence[Source],
     vehicle: VehicleDescription,
@@ -190,9 +208,7 @@ def make_context(
 ) -> Context:
     """Context of some sources; without a model, parameters are fitted to them."""
     terms = _formulas(tuple(_frozen(term_of(effect)) for effect in given if effect.name in TERMS))
-    memories = tuple(
-        (transform_cause(effect.name, effect.where), effect.size) for effect in given if effect.name not in TERMS
-    )
+    memories = tuple(_memory(effect) for effect in given if effect.name not in TERMS)
     context = Context(vehicle.geometry, processing, vehicle.prior.values, terms, memories)
     values = model.values if model else fitted_parameters(sources, vehicle, context)
     return replace(context, parameters=values)
@@ -208,6 +224,13 @@ def _frozen(term: EffectTerm) -> _FrozenTerm:
 @lru_cache(maxsize=FORMULAS_KEPT)
 def _formulas(given: tuple[_FrozenTerm, ...]) -> rows.Formulas:
     return rows.Formulas([EffectTerm(name, where, dict(values)) for name, where, values in given])
+
+
+def _memory(effect: Effect) -> tuple[TransformCause | SlidingCause, Array]:
+    """What takes an effect that is no term out of the signals, with its sizes."""
+    if effect.name is EffectName.SLIP:
+        return sliding_cause(effect.where), np.ones(1)
+    return transform_cause(effect.name, effect.where), np.array([effect.size])
 
 
 def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], processing: Processing) -> list[Source]:
@@ -354,14 +377,17 @@ def _unit(channel: Channel, coordinate: str) -> str:
 @lru_cache(maxsize=FORMULAS_KEPT)
 def _causes(effects: tuple[EffectName, ...], judged: bool) -> tuple[Cause, ...]:
     names = tuple(name for name in effects if judged or name not in DRIFTS)
-    return (*term_causes(names), *transform_causes(names))
+    sliding = sliding_causes() if EffectName.SLIP in names else []
+    return (*term_causes(names), *transform_causes(names), *sliding)
 
 
 def _candidate(
     cause: Cause, columns: Iterator[int], sources: Sequence[Source], tables: Sequence[Array], context: Context
 ) -> Candidate:
+    if isinstance(cause, SlidingCause):
+        return _sliding(cause, sources, context)
     if isinstance(cause, TransformCause):
-        variants: tuple[Variant, ...] = (Variant(_probed(cause, sources, context)),)
+        variants: tuple[Variant, ...] = tuple(_probed(cause, sources, context))
     else:
         variants = tuple(
             Variant(_picked([next(columns) for _ in variant.units], tables), variant.start)
@@ -376,6 +402,23 @@ def _candidate(
         contribution=None if linear else _contribution(cause, _acting(variants, sources), sources, context),
         drift=cause.name in DRIFTS,
         least=0.0 if cause.name in ONE_SIDED else None,
+    )
+
+
+def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Candidate:
+    """What was slid, as it was found; the friction coefficient by the traction that it took."""
+    acting = [source.spec.mode not in (None, Mode.ALIGNMENT) for source in sources]
+    slid = _contribution(cause, acting, sources, context)(np.ones(1), context.parameters)
+    travelling = [source for source, acts in zip(sources, acting, strict=True) if acts]
+    held = [adhesion(context.inputs(source), cause.wheels, context.setting(source)) for source in travelling]
+    friction = max(held, default=0.0) / ALONG
+    return Candidate(
+        effect=cause.name,
+        where=cause.where,
+        parameters=placed_parameters(cause.name, cause.where),
+        variants=(Variant(tuple(_side_by_side([column]) for column in slid), lambda _: np.array([friction])),),
+        least=0.0,
+        spread=(friction * ALONG_STD / ALONG,),
     )
 
 
@@ -395,10 +438,24 @@ def _picked(columns: list[int], tables: Sequence[Array]) -> tuple[Array | None, 
     return tuple(block if np.any(block) else None for block in blocks)
 
 
-def _probed(cause: TransformCause, sources: Sequence[Source], context: Context) -> tuple[Array | None, ...]:
-    probe, everywhere = np.array([cause.probe]), [True] * len(sources)
-    changes = _contribution(cause, everywhere, sources, context)(probe, context.parameters)
-    return tuple(None if change is None else change[:, None] / cause.probe for change in changes)
+def _probed(cause: TransformCause, sources: Sequence[Source], context: Context) -> Iterator[Variant]:
+    """The effect alone, then with what may come along."""
+    exact = _contribution(cause, [True] * len(sources), sources, context)
+    changes: list[Sequence[Array | None]] = []
+    for place, probe in enumerate(cause.probes):
+        sizes = np.zeros(len(cause.probes))
+        sizes[place] = probe
+        found = exact(sizes, context.parameters)
+        changes.append([None if change is None else change / probe for change in found])
+        yield Variant(tuple(_side_by_side(columns) for columns in zip(*changes, strict=True)))
+
+
+def _side_by_side(columns: Sequence[Array | None]) -> Array | None:
+    """Columns (N,) as one array, None for zeros; None where all are."""
+    there = [column for column in columns if column is not None]
+    if not there:
+        return None
+    return np.stack([np.zeros_like(there[0]) if column is None else column for column in columns], axis=1)
 
 
 def _contribution(
@@ -428,7 +485,6 @@ def _change(cause: Cause, source: Source, context: Context, values: Array, param
         exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)
         after = exact(inputs, *context.constants, values)
     else:
-        setting = Setting(context.geometry, parameters, source.sample_time)
-        changed = cause.transform(inputs, cause.place, float(values[0]), setting)
+        changed = cause.without(inputs, values, context.setting(source))
         after = plain(changed, *context.constants, np.zeros(0))
     return np.asarray((after - before)[..., 0])

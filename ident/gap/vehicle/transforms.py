@@ -27,7 +27,7 @@ MOTOR_SHARE: Final = 0.5
 """Share of B_w taken to lie on the motor's side of a gear that gives way."""
 
 LOAD_CUTOFF: Final = 150.0
-"""Of the filter on the torque that twists a gear or coupling [rad/s], which is differentiated twice."""
+"""Of the filter on the torque that twists a coupling [rad/s], which is differentiated twice."""
 
 CONTACT_SHARE: Final = 0.25
 """Load at which tooth flanks are taken to touch, in units of the joint's Coulomb friction: play is crossed below."""
@@ -51,18 +51,20 @@ class Setting:
         return float(self.parameters[PARAMETER_NAMES.index(name)])
 
 
-Transform = Callable[[Array, int, float, Setting], Array]
-"""Inputs (N, INPUTS), index of the place, size, setting -> inputs without the effect."""
+Transform = Callable[[Array, int, Array, Setting], Array]
+"""Inputs (N, INPUTS), index of the place, sizes (k,), setting -> inputs without the effect."""
 
 
-def _later_torque(inputs: Array, place: int, delay: float, setting: Setting) -> Array:
+def _later_torque(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
+    (delay,) = sizes
     changed = inputs.copy()
     column = SLICES["torques"].start + place
     changed[:, column] = shifted(inputs[:, column], delay, setting.sample_time)
     return changed
 
 
-def _earlier_angle(inputs: Array, place: int, delay: float, setting: Setting) -> Array:
+def _earlier_angle(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
+    (delay,) = sizes
     changed = inputs.copy()
     for name in ("alpha", "alpha_rate", "alpha_acceleration"):
         column = SLICES[name].start + place
@@ -70,30 +72,39 @@ def _earlier_angle(inputs: Array, place: int, delay: float, setting: Setting) ->
     return changed
 
 
-def _soft_gear(inputs: Array, place: int, compliance: float, setting: Setting) -> Array:
+def _soft_gear(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
+    (compliance,) = sizes
     return _behind_motor(inputs, place, compliance * _gear_load(inputs, place, setting), setting)
 
 
-def _gear_with_play(inputs: Array, place: int, gap: float, setting: Setting) -> Array:
-    flank = np.tanh(_gear_load(inputs, place, setting) / (CONTACT_SHARE * setting["d_cw"]))
-    return _behind_motor(inputs, place, gap / 2 * flank, setting)
+def _gear_with_play(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
+    """Play, and the compliance of its flanks: no contact is rigid."""
+    gap, compliance = sizes
+    load = _gear_load(inputs, place, setting)
+    flank = np.tanh(load / (CONTACT_SHARE * setting["d_cw"]))
+    return _behind_motor(inputs, place, gap / 2 * flank + compliance * load, setting)
 
 
-def _soft_coupling(inputs: Array, place: int, compliance: float, setting: Setting) -> Array:
+def _soft_coupling(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
+    (compliance,) = sizes
     return _rear_behind_front(inputs, place, compliance * _coupling_load(inputs, place, setting), setting)
 
 
-def _coupling_with_play(inputs: Array, place: int, gap: float, setting: Setting) -> Array:
+def _coupling_with_play(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
+    (gap,) = sizes
     friction = setting[("d_cl", "d_cr")[place]]
     flank = np.tanh(_coupling_load(inputs, place, setting) / (CONTACT_SHARE * friction))
     return _rear_behind_front(inputs, place, gap / 2 * flank, setting)
 
 
 def _gear_load(inputs: Array, wheel: int, setting: Setting) -> Array:
-    """Torque through the gear of a wheel (N,) [Nm at the wheel]."""
+    """Torque through the gear of a wheel (N,) [Nm at the wheel], as fast as the signals show it.
+
+    A motor that rattles in its play touches both flanks many times a second, and a smoothed load shows neither.
+    """
     drive = setting.geometry.gear_ratio * inputs[:, SLICES["torques"].start + wheel]
     inertia = MOTOR_SHARE * setting["B_w"] * inputs[:, SLICES["beta_acceleration"].start + wheel]
-    return zero_phase(drive - inertia, LOAD_CUTOFF, setting.sample_time)
+    return np.asarray(drive - inertia)
 
 
 def _coupling_load(inputs: Array, side: int, setting: Setting) -> Array:
@@ -112,10 +123,13 @@ def _contact_force(inputs: Array, wheel: int, setting: Setting) -> Array:
 
 
 def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> Array:
+    """The wheel instead of the motor; what the motor's own inertia takes more than at the wheel's pace is lost."""
     changed, rate = inputs.copy(), differentiate(twist, setting.sample_time)
-    for name, change in (("beta", twist), ("beta_rate", rate)):
+    acceleration = differentiate(rate, setting.sample_time)
+    for name, change in (("beta", twist), ("beta_rate", rate), ("beta_acceleration", acceleration)):
         changed[:, SLICES[name].start + wheel] -= change
-    changed[:, SLICES["beta_acceleration"].start + wheel] -= differentiate(rate, setting.sample_time)
+    own = MOTOR_SHARE * setting["B_w"] / setting.geometry.gear_ratio
+    changed[:, SLICES["torques"].start + wheel] -= own * acceleration
     return changed
 
 
@@ -134,25 +148,32 @@ class TransformCause:
         name, where: which.
         place: index of the drive or side.
         transform: takes the effect out of the inputs.
-        probe: a small size, at which the columns are taken.
+        probes: small sizes (k,) at which the columns are taken: the effect's own first, behind it those of what may
+            come along with it.
     """
 
     name: EffectName
     where: str
     place: int
     transform: Transform
-    probe: float
+    probes: tuple[float, ...]
+
+    def without(self, inputs: Array, sizes: Array, setting: Setting) -> Array:
+        """Inputs (N, INPUTS) without the effect; what it is not given a size for does not come along."""
+        padded = np.zeros(len(self.probes))
+        padded[: len(sizes)] = sizes
+        return self.transform(inputs, self.place, padded, setting)
 
 
 _DRIVE, _SIDE = "drive", "side"
-_TRANSFORMS: Final[Mapping[tuple[EffectName, str], tuple[Transform, float]]] = MappingProxyType(
+_TRANSFORMS: Final[Mapping[tuple[EffectName, str], tuple[Transform, tuple[float, ...]]]] = MappingProxyType(
     {
-        (EffectName.TIME_DELAY, _DRIVE): (_later_torque, 1e-3),
-        (EffectName.TIME_DELAY, _SIDE): (_earlier_angle, 1e-3),
-        (EffectName.ELASTICITY, _DRIVE): (_soft_gear, 1e-4),
-        (EffectName.ELASTICITY, _SIDE): (_soft_coupling, 1e-5),
-        (EffectName.BACKLASH, _DRIVE): (_gear_with_play, 1e-3),
-        (EffectName.BACKLASH, _SIDE): (_coupling_with_play, 1e-3),
+        (EffectName.TIME_DELAY, _DRIVE): (_later_torque, (1e-3,)),
+        (EffectName.TIME_DELAY, _SIDE): (_earlier_angle, (1e-3,)),
+        (EffectName.ELASTICITY, _DRIVE): (_soft_gear, (1e-4,)),
+        (EffectName.ELASTICITY, _SIDE): (_soft_coupling, (1e-5,)),
+        (EffectName.BACKLASH, _DRIVE): (_gear_with_play, (1e-3, 1e-5)),
+        (EffectName.BACKLASH, _SIDE): (_coupling_with_play, (1e-3,)),
     }
 )
 

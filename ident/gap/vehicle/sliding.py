@@ -1,0 +1,136 @@
+"""Wheels that slide on the floor: where, and by how much they run ahead of it.
+
+Dry friction acts against the sliding velocity, so a wheel slides the way its traction points, and only then. When it
+begins to slide and when it ends is decided by forces that no record holds: the wheels of a vehicle never point to one
+centre exactly, and what they push each other aside with fills part of every friction cone. So the sliding is not
+foretold but found: a wheel slides as long as it runs ahead of what the others roll, in the direction of its traction,
+by more than creep. How far a friction coefficient can be told from that, see `ALONG`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from ident.estimate.filters import differentiate, zero_phase
+from ident.gap.vehicle.rows import SLICES
+from ident.gap.vehicle.transforms import LOAD_CUTOFF, Setting
+from ident.vehicle import kinematics
+from ident.vehicle.effect_terms import GRAVITY
+from ident.vehicle.effects import CHASSIS, WHEEL_PLACES, EffectName
+from ident.vehicle.parameters import COULOMB_EPSILON
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+CREEPING: Final = 3e-4
+"""Part of its speed by which a wheel that rolls may run ahead: sliding begins and ends there [-]."""
+
+SLIDING: Final = 5e-3
+"""Part of its speed that a wheel must run ahead by, at some time between, for it to have slid [-]."""
+
+LEAST: Final = 1e-3
+"""Speed that it must run ahead by as well [m/s]."""
+
+ALONG: Final = 0.8
+"""Part of the friction cone that the traction has filled when a wheel slides; the rest acts across its plane [-]."""
+
+ALONG_STD: Final = 0.12
+"""Of `ALONG`: between three fifths and all of the cone."""
+
+
+@dataclass(frozen=True)
+class SlidingCause:
+    """Low friction at a place.
+
+    Attributes:
+        where: the chassis, which is the floor under all wheels, or one wheel.
+        wheels: numbers of those.
+    """
+
+    where: str
+    wheels: tuple[int, ...]
+    name: EffectName = EffectName.SLIP
+
+    def without(self, inputs: Array, sizes: Array, setting: Setting) -> Array:
+        """Inputs (N, INPUTS) as if the wheels had rolled, apart from the part 1 - `sizes[0]` of their sliding."""
+        changed = inputs.copy()
+        slid = self.sliding(inputs, setting)
+        for wheel, ahead in zip(self.wheels, slid.T, strict=True):
+            _roll(changed, wheel, sizes[0] * ahead / setting.geometry.wheel_radius, setting)
+        return changed
+
+    def sliding(self, inputs: Array, setting: Setting) -> Array:
+        """Speed of each contact over the floor along the plane of its wheel (N, wheels) [m/s]; zero where it rolls.
+
+        The wheels of a slippery floor have none that surely rolls: the one that is least ahead is taken to. A single
+        one that slides is no sign of a slippery floor.
+        """
+        pull = np.stack([traction(inputs, wheel, setting) for wheel in self.wheels], axis=1)
+        speed = setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, self.wheels]
+        if len(self.wheels) == 1:
+            forward = np.sign(pull) * ahead_of_others(inputs, setting, self.wheels[0])[:, self.wheels]
+        else:
+            forward = np.sign(pull) * ahead_of_others(inputs, setting)
+            forward = forward - forward.min(axis=1, keepdims=True)
+        slides = np.stack([_slides(*columns) for columns in zip(forward.T, np.abs(speed).T, strict=True)], axis=1)
+        if np.sum(slides.any(axis=0)) < min(2, len(self.wheels)):
+            return np.zeros_like(forward)
+        return np.where(slides, np.sign(pull) * forward, 0.0)
+
+
+def sliding_causes() -> list[SlidingCause]:
+    """Each wheel, and the floor."""
+    return [sliding_cause(where) for where in (*WHEEL_PLACES, *CHASSIS)]
+
+
+def sliding_cause(where: str) -> SlidingCause:
+    """One of them."""
+    return SlidingCause(where, (WHEEL_PLACES.index(where),) if where in WHEEL_PLACES else tuple(range(4)))
+
+
+def adhesion(inputs: Array, wheels: tuple[int, ...], setting: Setting) -> float:
+    """Largest traction of some wheels over a quarter of the weight [-]."""
+    pulls = [np.abs(traction(inputs, wheel, setting)).max(initial=0.0) for wheel in wheels]
+    return float(max(pulls)) / (setting["m_ch"] * GRAVITY / 4)
+
+
+def traction(inputs: Array, wheel: int, setting: Setting) -> Array:
+    """Force of the floor on a wheel along its plane (N,), positive where it drives forward [N]."""
+    rate, acceleration = (inputs[:, SLICES[name].start + wheel] for name in ("beta_rate", "beta_acceleration"))
+    lost = setting["d_vw"] * rate + setting["d_cw"] * np.tanh(rate / COULOMB_EPSILON) + setting["B_w"] * acceleration
+    drive = setting.geometry.gear_ratio * inputs[:, SLICES["torques"].start + wheel]
+    return zero_phase((drive - lost) / setting.geometry.wheel_radius, LOAD_CUTOFF, setting.sample_time)
+
+
+def ahead_of_others(inputs: Array, setting: Setting, wheel: int | None = None) -> Array:
+    """Speed (N, 4) [m/s] that the wheels run ahead of the floor, its twist by odometry; without one wheel, if given."""
+    matrix = kinematics.constraint_matrix(inputs[:, SLICES["alpha"]], setting.geometry)
+    rates = np.hstack([inputs[:, SLICES["alpha_rate"]], inputs[:, SLICES["beta_rate"]]])
+    kept = [row for row in range(8) if wheel is None or row != 4 + wheel]
+    chassis, measured = matrix[:, :, :3], np.einsum("nij,nj->ni", matrix[:, :, 3:], rates)
+    used = chassis[:, kept]
+    normal = np.einsum("nki,nkj->nij", used, used)
+    twist = -np.linalg.solve(normal, np.einsum("nki,nk->ni", used, measured[:, kept])[..., None])
+    left = (chassis @ twist)[:, 4:, 0] + measured[:, 4:]
+    return zero_phase(-left, LOAD_CUTOFF, setting.sample_time)
+
+
+def _slides(forward: Array, speed: Array) -> Mask:
+    """Stretches (N,) in which a wheel runs ahead, forward of its traction, and somewhere by more than creep."""
+    ahead, _ = ndimage.label(forward > CREEPING * speed)
+    sure = (forward > SLIDING * speed) & (forward > LEAST)
+    return np.asarray(np.isin(ahead, np.unique(ahead[sure])) & (ahead > 0))
+
+
+def _roll(inputs: Array, wheel: int, ahead: Array, setting: Setting) -> None:
+    """Take `ahead` (N,) [rad/s] off a wheel, and off its drive what it took."""
+    more = differentiate(ahead, setting.sample_time)
+    inputs[:, SLICES["beta_rate"].start + wheel] -= ahead
+    inputs[:, SLICES["beta_acceleration"].start + wheel] -= more
+    torque = setting["d_vw"] * ahead + setting["B_w"] * more
+    inputs[:, SLICES["torques"].start + wheel] -= torque / setting.geometry.gear_ratio
