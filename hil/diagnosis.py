@@ -98,7 +98,8 @@ def diagnose_records(order: DiagnosisOrder, console: Console) -> Diagnosis:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     if order.report is not None:
         fitted, confirmed = ([str(path) for path in paths] for paths in (order.records, order.confirm))
-        write_gap_report(GapReport(answer.findings, answer.diagnosis, fitted, confirmed), order.report)
+        model = None if order.model is None else str(order.model)
+        write_gap_report(GapReport(answer.findings, answer.diagnosis, fitted, confirmed, model), order.report)
     if order.json is not None:
         write_diagnosis(answer.diagnosis, order.json)
     written = [str(path) for path in (order.json, order.report) if path is not None]

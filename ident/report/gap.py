@@ -22,6 +22,10 @@ BIASED: Final = 2.0
 """Shift of a parameter, in standard deviations, from which it is said to be biased."""
 
 
+REPEATS: Final = 0.05
+"""What repeats, in units of the noise, from which it is worth a line."""
+
+
 @dataclass(frozen=True)
 class GapReport:
     """What the page is made of.
@@ -30,12 +34,14 @@ class GapReport:
         findings: everything that was found.
         diagnosis: the answer.
         records, confirm: names of the records.
+        model: name of the model that was given to be judged; None where the parameters were refitted.
     """
 
     findings: Findings
     diagnosis: Diagnosis
     records: Sequence[str]
     confirm: Sequence[str]
+    model: str | None = None
 
 
 @dataclass(frozen=True)
@@ -94,6 +100,7 @@ def render_gap_report(content: GapReport) -> str:
         repeated=_repeated(findings),
         significance=findings.significance,
         invisible=diagnosis.invisible,
+        judged=content.model,
         records=content.records,
         confirm=content.confirm,
         has_map="map" in figures,
@@ -153,8 +160,10 @@ def _parameters(findings: Findings) -> list[tuple[str, str, str, str]]:
 
 
 def _repeated(findings: Findings) -> list[tuple[str, float, float]]:
-    after = findings.repeated_after
-    return [(label, before, after.get(label, 0.0)) for label, before in findings.repeated_before.items()]
+    """Coordinates with something that repeats, before or after."""
+    found, after = findings.repeated_before, findings.repeated_after
+    pairs = [(label, before, after.get(label, 0.0)) for label, before in found.items()]
+    return [(label, before, now) for label, before, now in pairs if max(before, now) >= REPEATS]
 
 
 def _json(value: Any) -> Markup:

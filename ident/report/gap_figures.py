@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -11,9 +12,10 @@ from numpy.typing import NDArray
 
 from ident.gap.diagnosis import Share
 from ident.gap.judge import Findings
-from ident.gap.problem import Block
-from ident.gap.rows import kept_rows
-from ident.report.digits import percent, unit_text
+from ident.gap.problem import Block, Channel
+from ident.gap.remainder import ALL, noise_floors
+from ident.gap.rows import kept_rows, make_rows
+from ident.report.digits import percent, significant, unit_text
 from ident.report.figures import MODELLED, RESIDUAL, packed
 
 Array = NDArray[np.float64]
@@ -21,15 +23,24 @@ Figure = dict[str, Any]
 
 MOST_RESIDUALS: Final = 12
 MOST_SAMPLES: Final = 3000
+LEAST_SHARE: Final = 1e-3
+"""Share of the gap below which a coordinate is left out of the map."""
+REGIONS: Final = (
+    ALL,
+    *("low_speed", "high_speed", "forward", "backward", "speeding_up", "braking", "high_acceleration"),
+    *("behind", "ahead", "lower_half_of_travel", "upper_half_of_travel", "high_load", "early", "late"),
+)
+"""Across the map."""
 SCALE: Final = ((0.0, "rgba(217,102,15,0.04)"), (0.5, "rgba(217,102,15,0.55)"), (1.0, "rgba(217,102,15,1)"))
 """From nothing to the accent of residuals; readable on white and on near-black."""
 
 
 def map_figure(shares: Sequence[Share]) -> Figure:
-    """Share of the gap by step and coordinate (down) and region (across)."""
-    rows = list(dict.fromkeys((share.step, share.coordinate, share.channel) for share in shares))
-    columns = sorted(dict.fromkeys(share.region for share in shares), key=lambda region: (region != "all", region))
-    values = {((share.step, share.coordinate, share.channel), share.region): share.share for share in shares}
+    """Share of the gap by step and coordinate (down, those that matter) and region (across)."""
+    whole = {_row(share): share.share for share in shares if share.region == ALL}
+    rows = [row for row, share in whole.items() if share >= LEAST_SHARE] or list(whole)[:1]
+    columns = sorted(dict.fromkeys(share.region for share in shares), key=_place)
+    values = {(_row(share), share.region): share.share for share in shares}
     table = [[values.get((row, column)) for column in columns] for row in rows]
     texts = [["" if value is None else percent(value) for value in line] for line in table]
     heat = {
@@ -54,24 +65,38 @@ def map_figure(shares: Sequence[Share]) -> Figure:
     return {"data": [heat], "layout": layout}
 
 
+def _row(share: Share) -> tuple[str, str, str]:
+    return share.step, share.coordinate, share.channel
+
+
+def _place(region: str) -> tuple[int, str]:
+    """Opposites beside each other, what is not in the list behind."""
+    return REGIONS.index(region) if region in REGIONS else len(REGIONS), region
+
+
 def residual_figures(findings: Findings) -> list[tuple[str, str, Figure]]:
-    """Key, title and figure of the coordinates with the largest gap: what the model leaves, before and after."""
+    """Key, title and figure of what the model leaves, before and after; the largest gap over its noise first."""
     drawn: list[tuple[str, str, Figure]] = []
     blocks = findings.problem.blocks
-    order = np.argsort([-_size(block, model) for block, model in zip(blocks, findings.before.blocks, strict=False)])
-    for index in order[:MOST_RESIDUALS].tolist():
+    before, after = findings.before.blocks[: len(blocks)], findings.after.blocks[: len(blocks)]
+    rows = make_rows(replace(findings.problem, candidates=()))
+    floors = noise_floors(rows, after, rows.target - rows.stack(list(after)))
+    sizes = [_size(*one) for one in zip(blocks, before, floors.tolist(), strict=True)]
+    for index in np.argsort(sizes)[::-1][:MOST_RESIDUALS].tolist():
         block = blocks[index]
-        models = {"before": findings.before.blocks[index]}
+        models = {"before": before[index]}
         if findings.causes:
-            models["with the causes"] = findings.after.blocks[index]
-        drawn.append((f"residual-{index}", f"{block.step} · {block.coordinate}", _residual(block, models)))
+            models["with the causes"] = after[index]
+        channel = "" if block.channel is Channel.DYNAMIC else f" ({block.channel})"
+        title = f"{block.step} · {block.coordinate}{channel}: {significant(sizes[index], 2)} times the noise"
+        drawn.append((f"residual-{index}", title, _residual(block, models)))
     return drawn
 
 
-def _size(block: Block, model: Array) -> float:
-    left = (block.target - model)[block.moving]
-    scale = float(np.sqrt(np.mean(block.target[block.moving] ** 2))) if left.size else 0.0
-    return float(np.sqrt(np.mean(left**2))) / scale if scale > 0 else 0.0
+def _size(block: Block, model: Array, floor: float) -> float:
+    """Rms over the noise of the gap as it is drawn, repeats averaged."""
+    left = kept_rows(block).mean(block.target - model)
+    return float(np.sqrt(np.mean(left**2))) / floor if left.size else 0.0
 
 
 def _residual(block: Block, models: Mapping[str, Array]) -> Figure:

@@ -45,10 +45,13 @@ class Series:
 
 
 def extended_model(findings: Findings) -> ExtendedModel:
-    """The parameters refitted jointly with the effects that were found, and these effects."""
+    """The parameters refitted jointly with the effects that were found, and these effects.
+
+    A changed parameter is none of them: its new value is among the parameters.
+    """
     refit = findings.after
     effects = []
-    for cause in findings.causes:
+    for cause in (cause for cause in findings.causes if not cause.candidate.drift):
         names = [entry.name for entry in cause.candidate.parameters]
         values = dict(zip(names, cause.part.values.tolist(), strict=True))
         std = dict(zip(names, cause.part.std.tolist(), strict=True))
