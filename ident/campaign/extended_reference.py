@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import integrate
 
+from ident.campaign.feed_forward import Course, feed_forward
 from ident.campaign.reference import STEERING_LOOPS, Reference
-from ident.vehicle.extended import Course, ExtendedModel, feed_forward
+from ident.vehicle.extended import ExtendedModel
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.modes import Mode, virtual_steering
 
@@ -39,4 +40,5 @@ def with_effects(reference: Reference, model: ExtendedModel, geometry: Geometry)
         velocities=velocities,
         accelerations=np.gradient(velocities, dt, axis=0),
     )
-    return replace(reference, feed_forward=feed_forward(model, course, reference.feed_forward, geometry, dt))
+    demand = feed_forward(model, course, reference.feed_forward, geometry, dt)
+    return replace(reference, feed_forward=demand.torques)

@@ -1,4 +1,4 @@
-"""A model of the platform with effects: parameters and `[[effects]]` of one file, and the torques that they ask for."""
+"""A model of the platform with effects: parameters and `[[effects]]` of one file."""
 
 from __future__ import annotations
 
@@ -8,31 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.vehicle import symbolic
-from ident.vehicle.effect_terms import (
-    TERMS,
-    EffectTerm,
-    State,
-    added_forces,
-    changed_parameters,
-    on_radii,
-    rolling_radii,
-    shaft_torques,
-    term_of,
-)
+from ident.vehicle.effect_terms import TERMS, EffectTerm, term_of
 from ident.vehicle.effect_text import effects_text, read_effects
-from ident.vehicle.effects import DRIVES, Effect, EffectName
-from ident.vehicle.geometry import Geometry
-from ident.vehicle.kinematics import GENERALIZED_VELOCITIES
-from ident.vehicle.modes import Mode
-from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES, PARAMETER_UNITS, Parameters, read_parameters
+from ident.vehicle.effects import DRIVES, ENCODERS, STEERING, Effect, EffectName
+from ident.vehicle.flexible import Spring
+from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters, read_parameters
 from ident.vehicle.quantities import read_toml
-from ident.vehicle.symbolic import Expression
-from ident.vehicle.vectorised import Vectorised
 
 Array = NDArray[np.float64]
 
@@ -56,13 +40,38 @@ class ExtendedModel:
         """The effects that are terms of the equations."""
         return [term_of(effect) for effect in self.effects if effect.name in TERMS]
 
-    def delays(self) -> Array:
+    @property
+    def springs(self) -> tuple[Spring, ...]:
+        """Gears, then couplings of the steering, that give way; compliance and play of one place are one spring."""
+        found = []
+        for places in (DRIVES, STEERING):
+            compliances = self._sizes(EffectName.ELASTICITY, places)
+            gaps = self._sizes(EffectName.BACKLASH, places)
+            found += [
+                Spring(places is DRIVES, place, float(compliance), float(gap))
+                for place, (compliance, gap) in enumerate(zip(compliances, gaps, strict=True))
+                if compliance or gap
+            ]
+        return tuple(found)
+
+    def drive_delays(self) -> Array:
         """Dead times (4,) of the drives [s]."""
-        delays = np.zeros(4)
+        return self._sizes(EffectName.TIME_DELAY, DRIVES)
+
+    def encoder_delays(self) -> Array:
+        """Dead times (2,) of the steering encoders [s]."""
+        return self._sizes(EffectName.TIME_DELAY, ENCODERS)
+
+    def encoder_offsets(self) -> Array:
+        """Zero errors (2,) of the steering encoders [rad]."""
+        return self._sizes(EffectName.STEERING_OFFSET, STEERING)
+
+    def _sizes(self, name: EffectName, places: Sequence[str]) -> Array:
+        sizes = np.zeros(len(places))
         for effect in self.effects:
-            if effect.name is EffectName.TIME_DELAY and effect.where in DRIVES:
-                delays[DRIVES.index(effect.where)] += effect.size
-        return delays
+            if effect.name is name and effect.where in places:
+                sizes[places.index(effect.where)] += effect.size
+        return sizes
 
 
 def read_model(path: Path) -> ExtendedModel:
@@ -90,90 +99,3 @@ def write_model(model: ExtendedModel, path: Path, provenance: Mapping[str, str])
     temporary = path.with_suffix(".tmp")
     temporary.write_text(model_text(model, provenance), encoding="utf-8")
     temporary.replace(path)
-
-
-@dataclass(frozen=True)
-class Course:
-    """A motion in one mode.
-
-    Attributes:
-        mode: k.
-        heading: (N,) [rad].
-        alpha: (N, 2) [rad].
-        beta: (N, 4) [rad].
-        velocities, accelerations: ṡ_k, s̈_k (N, n_k).
-    """
-
-    mode: Mode
-    heading: Array
-    alpha: Array
-    beta: Array
-    velocities: Array
-    accelerations: Array
-
-
-def feed_forward(model: ExtendedModel, course: Course, plain: Array, geometry: Geometry, sample_time: float) -> Array:
-    """Motor torques (N, 4) [Nm] for a motion of a vehicle with effects.
-
-    What the effects ask for at a wheel or a steering side is given there, the rest by the pseudoinverse as in (21);
-    drives that are late are asked earlier.
-
-    Args:
-        model: with its effects.
-        course: desired motion.
-        plain: torques (N, 4) that the plain model with the same parameters gives, however distributed.
-        geometry: of the vehicle.
-        sample_time: of the course [s].
-    """
-    function = _torques_function(course.mode, model.terms)
-    torques = function(
-        course.heading[:, None],
-        course.alpha,
-        course.beta,
-        course.velocities,
-        course.accelerations,
-        plain,
-        model.parameters.values,
-        geometry.as_vector(),
-        np.array([COULOMB_EPSILON]),
-    )[..., 0]
-    return _earlier(torques, model.delays(), sample_time)
-
-
-def _torques_function(mode: Mode, terms: Sequence[EffectTerm]) -> Vectorised:
-    width = len(GENERALIZED_VELOCITIES[mode])
-    heading, alpha, beta, plain = (ca.SX.sym(name, size) for name, size in (("γ", 1), ("α", 2), ("β", 4), ("u", 4)))
-    velocity, acceleration = ca.SX.sym("v", width), ca.SX.sym("a", width)
-    p = ca.SX.sym("p", len(PARAMETER_NAMES))
-    H = on_radii(symbolic.complement(mode, alpha), rolling_radii(terms, beta))
-    rates = H @ velocity
-    accelerations = ca.jtimes(rates, alpha, rates[3:5]) + ca.jtimes(rates, beta, rates[5:]) + H @ acceleration
-    state = State(heading, alpha, beta, rates, accelerations)
-    forces = added_forces(terms, state, p)
-    wanted = H.T @ (symbolic.regressor(rates, accelerations) @ changed_parameters(terms, p) + forces)
-    driven = H.T @ symbolic.input_matrix()
-    local = plain + _at_its_place(forces)
-    torques = local + driven.T @ ca.solve(driven @ driven.T, wanted - driven @ local)
-    inputs = [heading, alpha, beta, velocity, acceleration, plain, p, symbolic.GEOMETRY, symbolic.EPSILON]
-    return Vectorised(ca.Function("torques", inputs, [ca.cse(ca.densify(_asked(terms, torques, beta)))]))
-
-
-def _at_its_place(forces: Expression) -> Expression:
-    """Motor torques (4,) against friction of wheels and steering sides, each by the wheels concerned."""
-    lengths = symbolic.LENGTHS
-    left, right = (forces[row] * lengths.r / (2 * lengths.a * lengths.i_G) for row in (3, 4))
-    return forces[5:] / lengths.i_G + ca.vertcat(-left, left, right, -right)
-
-
-def _asked(terms: Sequence[EffectTerm], torques: Expression, beta: Expression) -> Expression:
-    """Torques that the drives must believe to give for these to act at their shafts: `shaft_torques` backwards."""
-    reported = ca.SX.sym("reported", 4)
-    true = shaft_torques(terms, reported, beta)
-    offset = ca.substitute(true, reported, ca.SX.zeros(4))
-    return ca.solve(ca.jacobian(true, reported), torques - offset)
-
-
-def _earlier(torques: Array, delays: Array, sample_time: float) -> Array:
-    time = np.arange(len(torques)) * sample_time
-    moved = [np.interp(time + delay, time, column) for column, delay in zip(torques.T, delays, strict=True)]
-    return np.stack(moved, axis=1)

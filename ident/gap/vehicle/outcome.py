@@ -1,4 +1,8 @@
-"""The outcome channel: the model simulated forward with the recorded torques, set back to the recorded state often."""
+"""The outcome channel: the model simulated forward with the recorded torques, set back to the recorded state often.
+
+What is compared is what encoders read: on motors behind gears that give way, on wheels of a radius of their own. Only
+a steering encoder that is late or misadjusted is put right in the record.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +15,12 @@ from numpy.typing import NDArray
 from ident.gap.problem import Channel
 from ident.gap.vehicle.build import Source
 from ident.gap.vehicle.rows import SLICES
+from ident.gap.vehicle.signals import shifted
 from ident.vehicle import kinematics
 from ident.vehicle.extended import ExtendedModel
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.kinematics import GENERALIZED_VELOCITIES
-from ident.vehicle.simulation import Motion, Simulation
+from ident.vehicle.simulation import Motion, Readings, Simulation
 
 Array = NDArray[np.float64]
 
@@ -50,18 +55,21 @@ def outcomes(source: Source, model: ExtendedModel, geometry: Geometry) -> list[O
     starts, repeat, place = _starts(source, length)
     if not len(starts):
         return []
-    inputs = source.inputs[starts[:, None] + np.arange(length)]
-    recorded = _velocities(source, inputs, geometry)
+    inputs = without_encoder_errors(source.inputs, model, source.sample_time)[starts[:, None] + np.arange(length)]
+    read = Readings(inputs[..., SLICES["alpha_rate"]], inputs[..., SLICES["beta_rate"]])
+    recorded = _velocities(source, inputs, read, geometry)
     start = Motion(
         inputs[:, 0, SLICES["heading"].start],
         inputs[:, 0, SLICES["alpha"]],
         inputs[:, 0, SLICES["beta"]],
         recorded[:, 0],
     )
-    run = Simulation(model, mode, geometry).run(start, inputs[:, :, SLICES["torques"]], source.sample_time)
+    simulation = Simulation(model, mode, geometry)
+    run = simulation.run_from_readings(start, read, inputs[:, :, SLICES["torques"]], source.sample_time)
+    simulated = _velocities(source, inputs, run.readings, geometry)
     names = GENERALIZED_VELOCITIES[mode]
     return [
-        Outcome(source.step, name, (run - recorded)[:, 1:, names.index(name)], repeat, place)
+        Outcome(source.step, name, (simulated - recorded)[:, 1:, names.index(name)], repeat, place)
         for name in source.spec.coordinates
     ]
 
@@ -79,12 +87,22 @@ def _starts(source: Source, length: int) -> tuple[NDArray[np.int64], NDArray[np.
     return table[:, 0], table[:, 1], table[:, 2]
 
 
-def _velocities(source: Source, inputs: Array, geometry: Geometry) -> Array:
-    """ṡ_k (W, T, n_k) that the recorded joint rates stand for."""
+def without_encoder_errors(inputs: Array, model: ExtendedModel, sample_time: float) -> Array:
+    """Inputs (N, INPUTS) with the true steering angles in place of those that late or misadjusted encoders report."""
+    true = inputs.copy()
+    for side, (delay, offset) in enumerate(zip(model.encoder_delays(), model.encoder_offsets(), strict=True)):
+        for name in ("alpha", "alpha_rate", "alpha_acceleration"):
+            column = SLICES[name].start + side
+            true[:, column] = shifted(inputs[:, column], -float(delay), sample_time)
+        true[:, SLICES["alpha"].start + side] -= offset
+    return true
+
+
+def _velocities(source: Source, inputs: Array, read: Readings, geometry: Geometry) -> Array:
+    """ṡ_k (W, T, n_k) that rates of the joints, as their encoders read them, stand for at the recorded angles."""
     mode = source.spec.mode
     assert mode is not None
-    flat = inputs.reshape(-1, inputs.shape[-1])
-    H = kinematics.complement(mode, flat[:, SLICES["alpha"]], geometry)[:, 3:]
-    rates = np.hstack([flat[:, SLICES["alpha_rate"]], flat[:, SLICES["beta_rate"]]])
+    H = kinematics.complement(mode, inputs.reshape(-1, inputs.shape[-1])[:, SLICES["alpha"]], geometry)[:, 3:]
+    rates = np.concatenate([read.steering_rates, read.wheel_rates], axis=-1).reshape(-1, H.shape[1])
     solved = np.einsum("nij,nj->ni", np.linalg.pinv(H), rates)
     return np.asarray(solved.reshape(*inputs.shape[:2], -1))

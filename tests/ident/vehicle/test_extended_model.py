@@ -9,10 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy import integrate
 
+from ident.campaign.feed_forward import Course, feed_forward
 from ident.vehicle import dynamics, kinematics
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import Effect, EffectName, make_effect
-from ident.vehicle.extended import Course, ExtendedModel, feed_forward, read_model, write_model
+from ident.vehicle.extended import ExtendedModel, read_model, write_model
 from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import read_parameters
 from ident.vehicle.simulation import Motion, Simulation
@@ -58,7 +59,8 @@ def course_of(mode: Mode, vehicle: VehicleDescription) -> tuple[Course, Array]:
 
 def simulated(model: ExtendedModel, course: Course, torques: Array, vehicle: VehicleDescription) -> Array:
     start = Motion(course.heading[:1], course.alpha[:1], course.beta[:1], course.velocities[:1])
-    return Simulation(model, course.mode, vehicle.geometry).run(start, torques[None], SAMPLE_TIME)[0]
+    simulation = Simulation(model, course.mode, vehicle.geometry)
+    return np.asarray(simulation.run(start, torques[None], SAMPLE_TIME).velocities[0])
 
 
 @pytest.mark.parametrize("mode", list(Mode))
@@ -67,7 +69,7 @@ def test_torques_asked_for_give_the_motion_they_were_asked_for(mode: Mode, vehic
     model = ExtendedModel(vehicle.prior, EFFECTS)
     p, g = vehicle.prior.values, vehicle.geometry
     plain = dynamics.feed_forward(mode, course.alpha, course.velocities, course.accelerations, p, g)
-    torques = feed_forward(model, course, plain, g, SAMPLE_TIME)
+    torques = feed_forward(model, course, plain, g, SAMPLE_TIME).torques
     followed = simulated(model, course, torques, vehicle)
     scale = np.abs(course.velocities).max()
     assert np.abs(followed - course.velocities).max() < 1e-3 * scale
@@ -80,7 +82,9 @@ def test_without_effects_the_torques_are_those_of_the_plain_model(mode: Mode, ve
     course, _ = course_of(mode, vehicle)
     p, g = vehicle.prior.values, vehicle.geometry
     plain = dynamics.feed_forward(mode, course.alpha, course.velocities, course.accelerations, p, g)
-    assert np.allclose(feed_forward(ExtendedModel(vehicle.prior), course, plain, g, SAMPLE_TIME), plain, atol=1e-9)
+    asked = feed_forward(ExtendedModel(vehicle.prior), course, plain, g, SAMPLE_TIME)
+    assert np.allclose(asked.torques, plain, atol=1e-9)
+    assert not asked.twists.any()
 
 
 def test_coasting_ends_where_viscous_and_coulomb_friction_say(vehicle: VehicleDescription) -> None:
@@ -90,10 +94,9 @@ def test_coasting_ends_where_viscous_and_coulomb_friction_say(vehicle: VehicleDe
     time = np.arange(0, 0.5, SAMPLE_TIME)
     expected = (1.0 + dry / viscous) * np.exp(-viscous / mass * time) - dry / viscous
     start = Motion(np.zeros(1), np.zeros((1, 2)), np.zeros((1, 4)), np.array([[0.0, 1.0]]))
-    run = Simulation(ExtendedModel(p), Mode.STEERED, vehicle.geometry).run(
-        start, np.zeros((1, len(time), 4)), SAMPLE_TIME
-    )
-    assert np.allclose(run[0, :, 1], expected, atol=1e-5)
+    simulation = Simulation(ExtendedModel(p), Mode.STEERED, vehicle.geometry)
+    run = simulation.run(start, np.zeros((1, len(time), 4)), SAMPLE_TIME)
+    assert np.allclose(run.velocities[0, :, 1], expected, atol=1e-5)
 
 
 def test_runs_side_by_side_do_not_see_each_other(vehicle: VehicleDescription) -> None:
@@ -102,17 +105,16 @@ def test_runs_side_by_side_do_not_see_each_other(vehicle: VehicleDescription) ->
     one = Motion(np.zeros(1), np.zeros((1, 2)), np.zeros((1, 4)), speeds[1:])
     simulation = Simulation(ExtendedModel(vehicle.prior, EFFECTS), Mode.STEERED, vehicle.geometry)
     torques = np.full((2, 50, 4), 0.1)
-    assert np.array_equal(
-        simulation.run(both, torques, SAMPLE_TIME)[1], simulation.run(one, torques[:1], SAMPLE_TIME)[0]
-    )
+    together, alone = simulation.run(both, torques, SAMPLE_TIME), simulation.run(one, torques[:1], SAMPLE_TIME)
+    assert np.array_equal(together.velocities[1], alone.velocities[0])
 
 
 def test_a_late_drive_is_asked_earlier(vehicle: VehicleDescription) -> None:
     late = (make_effect(EffectName.TIME_DELAY, "drive_fl", {"delay": 0.01}),)
     course, time = course_of(Mode.ROTATION, vehicle)
     plain = np.tile(np.sin(3 * time)[:, None], 4)
-    none = feed_forward(ExtendedModel(vehicle.prior), course, plain, vehicle.geometry, SAMPLE_TIME)
-    asked = feed_forward(ExtendedModel(vehicle.prior, late), course, plain, vehicle.geometry, SAMPLE_TIME)
+    none = feed_forward(ExtendedModel(vehicle.prior), course, plain, vehicle.geometry, SAMPLE_TIME).torques
+    asked = feed_forward(ExtendedModel(vehicle.prior, late), course, plain, vehicle.geometry, SAMPLE_TIME).torques
     assert np.allclose(asked[:-5, 0], none[5:, 0])
     assert np.array_equal(asked[:, 1:], none[:, 1:])
 

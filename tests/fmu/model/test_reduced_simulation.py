@@ -1,0 +1,99 @@
+"""The reduced model with effects moves as the FMU of the same model, whose wheels creep instead of being held."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ident.estimate.filters import zero_phase
+from ident.vehicle import dynamics
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effects import Effect, EffectName, make_effect
+from ident.vehicle.extended import ExtendedModel
+from ident.vehicle.geometry import WHEELS
+from ident.vehicle.modes import Mode
+from ident.vehicle.simulation import Motion, Simulation, Trajectory
+
+Array = NDArray[np.float64]
+
+SAMPLE_TIME, DURATION, PARTS = 0.002, 0.8, 4
+CUTOFF = 60.0  # [rad/s]
+HELD_STEERING = {"d_cl": 1e3, "d_cr": 1e3}
+QUICK = {"stick_time": 1e9}
+"""The FMU's friction without its memory, which the reduced model does not have."""
+
+SOFT = make_effect(EffectName.ELASTICITY, "drive_fr", {"compliance": 2e-3})
+LOOSE = make_effect(EffectName.BACKLASH, "drive_fl", {"gap": 0.01})
+SOFT_SIDE = make_effect(EffectName.ELASTICITY, "steering_left", {"compliance": 5e-4})
+LOOSE_SIDE = make_effect(EffectName.BACKLASH, "steering_right", {"gap": 0.005})
+LATE = make_effect(EffectName.TIME_DELAY, "drive_rl", {"delay": 0.008})
+
+
+def swinging(mode: Mode, vehicle: VehicleDescription) -> tuple[Motion, Array]:
+    """A start at rest, and torques (N, 4) of a motion to and fro."""
+    time, omega = np.arange(0, DURATION, SAMPLE_TIME)[:, None], 2 * np.pi / DURATION
+    width = {Mode.ALIGNMENT: [0.3, 0.2], Mode.STEERED: [0.0, 0.02], Mode.LATERAL: [0.02], Mode.ROTATION: [0.02]}[mode]
+    velocity = np.array(width) * omega * (np.cos(omega * time) - np.cos(2 * omega * time))
+    acceleration = np.array(width) * omega**2 * (2 * np.sin(2 * omega * time) - np.sin(omega * time))
+    angle = {Mode.LATERAL: np.pi / 2, Mode.ROTATION: vehicle.geometry.rotation_angle}.get(mode, 0.0)
+    alpha = np.tile([-angle, angle], (len(time), 1))
+    torques = dynamics.feed_forward(mode, alpha, velocity, acceleration, vehicle.prior.values, vehicle.geometry)
+    torques[:2] = 0.0  # so that what gives way rests, in the FMU too
+    return Motion(np.zeros(1), alpha[:1], np.zeros((1, 4)), np.zeros((1, len(width)))), torques
+
+
+def reduced(
+    effects: tuple[Effect, ...], mode: Mode, vehicle: VehicleDescription, parameters: dict[str, float]
+) -> Trajectory:
+    start, torques = swinging(mode, vehicle)
+    model = ExtendedModel(vehicle.prior.replaced(**parameters), effects)
+    return Simulation(model, mode, vehicle.geometry).run(start, torques[None], SAMPLE_TIME)
+
+
+def in_the_fmu(core: Any, mode: Mode, **parameters: float) -> dict[str, Array]:
+    start, torques = swinging(mode, core.vehicle)
+    instance = core.new(alpha_l=start.alpha[0, 0], alpha_r=start.alpha[0, 1], **QUICK, **parameters)
+    names = [f"beta_{wheel}_dot" for wheel in WHEELS] + ["alpha_l_dot", "alpha_r_dot"]
+    twists = [row.name for row in core.table.variables if row.name.endswith("_twist_dot")]
+    found = [[instance[name] for name in names + twists]]
+    for before, after in pairwise(torques):
+        for part in range(PARTS):
+            share = (part + 0.5) / PARTS
+            instance.u[:4] = (1 - share) * before + share * after
+            instance.step(SAMPLE_TIME / PARTS)
+        found.append([instance[name] for name in names + twists])
+    return dict(zip(names + twists, np.array(found).T, strict=True))
+
+
+ELASTIC, PLAY = 0.15, 0.25
+"""Part of what the effect does that may be left. A motor bounces between flanks, which no two solvers do alike."""
+CASES = [
+    (Mode.STEERED, (SOFT, LATE), {}, ELASTIC),
+    (Mode.ROTATION, (LOOSE,), HELD_STEERING, PLAY),
+    pytest.param(Mode.LATERAL, (SOFT,), HELD_STEERING, ELASTIC, marks=pytest.mark.slow),
+    pytest.param(Mode.ALIGNMENT, (SOFT_SIDE,), {}, ELASTIC, marks=pytest.mark.slow),
+    (Mode.ALIGNMENT, (LOOSE_SIDE,), {}, PLAY),
+]
+
+
+@pytest.mark.parametrize(("mode", "effects", "parameters", "part"), CASES)
+def test_what_gives_way_or_is_late_moves_as_in_the_fmu(
+    core_of: Callable[..., Any], mode: Mode, effects: tuple[Effect, ...], parameters: dict[str, float], part: float
+) -> None:
+    core = core_of("prototype", effects)
+    fmu = in_the_fmu(core, mode, **parameters)
+    model, plain = (reduced(each, mode, core.vehicle, parameters).readings for each in (effects, ()))
+    motors = np.stack([fmu[f"beta_{w}_dot"] + fmu.get(f"gear_{w}_twist_dot", 0.0) for w in WHEELS], axis=1)
+    compared = [(motors, model.wheel_rates[0], plain.wheel_rates[0])]
+    if mode is Mode.ALIGNMENT:
+        steering = np.stack([fmu["alpha_l_dot"], fmu["alpha_r_dot"]], axis=1)
+        compared.append((steering, model.steering_rates[0], plain.steering_rates[0]))
+    for rates in compared:
+        expected, actual, without = (zero_phase(each, CUTOFF, SAMPLE_TIME) for each in rates)
+        effect, left = (np.sqrt(np.mean((expected - each) ** 2)) for each in (without, actual))
+        assert left < part * effect
