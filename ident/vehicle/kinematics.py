@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, Final
 
 import casadi as ca
 import numpy as np
@@ -12,8 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from ident.vehicle import symbolic
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.modes import Mode
+from ident.vehicle.vectorised import Vectorised
 
 Array = NDArray[np.float64]
+
+MANY: Final = 64
+"""Samples from which numpy, one operation at a time, is faster than CasADi, one sample at a time."""
 
 
 def evaluate(function: Any, shape: tuple[int, ...], *arguments: Array) -> Array:
@@ -30,11 +34,18 @@ def evaluate(function: Any, shape: tuple[int, ...], *arguments: Array) -> Array:
     samples = next(len(argument) for argument in arguments if argument.ndim == 2)
     if samples == 0:
         return np.zeros((0, *shape))
+    if samples >= MANY and all(argument.ndim == 1 or len(argument) == samples for argument in arguments):
+        return np.ascontiguousarray(_vectorised(function)(*arguments)).reshape(samples, *shape)
     columns = [argument.T if argument.ndim == 2 else argument for argument in arguments]
     flat = np.asarray(function(*columns))
     rows, width = (shape[0], shape[1]) if len(shape) == 2 else (shape[0], 1)
     stacked = flat.reshape(rows, samples, width).transpose(1, 0, 2)
     return np.ascontiguousarray(stacked).reshape(samples, *shape)
+
+
+@cache
+def _vectorised(function: Any) -> Vectorised:
+    return Vectorised(function)
 
 
 def samples_of(*values: ArrayLike) -> list[Array]:

@@ -469,22 +469,28 @@ def _contribution(
             if not acts:
                 found += [None] * len(source.coordinates)
                 continue
-            change = context.filtered(_change(cause, source, context, values, parameters), source)
-            found += [column if np.any(column) else None for column in change.T]
+            change = _change(cause, source, context, values, parameters)
+            if change is None:
+                found += [None] * len(source.coordinates)
+                continue
+            columns = context.filtered(change, source).T
+            found += [column if np.any(column) else None for column in columns]
         return found
 
     return contribution
 
 
-def _change(cause: Cause, source: Source, context: Context, values: Array, parameters: Array) -> Array:
-    """The same for one source before the filter (M, rows)."""
+def _change(cause: Cause, source: Source, context: Context, values: Array, parameters: Array) -> Array | None:
+    """The same for one source before the filter (M, rows); None where it is zero."""
     context = replace(context, parameters=parameters)
     inputs, plain = context.inputs(source), context.formulas.exact(source.channel, source.spec)
-    before = context.plain(source)
     if isinstance(cause, TermCause):
         exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)
         after = exact(inputs, *context.constants, values)
     else:
         changed = cause.without(inputs, values, context.setting(source))
+        seen = [element for argument, element in plain.inputs if argument == 0]
+        if np.array_equal(changed[:, seen], inputs[:, seen]):
+            return None
         after = plain(changed, *context.constants, np.zeros(0))
-    return np.asarray((after - before)[..., 0])
+    return np.asarray((after - context.plain(source))[..., 0])
