@@ -234,10 +234,10 @@ def _memory(effect: Effect) -> tuple[TransformCause | SlidingCause, Array]:
 
 
 def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], processing: Processing) -> list[Source]:
-    """Rows of a record that belong to the steps.
+    """Rows of a record that belong to the steps; of those in which nothing moves there are none.
 
     Raises:
-        RecordError: there are none.
+        RecordError: it has none of the steps, or moves in none of them.
     """
     found = [
         source
@@ -250,7 +250,13 @@ def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], proces
             f"{record.source} holds none of the steps of a diagnosis.",
             f"It needs some of {', '.join(steps)} by these names in the channel step.",
         )
-    return found
+    moving = [source for source in found if any(mask.any() for mask in source.moving)]
+    if not moving:
+        raise RecordError(
+            f"{record.source} does not move in any step of a diagnosis.",
+            "Record a drive: angles of wheels and steering must change.",
+        )
+    return moving
 
 
 def _spec(step: str, steps: Sequence[Step]) -> RowsOfStep | None:
