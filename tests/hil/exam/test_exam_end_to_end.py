@@ -1,4 +1,4 @@
-"""An exam of two cases from drawing to score, with the command line, in processes of their own."""
+"""An exam of three cases from drawing to score, with the command line, in processes of their own."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import sys
 import pytest
 
 from hil.exam.folder import RECORDS, ExamFolder, read_exam
+from hil.exam.score_names import FALSE_ALARMS, REJECTED, RIGHT
 from ident.records.files import read_record
 
 pytestmark = pytest.mark.slow
 
-CASES = ["--effects", "0", "--pairs", "0", "--none", "1", "--unknown", "1", "--invisible", "0"]
+CASES = ["--effects", "1", "--pairs", "0", "--none", "1", "--unknown", "1", "--invisible", "0"]
 
 
 def quasiomni(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -57,12 +58,18 @@ def test_another_exam_is_not_sealed_into_the_same_folder(folder: ExamFolder) -> 
 
 
 def test_the_exam_is_diagnosed_and_scored(folder: ExamFolder) -> None:
-    diagnosed = quasiomni("exam", "diagnose", str(folder.path), "--jobs", "1")
-    assert diagnosed.returncode == 0, diagnosed.stderr
+    for option in ([], ["--without-true-candidate"]):
+        diagnosed = quasiomni("exam", "diagnose", str(folder.path), "--jobs", "1", *option)
+        assert diagnosed.returncode == 0, diagnosed.stderr
     answers = [json.loads(folder.diagnosis(name).read_text()) for name in read_exam(folder).identifiers]
     assert all(answer["verdict"] in ("effect", "none", "unknown") for answer in answers)
+    assert all(len(answer["alone"]) > 10 for answer in answers)
+    assert len(list((folder.path / "diagnoses_without").iterdir())) == 1
     scored = quasiomni("exam", "score", str(folder.path))
     assert scored.returncode == 0, scored.stderr
     score = json.loads((folder.path / "score.json").read_text())
-    assert score["cases"] == 2
-    assert (folder.path / "reliability.svg").is_file()
+    assert score["cases"] == 3
+    assert score["missing"] == {}
+    assert [score["rates"][name][1] for name in (FALSE_ALARMS, REJECTED, RIGHT)] == [1, 1, 1]
+    assert sum(count for _, _, count in score["confusion"]) == 3
+    assert all((folder.path / name).is_file() for name in ("score.md", "reliability.svg", "confusion.svg"))

@@ -1,0 +1,152 @@
+"""The page and the ten lines of a diagnosis: true to the numbers, largest first, nothing loaded from anywhere."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ident.gap.diagnosis import Diagnosis, Gap, NamedEffect, Share, Verdict
+from ident.gap.judge import Findings, judge
+from ident.gap.problem import Block, Candidate, Channel, Problem, Variant
+from ident.report.gap import GapReport, render_gap_report
+from ident.report.gap_figures import map_figure, residual_figures
+from ident.report.gap_summary import summary_lines
+from ident.vehicle.effects import EffectParameter
+from ident.vehicle.quantities import Quantity
+
+Array = NDArray[np.float64]
+
+SAMPLES, REPEATS = 500, 4
+LARGE = {("straight", "x"): (100.0, 1.0), ("rotation", "gamma"): (100.0, 1.0), ("straight", "roll"): (1e-4, 1e-4)}
+"""Rms of the signal and of the noise; the third is all noise, as rolling constraints are."""
+
+
+def _problem(part: int, effect: float) -> Problem:
+    """An effect in `rotation, gamma` of so many times the noise."""
+    blocks, columns = [], []
+    for number, ((step, coordinate), (signal, noise)) in enumerate(LARGE.items()):
+        generator = np.random.default_rng([part, number])
+        baseline = np.tile(generator.normal(size=(SAMPLES, 1)), (REPEATS, 1))
+        column = np.tile(generator.normal(size=(SAMPLES, 1)), (REPEATS, 1))
+        acts = coordinate == "gamma"
+        target = signal * baseline[:, 0] + noise * generator.normal(size=len(baseline)) + acts * effect * column[:, 0]
+        blocks.append(
+            Block(
+                record="made up",
+                channel=Channel.KINEMATIC if coordinate == "roll" else Channel.DYNAMIC,
+                step=step,
+                coordinate=coordinate,
+                unit="m/s" if coordinate == "roll" else "Nm",
+                sample_time=0.02,
+                bandwidth=100.0,
+                target=target,
+                baseline=baseline * signal / 100.0,
+                moving=np.ones(len(target), dtype=bool),
+                period=np.repeat(np.arange(REPEATS), SAMPLES),
+                regions={"forward": baseline[:, 0] > 0, "backward": baseline[:, 0] < 0},
+                features=baseline,
+            )
+        )
+        columns.append(column if acts else None)
+    candidate = Candidate("scrub", "chassis", (EffectParameter("torque", "Nm", ""),), (Variant(tuple(columns)),))
+    return Problem(("m_ch",), ("kg",), tuple(blocks), (candidate,))
+
+
+@pytest.fixture(scope="module")
+def findings() -> Findings:
+    return judge(_problem(0, 3.0), _problem(1, 3.0), seed=1)
+
+
+@pytest.fixture(scope="module")
+def page(findings: Findings) -> str:
+    return render_gap_report(GapReport(findings, findings.diagnosis("drive a circle"), ["a.csv"], ["b.csv"], "m.toml"))
+
+
+def drawn(page: str) -> dict[str, Any]:
+    found = re.search(r'<script type="application/json" id="figures">(.*?)</script>', page, re.DOTALL)
+    assert found is not None
+    figures: dict[str, Any] = json.loads(found.group(1))
+    return figures
+
+
+def values(series: Any) -> Array:
+    """Numbers of a series of a figure, packed or plain."""
+    if isinstance(series, dict):
+        return np.frombuffer(base64.b64decode(series["bdata"]), dtype=series["dtype"]).astype(float)
+    return np.asarray(series, dtype=float)
+
+
+def test_the_largest_gap_over_its_noise_comes_first_whatever_its_share_of_the_signal(findings: Findings) -> None:
+    """All of the rolling constraint is noise, 3 % of the torque is gap."""
+    titles = [title for _, title, _ in residual_figures(findings)]
+    assert titles[0].startswith("rotation · gamma: 3.")
+    assert all(re.search(r": 0\.\d+ times the noise", title) for title in titles[1:])
+    assert any("roll (kinematic)" in title for title in titles[1:])
+
+
+def test_residuals_are_those_before_and_with_the_causes(findings: Findings) -> None:
+    _, _, figure = residual_figures(findings)[0]
+    before, after = (values(line["y"]) for line in figure["data"])
+    assert np.sqrt(np.nanmean(before**2)) == pytest.approx(3.0, rel=0.15)
+    assert np.sqrt(np.nanmean(after**2)) == pytest.approx(1 / np.sqrt(REPEATS), rel=0.2)
+
+
+def test_the_map_leaves_out_what_does_not_matter_and_puts_opposites_beside_each_other() -> None:
+    shares = [
+        Share("dynamic", "straight", "x", "late", 0.4),
+        Share("dynamic", "straight", "x", "all", 0.9995),
+        Share("dynamic", "straight", "x", "forward", 0.7),
+        Share("dynamic", "straight", "x", "my_region", 0.1),
+        Share("dynamic", "straight", "x", "backward", 0.2995),
+        Share("kinematic", "straight", "roll", "all", 0.0005),
+    ]
+    (heat,) = map_figure(shares)["data"]
+    assert heat["x"] == ["all", "forward", "backward", "late", "my region"]
+    assert heat["y"] == ["straight, x"]
+    assert heat["z"] == [[0.9995, 0.7, 0.2995, 0.4, 0.1]]
+
+
+def test_the_page_says_what_was_found_and_loads_nothing(page: str, findings: Findings) -> None:
+    assert "The model lacks scrub (chassis)." in page
+    assert "drive a circle" in page
+    assert "m.toml" in page
+    head = page[: page.index("<script")]
+    assert not re.search(r'(src|href)="(?!#|data:)', head)
+    shown = drawn(page)
+    assert set(shown) == {"map", *(key for key, _, _ in residual_figures(findings))}
+    assert all(f'id="{key}"' in page for key in shown)
+
+
+def test_everything_in_the_map_adds_up(page: str) -> None:
+    (heat,) = drawn(page)["map"]["data"]
+    assert heat["x"][0] == "all"
+    assert sum(row[0] for row in heat["z"]) == pytest.approx(1.0, abs=0.01)
+
+
+def _diagnosis(verdict: Verdict, count: int) -> Diagnosis:
+    effects = tuple(
+        NamedEffect(
+            "torque_bias", f"drive_{place}", {"bias": Quantity(0.1, "Nm", "", 0.01)}, 0.9, ("torque_bias", "slope"), 0.2
+        )
+        for place in ("fl", "rl", "fr", "rr")[:count]
+    )
+    where = (Share("dynamic", "straight", "x", "forward", 0.9), Share("dynamic", "straight", "x", "all", 0.8))
+    return Diagnosis(verdict, effects, where, Gap(2.0, 1.1, 1.0), ("com_offset",), "drive a circle")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "count"), [(Verdict.EFFECT, 4), (Verdict.EFFECT, 1), (Verdict.NONE, 0), (Verdict.UNKNOWN, 0)]
+)
+def test_ten_lines_say_it_all(findings: Findings, verdict: Verdict, count: int) -> None:
+    lines = summary_lines(findings, _diagnosis(verdict, count))
+    assert len(lines) <= 10
+    assert lines[-1] == "Next: drive a circle"
+    assert sum("might as well be slope" in line for line in lines) == count
+    assert any("2.00 times the noise" in line for line in lines)
+    assert any("80 % of it in straight, x" in line for line in lines) is (verdict is not Verdict.NONE)
