@@ -14,9 +14,10 @@ from ident.gap.generic import Generic, SmoothFunction
 from ident.gap.probability import Ranked, calibration, rank
 from ident.gap.problem import Candidate, Problem
 from ident.gap.refit import Part, Refit, refit
-from ident.gap.remainder import held_out_gap, noise_floors, repeated, shares
+from ident.gap.remainder import held_out_gap, lasting, noise_floors, repeated, shares
 from ident.gap.rows import make_rows
-from ident.gap.search import Found, Regression, Settings, concluded, least_squares, search
+from ident.gap.search import Found, Regression, Settings, concluded, least_squares
+from ident.gap.shapes import search
 from ident.gap.whitening import Predictor, Whitener
 from ident.vehicle.quantities import Quantity
 
@@ -30,18 +31,24 @@ class Limits:
     Attributes:
         deviations: by which a smooth function must predict the confirming rows for there to be a remainder.
         size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
-        repeating: the same, above which a gap without any effect is unknown, whether or not it can be predicted.
-        explained: share of a remainder that the effects named must explain, or the answer is `unknown`.
+        repeating: the same, above which there is a remainder whether or not it can be predicted.
+        creeping: the same of rows with a tolerance, whose noise is that.
+        explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
+        named: what one effect must close, over that and what all leave, where a remainder repeats.
         improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
         minor: log evidence over that of the strongest effect above which one counts that closes less.
+        share: of the gap that is left, which an effect must close to count all the same.
     """
 
     deviations: float = 3.0
     size: float = 0.25
-    repeating: float = 1.5
+    repeating: float = 0.5
+    creeping: float = 1.5
     explained: float = 0.5
+    named: float = 2 / 3
     improvement: float = 0.01
     minor: float = 0.05
+    share: float = 0.1
 
 
 @dataclass(frozen=True)
@@ -128,11 +135,13 @@ def judge(
     # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
         regression = Regression(fit, make_rows(fit, confirm), settings or Settings(), seed)
-        found = search(regression)
-        judgement = _Judgement((fit, confirm), regression, found, limits or Limits(), seed)
+        searched = search((fit, confirm), regression)
+        problems, regression = searched.problems, searched.regression
+        found = concluded(regression, searched.taken)
+        judgement = _Judgement(problems, regression, found, limits or Limits(), seed)
         while (kept := judgement.worthwhile()) != found.variants:
             found = concluded(regression, kept)
-            judgement = _Judgement((fit, confirm), regression, found, limits or Limits(), seed)
+            judgement = _Judgement(problems, regression, found, limits or Limits(), seed)
         return judgement.findings()
 
 
@@ -182,7 +191,12 @@ class _Judgement:
         evidence = [self._log_evidence(index) for index in range(len(variants))]
         least = int(np.argmin(evidence))
         minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
-        return self._others(least) if minor else variants
+        return self._others(least) if minor and closed[least] < self.limits.share * self._left() else variants
+
+    def _left(self) -> float:
+        """Share of the removable held-out gap that all effects leave."""
+        gap = self._gap(self.found.variants)
+        return max(1 - gap.closed, 0.0)
 
     def _log_evidence(self, index: int) -> float:
         return float(self.found.slots[index].evidence.log_evidence[self.found.variants[index]])
@@ -229,8 +243,15 @@ class _Judgement:
     def _verdict(self) -> Verdict:
         if not self.found.variants:
             return Verdict.UNKNOWN if self._predictable() or self._repeating() else Verdict.NONE
-        unknown = self._predictable() and self._explained() < self.limits.explained
+        unknown = (self._predictable() and self._explained() < self.limits.explained) or (
+            self._repeating() and self._named() < self.limits.named
+        )
         return Verdict.UNKNOWN if unknown else Verdict.EFFECT
+
+    def _named(self) -> float:
+        """What the effect that closes most closes, in what it closes and all of them leave."""
+        most = max(self._closed(index) for index in range(len(self.found.variants)))
+        return max(most, 0.0) / max(most + self._left(), np.finfo(float).tiny)
 
     def _predictable(self) -> bool:
         """Whether a smooth function of the states predicts what the effects leave, and it is no trifle."""
@@ -239,8 +260,11 @@ class _Judgement:
         return large and self.rest.deviations > self.limits.deviations and self.rest.gain > 0
 
     def _repeating(self) -> bool:
-        """Whether what the model leaves repeats, and is well above the noise."""
-        return max(self._sizes(self.after.blocks).values(), default=0.0) > self.limits.repeating
+        """Whether what the model leaves repeats in every record, and is well above the noise."""
+        creeping = {block.label for block, _ in self.rows.blocks if block.tolerance > 0}
+        sizes = lasting(self.rows, self.floors, self.after.blocks)
+        limits = {label: self.limits.creeping if label in creeping else self.limits.repeating for label in sizes}
+        return any(size > limits[label] for label, size in sizes.items())
 
     def _sizes(self, models: Sequence[Array]) -> Mapping[str, float]:
         return repeated(self.rows, self.floors, models)

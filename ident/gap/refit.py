@@ -16,7 +16,7 @@ from ident.gap.whitening import Whitener
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Series = list[Array | None]
+Series = Sequence[Array | None]
 
 MOST_STEPS: Final = 15
 HALVINGS: Final = 6
@@ -33,11 +33,15 @@ class Part:
     Attributes:
         key: of its candidate.
         values, std: of its parameters (k,).
+        numbers: all of them (m,), those that come along with the parameters behind.
+        added: what it adds to every block, (N,), None where that is nothing.
     """
 
     key: str
     values: Array
     std: Array
+    numbers: Array
+    added: Series
 
 
 @dataclass(frozen=True)
@@ -182,7 +186,8 @@ class _Model:
             spread = turn @ covariance[unknown.place, unknown.place] @ turn.T
             deviations, stated = np.sqrt(np.maximum(np.diag(spread), 0.0)), slice(unknown.stated)
             total = np.hypot(deviations[stated], unknown.spread or 0.0)
-            parts.append(Part(unknown.key, unknown.finish(own)[stated], total))
+            numbers = unknown.finish(own)
+            parts.append(Part(unknown.key, numbers[stated], total, numbers, tuple(series)))
         baseline_std = np.sqrt(np.diag(covariance)[: self.size])
         return Refit(values[: self.size], baseline_std, tuple(parts), tuple(blocks))
 
@@ -213,7 +218,8 @@ class _Model:
         starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
         sums = np.add.reduceat(scores, starts, axis=0)
         freedom = len(starts) / max(len(starts) - 1, 1)
-        robust = inverse @ (freedom * sums.T @ sums) @ inverse
+        prior = (jacobian / scale)[len(stretch) :]
+        robust = inverse @ (freedom * sums.T @ sums + prior.T @ prior) @ inverse
         lift = np.sqrt(np.maximum(np.diag(inverse) / np.maximum(np.diag(robust), np.finfo(float).tiny), 1.0))
         return np.asarray(robust * np.outer(lift, lift) / np.outer(scale, scale))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,9 +77,23 @@ ALL = "all"
 
 def repeated(rows: Rows, floors: Array, models: Series) -> Mapping[str, float]:
     """Rms over the noise of what repeats, by coordinate; only of blocks with repeats."""
+    return _repeated(rows, floors, models, (False, True))
+
+
+def lasting(rows: Rows, floors: Array, models: Series) -> Mapping[str, float]:
+    """The same of what repeats in the records that are fitted and in those that confirm: the smaller of the two.
+
+    What one campaign alone repeats comes from how it began: wheels a few increments askew after an alignment.
+    """
+    fitted, confirming = (_repeated(rows, floors, models, (part,)) for part in (False, True))
+    return {label: min(size, confirming.get(label, size)) for label, size in {**confirming, **fitted}.items()}
+
+
+def _repeated(rows: Rows, floors: Array, models: Series, parts: Collection[bool]) -> Mapping[str, float]:
+    """In the records whose rows confirm, or not, as `parts` says."""
     sums: dict[str, tuple[float, int]] = {}
     for index, (block, kept) in enumerate(rows.blocks):
-        if len(kept.samples) < 2:
+        if len(kept.samples) < 2 or bool(rows.confirming[rows.block_slices[index]].any()) not in parts:
             continue
         excess = _excess(block, kept, models[index], floors[index])
         total, count = sums.get(block.label, (0.0, 0))

@@ -19,7 +19,7 @@ from ident.gap.evidence import Directions, Evidence, White, directions, gather
 from ident.gap.pairs import best_pair
 from ident.gap.problem import Problem
 from ident.gap.rows import Rows
-from ident.gap.whitening import ORDER, Whitener, fit_whitener
+from ident.gap.whitening import ORDER, Colour, Whitener, colours_of_repeats, fit_whitener
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -44,7 +44,9 @@ class Settings:
     Attributes:
         level: largest probability by chance, over all candidates at once, at which an effect is believed.
         pair_level: the same over all pairs.
-        confirmation: smallest log Bayes factor of the confirming rows.
+        least: smallest log evidence, its price paid: noise is never quite what surrogates make of it.
+        confirmation: smallest log Bayes factor of the confirming rows; 0 will do where the evidence is clear.
+        clear: log evidence of that.
         stretch: rows of the stretches whose sign a surrogate flips, well beyond the memory of whitened rows.
         stretches: that there shall be at least; short records have shorter ones.
         surrogates: how many.
@@ -54,7 +56,9 @@ class Settings:
 
     level: float = 0.02
     pair_level: float = 0.01
+    least: float = 3.5
     confirmation: float = 1.0
+    clear: float = 20.0
     stretch: int = 30
     stretches: int = 24
     surrogates: int = 600
@@ -88,6 +92,7 @@ class Regression:
         self.problem = problem
         self.rows = rows
         self.settings = settings
+        self.seed = seed
         length = max(1, min(settings.stretch, len(rows) // settings.stretches))
         self.stretch = _stretches(rows, length)
         nominal = problem.nominal
@@ -127,10 +132,18 @@ class Regression:
         design = np.hstack([self.rows.baseline, self.columns_of(variants)])
         weighted = np.column_stack([design, self.rows.target]) / self._scale[:, None]
         residual = self.rows.target - design @ least_squares(weighted[:, :-1], weighted[:, -1])
-        whitener = fit_whitener(self.rows, residual, design.shape[1], order)
+        whitener = fit_whitener(self.rows, residual, design.shape[1], order, self._repeats)
         white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
         residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
-        return fit_whitener(self.rows, residual, design.shape[1], order)
+        return fit_whitener(self.rows, residual, design.shape[1], order, self._repeats)
+
+    @cached_property
+    def _repeats(self) -> Sequence[Colour]:
+        """Colour of what differs between repeats: of measurement and motion, the model taken off."""
+        weighted = np.column_stack([self.rows.baseline, self.rows.target]) / self._scale[:, None]
+        parameters = least_squares(weighted[:, :-1], weighted[:, -1])
+        residuals = [block.target - block.baseline @ parameters for block, _ in self.rows.blocks]
+        return colours_of_repeats(self.rows, residuals)
 
     @cached_property
     def _scale(self) -> Array:
@@ -218,18 +231,15 @@ class Found:
     rest: Slot
 
 
-def search(regression: Regression) -> Found:
-    """Forward in singles and pairs, then every effect in doubt again."""
-    taken: tuple[int, ...] = ()
-    while len(taken) < regression.settings.most:
-        grown = _grown(regression, taken)
-        if grown == taken:
-            break
-        settled = _settled(regression, grown)
-        if set(settled) <= set(taken):
-            break
-        taken = settled
-    return concluded(regression, taken)
+def extended(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
+    """One effect or pair more, and every effect in doubt again; those taken where nothing more is believed."""
+    if len(taken) >= regression.settings.most:
+        return taken
+    grown = _grown(regression, taken)
+    if grown == taken:
+        return taken
+    settled = _settled(regression, grown)
+    return taken if set(settled) <= set(taken) else settled
 
 
 def concluded(regression: Regression, taken: tuple[int, ...]) -> Found:
@@ -257,9 +267,9 @@ def _grown(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
 
 def _believed(slot: Slot, variant: int, settings: Settings) -> bool:
     """Larger than chance over all candidates, and confirmed."""
-    evidence = slot.evidence
-    confirmed = evidence.log_predictive[variant] >= settings.confirmation
-    return bool(confirmed and evidence.significance <= settings.level and evidence.log_evidence[variant] > 0)
+    evidence, found = slot.evidence, slot.evidence.log_evidence[variant]
+    confirmed = evidence.log_predictive[variant] >= (0.0 if found > settings.clear else settings.confirmation)
+    return bool(confirmed and evidence.significance <= settings.level and found > settings.least)
 
 
 def _settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:

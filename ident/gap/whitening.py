@@ -1,7 +1,13 @@
-"""Whitening of coloured residuals: an autoregression for every group of rows, restarted at every interruption."""
+"""Whitening of coloured residuals: an autoregression for every group of rows, restarted at every interruption.
+
+Where steps repeat, the colour is that of what differs between the repeats: what repeats is not in it, so that no effect
+can be taken for noise. It counts as long as what the best candidates leave is about as small; where model errors
+prevail, and where nothing repeats, the colour is that of what is left.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,6 +22,8 @@ ORDER: Final = 20
 """Of the autoregression: slow noise hides below fast noise, and shows only over many rows."""
 TOLERATED_MEMORY: Final = 0.5
 """Correlation time of what is tolerated [s]: it is model error, and as slow as the motion."""
+PREVAILING: Final = 2.0
+"""Power of what is left, over that of the noise in the mean of the repeats, from which model errors prevail."""
 TAPER: Final = 1e-4
 """White share added to the variance, so that a band without any power is not blown up."""
 
@@ -61,15 +69,62 @@ def row_ages(rows: Rows) -> NDArray[np.int64]:
     return np.asarray(number - np.repeat(starts, lengths))
 
 
-def fit_whitener(rows: Rows, residual: Array, freedom_lost: float = 0.0, order: int = ORDER) -> Whitener:
-    """Whitener of a residual (n,); `freedom_lost` parameters were fitted to it. Of order 0, it only scales."""
-    age = row_ages(rows)
+@dataclass(frozen=True)
+class Colour:
+    """Autocovariance of a group of rows, and how many rows it was taken from; no rows where it is not known."""
+
+    covariance: Array
+    count: int
+
+
+def colours_of_repeats(rows: Rows, residuals: Sequence[Array]) -> tuple[Colour, ...]:
+    """Colour of the noise in the mean over the repeats, by group, from what differs between them.
+
+    Args:
+        rows: of all blocks.
+        residuals: of every block, (N,), of any model: what repeats in them cancels.
+    """
+    groups = int(rows.group.max(initial=-1)) + 1
+    sums, counts, means = np.zeros((groups, ORDER + 1)), np.zeros(groups, dtype=int), np.zeros(groups)
+    for (_, kept), place, residual in zip(rows.blocks, rows.block_slices, residuals, strict=True):
+        repeats, length = kept.samples.shape
+        if repeats < 2 or length == 0:
+            continue
+        group, age = rows.group[place.start], row_ages(rows)[place]
+        deviations = residual[kept.samples] - residual[kept.samples].mean(axis=0)
+        for lag in range(ORDER + 1):
+            later = np.flatnonzero(age >= lag)
+            sums[group, lag] += np.sum(deviations[:, later] * deviations[:, later - lag]) / repeats
+        counts[group] += (repeats - 1) * length
+        means[group] += length
+    complete = means == np.bincount(rows.group, minlength=groups)
+    return tuple(
+        Colour(total / max(count, 1), int(count) if whole else 0)
+        for total, count, whole in zip(sums, counts, complete, strict=True)
+    )
+
+
+def fit_whitener(
+    rows: Rows,
+    residual: Array,
+    freedom_lost: float = 0.0,
+    order: int = ORDER,
+    repeats: Sequence[Colour] | None = None,
+) -> Whitener:
+    """Whitener of a residual (n,); `freedom_lost` parameters were fitted to it. Of order 0, it only scales.
+
+    `repeats` are the colours of `colours_of_repeats`; without them, only what is left has one.
+    """
     inflation = len(rows) / max(len(rows) - freedom_lost, 1.0)
     tolerated = _tolerated(rows)
-    groups = range(int(rows.group.max(initial=-1)) + 1)
-    return Whitener(
-        tuple(_predictor(residual, age, rows.group == group, inflation, tolerated[group], order) for group in groups)
-    )
+    predictors = []
+    for group in range(int(rows.group.max(initial=-1)) + 1):
+        colour = _colour(residual, row_ages(rows), rows.group == group, inflation)
+        known = repeats[group] if repeats is not None else Colour(colour.covariance, 0)
+        if known.count and colour.covariance[0] <= PREVAILING * known.covariance[0]:
+            colour = known
+        predictors.append(_predictor(colour, tolerated[group], order))
+    return Whitener(tuple(predictors))
 
 
 def _tolerated(rows: Rows) -> Array:
@@ -82,17 +137,18 @@ def _tolerated(rows: Rows) -> Array:
     return found
 
 
-def _predictor(
-    residual: Array, age: NDArray[np.int64], chosen: NDArray[np.bool_], inflation: float, tolerated: Array, order: int
-) -> Predictor:
+def _colour(residual: Array, age: NDArray[np.int64], chosen: NDArray[np.bool_], inflation: float) -> Colour:
     place = np.flatnonzero(chosen)
-    depth = min(order, len(place) // 20)
-    covariance = np.empty(depth + 1)
-    for lag in range(depth + 1):
+    covariance = np.empty(ORDER + 1)
+    for lag in range(ORDER + 1):
         later = place[age[place] >= lag]
         covariance[lag] = residual[later] @ residual[later - lag]
-    covariance *= inflation / max(len(place), 1)
-    covariance += tolerated[: depth + 1]
+    return Colour(covariance * inflation / max(len(place), 1), len(place))
+
+
+def _predictor(colour: Colour, tolerated: Array, order: int) -> Predictor:
+    depth = min(order, colour.count // 20)
+    covariance = colour.covariance[: depth + 1] + tolerated[: depth + 1]
     covariance[0] = max(covariance[0] * (1 + TAPER), np.finfo(float).tiny)
     return _levinson(covariance)
 

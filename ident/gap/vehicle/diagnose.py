@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
 
 from ident.errors import DataFileError, RecordError
 from ident.gap.diagnosis import Diagnosis
@@ -11,13 +14,15 @@ from ident.gap.judge import Findings, judge
 from ident.gap.problem import Problem
 from ident.gap.split import split_problem
 from ident.gap.vehicle.build import build_problem
-from ident.gap.vehicle.drift import with_drift
 from ident.gap.vehicle.experiments import hidden_effects, next_experiment
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EffectName
 from ident.vehicle.extended import ExtendedModel
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+
+LEAST_STD: Final = 1e-3
+"""Standard deviation that a model's value has at least, relative to the value: nobody knows friction better."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +80,7 @@ def diagnose_vehicle(
         _refuse_strangers(fitted, confirming)
     else:
         fitted, confirming = split_problem(fitted)
-    findings = judge(_free(fitted), _free(confirming), seed=seed)
-    if fitted.nominal is not None:
-        findings = with_drift(findings, _free(fitted), _free(confirming), fitted.nominal)
+    findings = judge(fitted, confirming, seed=seed)
     invisible = tuple(str(name) for name in effects if name in hidden or name in findings.invisible)
     findings = replace(findings, invisible=invisible)
     advice = next_experiment(findings, [block.step for block in fitted.blocks])
@@ -89,13 +92,10 @@ def _problem(
 ) -> Problem:
     if model is None:
         return build_problem(records, vehicle, effects=effects)
-    return build_problem(records, vehicle, model.parameters, given=model.effects, effects=effects)
-
-
-def _free(problem: Problem) -> Problem:
-    """The search for structure: parameters free, changed values of them no candidates."""
-    structural = tuple(candidate for candidate in problem.candidates if not candidate.drift)
-    return replace(problem, nominal=None, candidates=structural)
+    problem = build_problem(records, vehicle, model.parameters, given=model.effects, effects=effects)
+    assert problem.nominal is not None
+    std = np.maximum(problem.nominal.std, LEAST_STD * np.abs(problem.nominal.values))
+    return replace(problem, nominal=replace(problem.nominal, std=std))
 
 
 def _refuse_zero(parameters: Parameters) -> None:
