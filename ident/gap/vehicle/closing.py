@@ -13,8 +13,9 @@ from ident.estimate.equations import ROWS
 from ident.estimate.filters import Processing
 from ident.gap.diagnosis import Gap
 from ident.gap.judge import Findings
-from ident.gap.problem import Channel
-from ident.gap.vehicle.build import Source, make_context, sources_of, tolerated_creep
+from ident.gap.problem import Channel, Problem
+from ident.gap.refit import Refit
+from ident.gap.vehicle.build import PRIOR_WEIGHT, Source, make_context, sources_of, tolerated_creep
 from ident.gap.vehicle.outcome import outcomes
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
@@ -44,10 +45,15 @@ class Series:
     least: float = 0.0
 
 
-def extended_model(findings: Findings) -> ExtendedModel:
+def extended_model(findings: Findings, guesses: Parameters) -> ExtendedModel:
     """The parameters refitted jointly with the effects that were found, and these effects.
 
     A changed parameter is none of them: its new value is among the parameters.
+
+    Args:
+        findings: of a diagnosis.
+        guesses: the vehicle file's, for what the records do not show where no model was given (the four steps do not
+            split B_w from inertias and mass, and a gear that gives way needs it).
     """
     refit = findings.after
     effects = []
@@ -56,15 +62,27 @@ def extended_model(findings: Findings) -> ExtendedModel:
         values = dict(zip(names, cause.part.values.tolist(), strict=True))
         std = dict(zip(names, cause.part.std.tolist(), strict=True))
         effects.append(make_effect(EffectName(cause.candidate.effect), cause.candidate.where, values, std))
-    return ExtendedModel(Parameters(refit.baseline, refit.baseline_std), tuple(effects))
+    return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), tuple(effects))
 
 
-def plain_model(findings: Findings) -> ExtendedModel:
-    """The model that is judged: as given, or refitted without any effect."""
+def plain_model(findings: Findings, guesses: Parameters) -> ExtendedModel:
+    """The model that is judged: as given, or refitted without any effect, with guesses as in `extended_model`."""
     nominal = findings.problem.nominal
     if nominal is not None:
         return ExtendedModel(Parameters(nominal.values, nominal.std))
-    return ExtendedModel(Parameters(findings.before.baseline, findings.before.baseline_std))
+    return ExtendedModel(_guessed_where_unseen(findings.before, findings.problem, guesses))
+
+
+def _guessed_where_unseen(refit: Refit, problem: Problem, guesses: Parameters) -> Parameters:
+    """The fit, moved towards the guesses along what the rows do not show."""
+    if problem.nominal is not None:
+        return Parameters(refit.baseline, refit.baseline_std)
+    size = np.where(guesses.std > 0, guesses.std, np.abs(guesses.values))
+    rows = np.concatenate([block.baseline[block.moving] for block in problem.blocks]) * size
+    scale = np.maximum(np.linalg.norm(rows, axis=0).max(), np.finfo(float).tiny)
+    normal = (rows / scale).T @ (rows / scale) + PRIOR_WEIGHT**2 * np.eye(len(size))
+    pull = PRIOR_WEIGHT**2 * (guesses.values - refit.baseline) / size
+    return Parameters(refit.baseline + size * np.linalg.solve(normal, pull), refit.baseline_std)
 
 
 def channel_gaps(

@@ -62,7 +62,8 @@ def test_a_bias_is_named_with_its_set_its_place_and_its_size(prototype: VehicleD
     if first.name == "torque_bias":
         bias = first.parameters["bias"]
         assert abs(bias.value - 0.05) < 3 * bias.std + 1e-3
-    gaps = channel_gaps([confirm], prototype, plain_model(found.findings), extended_model(found.findings))
+    models = (plain_model(found.findings, prototype.prior), extended_model(found.findings, prototype.prior))
+    gaps = channel_gaps([confirm], prototype, *models)
     assert gaps[Channel.DYNAMIC].closed > 0.8
 
 

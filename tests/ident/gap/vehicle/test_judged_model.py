@@ -61,7 +61,7 @@ def test_a_changed_value_is_named_with_its_size(found: VehicleDiagnosis) -> None
 
 @pytest.mark.slow
 def test_the_gap_shown_is_that_of_the_model_that_was_given(found: VehicleDiagnosis, model: Parameters) -> None:
-    assert plain_model(found.findings).parameters.values == pytest.approx(model.values)
+    assert plain_model(found.findings, model).parameters.values == pytest.approx(model.values)
     where = found.diagnosis.where[0]
     assert where.step in ("straight", "rotation")
     assert max(found.findings.repeated_before.values()) > 3 * max(found.findings.repeated_after.values())
@@ -69,6 +69,6 @@ def test_the_gap_shown_is_that_of_the_model_that_was_given(found: VehicleDiagnos
 
 @pytest.mark.slow
 def test_a_changed_value_is_in_the_extended_model_once(found: VehicleDiagnosis, vehicle: VehicleDescription) -> None:
-    extended = extended_model(found.findings)
+    extended = extended_model(found.findings, vehicle.prior)
     assert extended.effects == ()
     assert extended.parameters["d_cw"] == pytest.approx(vehicle.prior["d_cw"], rel=0.01)
