@@ -24,6 +24,9 @@ Mask = NDArray[np.bool_]
 
 VISIBLE: Final = 0.02
 """Part of a column that the baseline must leave for it to count as visible."""
+BESIDE: Final = 4.0
+"""Log evidence that what comes along with an effect must bring more than the price of its number: few effects do not
+come alone, one in fifty by this."""
 RANK: Final = 1e-7
 """Smallest singular value, relative to the largest, of a baseline column that counts."""
 
@@ -52,11 +55,13 @@ class Bounded:
     """A variant of k columns whose coefficients have a least value.
 
     Attributes:
+        variant: which.
         place: of its directions.
         turn: (k, directions) amplitudes -> coefficients.
         least: of all coefficients.
     """
 
+    variant: int
     place: slice
     turn: Array
     least: float
@@ -98,8 +103,11 @@ class Directions:
 
     def ratios(self, amplitudes: Array) -> Array:
         """Sums of squared amplitudes (..., D) over the directions of every variant, (..., V)."""
-        counted = np.where(self.possible(amplitudes), amplitudes, 0.0)
-        squares = np.concatenate([np.zeros((*amplitudes.shape[:-1], 1)), np.cumsum(counted**2, axis=-1)], axis=-1)
+        return self.lengths(np.where(self.possible(amplitudes), amplitudes, 0.0))
+
+    def lengths(self, amplitudes: Array) -> Array:
+        """The same whatever the amplitudes are."""
+        squares = np.concatenate([np.zeros((*amplitudes.shape[:-1], 1)), np.cumsum(amplitudes**2, axis=-1)], axis=-1)
         starts = [place.start for place in self.places]
         stops = [place.stop for place in self.places]
         return np.asarray(squares[..., stops] - squares[..., starts])
@@ -128,7 +136,7 @@ def directions(white: White, layout: Sequence[Column], rows: Mask | None = None)
         places.append(slice(end, end + count))
         if count and not single and math.isfinite(column.least):
             coefficients = (turn[:count].T / singular[:count]) / scale[:, None]
-            bounded.append(Bounded(places[-1], coefficients, column.least))
+            bounded.append(Bounded(len(places) - 1, places[-1], coefficients, column.least))
         volumes.append(2 * float(np.sum(np.log(np.maximum(singular, VISIBLE)))))
         end += count
     low, small = np.array(bounds).reshape(-1, 2).T
@@ -152,6 +160,7 @@ class Evidence:
         amplitudes: (D,) of the residual along the directions.
         surrogates: (M, D) the same, signs of stretches flipped, the best candidate taken away before.
         scale: (V,) how much more than white noise the ratio scatters, at least 1; the variant itself taken away before.
+            Variants that point where the best one does have its scale: what tells them apart is the fit, not the noise.
         log_evidence: (V,) half the scaled ratio, less the price of its coefficients; -inf where nothing is visible.
         log_predictive: (V,) log Bayes factor of the confirming rows, given the fitted ones; 0 without any.
         significance: probability of so large a maximum over all variants without any effect.
@@ -183,8 +192,11 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
     best = int(np.argmax(np.where(competing, ratios, -1.0)))
     surrogates = signs @ _sums(found.basis * _without(found, amplitudes, best)[:, None], white.stretch)
     scale = np.array([_scatter(found, amplitudes, variant, white.stretch) for variant in range(len(layout))])
+    scale = _shared(found, amplitudes, best, scale)
     spread = np.maximum(found.ratios(surrogates).mean(axis=0) / np.maximum(sizes, 1), 1.0)
     price = 0.5 * sizes * math.log(len(white.target))
+    for several in found.bounded:
+        price[several.variant] += BESIDE * (sizes[several.variant] - 1)
     tested = np.where(competing, 0.5 * ratios / spread - price, -np.inf)
     by_chance = np.where((sizes > 0) & ~excluded, 0.5 * found.ratios(surrogates) / spread - price, -np.inf)
     return Evidence(
@@ -222,6 +234,19 @@ def significance(found: float, by_chance: Array) -> float:
     return float((1 + np.sum(by_chance >= found)) / (1 + len(by_chance)))
 
 
+def _shared(found: Directions, amplitudes: Array, best: int, scale: Array) -> Array:
+    """Scale (V,) of every variant, that of the best one as far as both point the same way."""
+    return np.asarray(scale + _overlap(found, amplitudes, best) * (scale[best] - scale))
+
+
+def _overlap(found: Directions, amplitudes: Array, variant: int) -> Array:
+    """Share (V,) of the square of what one variant explains that every other can explain too."""
+    place = found.places[variant]
+    fitted = found.basis[:, place] @ amplitudes[place]
+    share = found.lengths(found.basis.T @ fitted) / max(float(fitted @ fitted), np.finfo(float).tiny)
+    return np.asarray(np.minimum(share, 1.0))
+
+
 def _predictive(white: White, layout: Sequence[Column], found: Directions, amplitudes: Array, scale: Array) -> Array:
     """Log Bayes factor that the confirming rows add, the coefficients known from the fit as well as it shows them.
 
@@ -236,10 +261,6 @@ def _predictive(white: White, layout: Sequence[Column], found: Directions, ampli
 
 
 def cosines(evidence: Evidence, index: int) -> Array:
-    """Largest cosine between directions of one variant and those of every other (V,), 0 where nothing is visible."""
+    """Cosine between what one variant explains and what every other can (V,), 0 where nothing is visible."""
     found = evidence.directions
-    mine = found.basis[:, found.places[index]]
-    overlap = mine.T @ found.basis
-    return np.array(
-        [np.linalg.norm(overlap[:, place], 2) if place.stop > place.start else 0.0 for place in found.places]
-    )
+    return np.sqrt(_overlap(found, evidence.amplitudes, index))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -299,8 +299,15 @@ class _Judgement:
 
 
 def ordered(causes: Iterable[Cause]) -> tuple[Cause, ...]:
-    """Most probable first; those that are as probable, to a hundredth, by evidence."""
-    return tuple(sorted(causes, key=lambda cause: (-round(cause.probability, 2), -cause.log_evidence)))
+    """By the share of the held-out gap that they close, to a tenth, then by evidence; none surer than those before it.
+
+    What is found beside another cause is right only as far as that one is.
+    """
+    found: list[Cause] = []
+    for cause in sorted(causes, key=lambda cause: (-round(cause.closed, 1), -cause.log_evidence)):
+        surest = min([cause.probability, *(other.probability for other in found[-1:])])
+        found.append(replace(cause, probability=surest))
+    return tuple(found)
 
 
 def invisible_names(regression: Regression) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from ident.gap.search import Regression, Slot
 from ident.vehicle.quantities import read_toml
 
 ALIKE: Final = 0.995
-"""Cosine beside the baseline above which two candidates are the same in these records."""
+"""Cosine beside the baseline, with what was fitted, above which a candidate of as many numbers is the same here."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,8 @@ def rank(regression: Regression, slot: Slot, variant: int, settings: Calibration
 
 
 def _alike(regression: Regression, slot: Slot, variant: int) -> tuple[str, ...]:
-    cosine = cosines(slot.evidence, variant)
-    same: Sequence[int] = np.flatnonzero((cosine > ALIKE) & np.isfinite(slot.evidence.log_evidence)).tolist()
+    evidence = slot.evidence
+    sizes = evidence.directions.sizes
+    alike = (cosines(evidence, variant) > ALIKE) & (sizes == sizes[variant]) & np.isfinite(evidence.log_evidence)
+    same: Sequence[int] = np.flatnonzero(alike).tolist()
     return tuple(dict.fromkeys([regression.key(variant), *(regression.key(other) for other in same)]))

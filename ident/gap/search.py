@@ -33,6 +33,9 @@ CONTENDERS: Final = 12
 """Candidates that are taken off before the colour of the noise is found."""
 
 
+SAME: Final = 0.9999
+"""Cosine of two columns that are one and the same."""
+
 SILENT = 1e-12
 """Rms, in whatever unit, of a group that leaves nothing at all, as ideal records do."""
 
@@ -104,6 +107,20 @@ class Regression:
     def owners(self) -> list[int]:
         """Candidate of every variant."""
         return [column.candidate for column in self.rows.layout]
+
+    @cached_property
+    def wholes(self) -> dict[int, tuple[int, ...]]:
+        """Variants of several columns each of which is a variant by itself, with those."""
+        norms = np.linalg.norm(self.rows.columns, axis=0)
+        unit = self.rows.columns / np.where(norms > 0, norms, 1.0)
+        places = [column.place for column in self.rows.layout]
+        alone = {place.start: variant for variant, place in enumerate(places) if place.stop == place.start + 1}
+        found = {}
+        for variant, place in enumerate(places):
+            cosines = np.abs(unit[:, place].T @ unit[:, list(alone)])
+            if place.stop > place.start + 1 and np.all(cosines.max(axis=1, initial=0.0) > SAME):
+                found[variant] = tuple(list(alone.values())[best] for best in cosines.argmax(axis=1).tolist())
+        return found
 
     def key(self, variant: int) -> str:
         """Key of a variant's candidate."""
@@ -275,7 +292,7 @@ def _believed(slot: Slot, variant: int, settings: Settings) -> bool:
 def _settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     """Replace what another candidate explains better, drop what the others make superfluous, until nothing changes."""
     for _ in range(2 * len(taken)):
-        changed = _revised(regression, taken)
+        changed = _revised(regression, _joined(regression, taken))
         if changed == taken:
             break
         taken = changed
@@ -292,6 +309,16 @@ def _revised(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
             return (*taken[:index], best, *taken[index + 1 :])
         if not _believed(slot, variant, regression.settings):
             return _without(taken, index)
+    return taken
+
+
+def _joined(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
+    """One cause for several where it alone has the columns of all of them."""
+    for whole, parts in regression.wholes.items():
+        if set(parts) <= set(taken):
+            first = min(taken.index(part) for part in parts)
+            kept = [whole if place == first else variant for place, variant in enumerate(taken)]
+            return tuple(variant for variant in kept if variant not in parts)
     return taken
 
 

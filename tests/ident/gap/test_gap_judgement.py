@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from ident.errors import UserError
 from ident.gap.diagnosis import Gap, Verdict, write_diagnosis
 from ident.gap.judge import Findings, judge
-from ident.gap.problem import Nominal
+from ident.gap.problem import Nominal, Problem, Variant
 from ident.gap.split import split_problem
 
 
@@ -57,11 +57,44 @@ def test_a_gap_without_a_candidate_is_unknown(world: type[Any]) -> None:
     assert findings.remainder.deviations > 3
 
 
-def test_candidates_that_are_the_same_form_one_ambiguity_set_and_share_their_probability(world: type[Any]) -> None:
+def test_candidates_that_are_the_same_form_one_ambiguity_set_whose_probability_is_stated(world: type[Any]) -> None:
     findings = _judged(world(seed=11, true={"a": 0.3}, alike={"d": "a"}))
-    (effect,) = findings.diagnosis().effects
+    (effect,), (cause,) = findings.diagnosis().effects, findings.causes
     assert set(effect.ambiguity_set) == {"a", "d"}
-    assert effect.probability == pytest.approx(0.5, abs=0.01)
+    assert effect.probability == pytest.approx(0.99)
+    assert cause.ranked.names["a"] == pytest.approx(cause.ranked.names["d"])
+
+
+def test_twins_that_explain_more_rank_before_a_lone_name_that_explains_less(world: type[Any]) -> None:
+    findings = _judged(world(seed=11, true={"a": 0.4, "e": 0.15}, alike={"d": "a"}))
+    first, second = findings.causes
+    assert first.candidate.effect in ("a", "d")
+    assert second.candidate.effect == "e"
+    assert first.probability >= second.probability
+
+
+def _with_play(problem: Problem) -> Problem:
+    """`a` is a play that may come along with what `b` is alone."""
+    play, soft, *others = problem.candidates
+    both = zip(play.variants[0].columns, soft.variants[0].columns, strict=True)
+    columns = tuple(np.hstack([one, other]) for one, other in both if one is not None and other is not None)
+    play = replace(play, variants=(*play.variants, Variant(columns)), least=0.0)
+    return replace(problem, candidates=(play, replace(soft, least=0.0), *others))
+
+
+@pytest.mark.parametrize(
+    ("true", "named"),
+    [({"a": 0.2, "b": 0.4}, ["a"]), ({"b": 0.4}, ["b"]), ({"a": 0.3}, ["a"]), ({"a": -0.3, "b": 0.4}, ["b"])],
+)
+def test_what_comes_along_with_an_effect_is_no_second_one(
+    world: type[Any], true: dict[str, float], named: list[str]
+) -> None:
+    problems = [_with_play(world(seed=21, true=true).problem(part)) for part in (0, 1)]
+    findings = judge(*problems, seed=1)
+    assert _names(findings) == named
+    (cause,) = findings.causes
+    assert cause.ranked.names[named[0]] > 0.9
+    assert cause.part.values == pytest.approx([true[named[0]]], abs=4 * cause.part.std[0])
 
 
 def test_what_the_parameters_absorb_is_invisible(world: type[Any]) -> None:
