@@ -1,0 +1,63 @@
+"""What the diagnosis says of a vehicle that is written without its formulas, and with physics beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from ident.gap.diagnosis import Verdict
+from ident.gap.problem import Channel
+from ident.gap.vehicle.closing import channel_gaps, extended_model, plain_model
+from ident.gap.vehicle.diagnose import diagnose_vehicle
+from ident.records.record import Record
+from ident.vehicle.description import VehicleDescription
+
+Drives = Callable[..., tuple[Record, Record]]
+
+
+def test_of_the_plain_vehicle_nothing_is_missing_and_its_parameters_come_out(
+    drives: Drives, prototype: VehicleDescription, plain_truth: dict[str, float]
+) -> None:
+    fit, confirm = drives()
+    found = diagnose_vehicle([fit], [confirm], prototype)
+    assert found.diagnosis.verdict is Verdict.NONE
+    p, g = extended_model(found.findings, prototype.prior).parameters, prototype.geometry
+    wheel = 2 * g.lever_ratio**2
+    for name, merged in (("C_l", wheel), ("C_r", wheel), ("m_ch", 4 / g.wheel_radius**2)):
+        expected = plain_truth[name] + merged * plain_truth["B_w"]
+        assert p[name] + merged * p["B_w"] == pytest.approx(expected, rel=0.02), name
+    for name in ("d_vw", "d_cw"):
+        assert p[name] == pytest.approx(plain_truth[name], rel=0.01), name
+    for side in "lr":
+        coulomb = p[f"d_c{side}"] + 2 * g.lever_ratio * p["d_cw"]
+        expected = plain_truth[f"d_c{side}"] + 2 * g.lever_ratio * plain_truth["d_cw"]
+        assert coulomb == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.slow
+def test_bristles_at_a_steering_axis_come_out_as_stribeck_there(drives: Drives, prototype: VehicleDescription) -> None:
+    fit, confirm = drives(bristles=(0, 3.0, 0.3))
+    found = diagnose_vehicle([fit], [confirm], prototype)
+    (effect,) = found.diagnosis.effects
+    assert (effect.name, effect.where) == ("stribeck", "steering_left")
+    assert effect.parameters["amplitude"].value == pytest.approx(3.0, rel=0.15)
+    assert effect.parameters["velocity"].value == pytest.approx(0.3, rel=0.15)
+    assert effect.gap_closed_held_out > 0.7
+
+
+@pytest.mark.slow
+def test_two_masses_and_a_spring_come_out_as_elasticity_of_that_drive_and_close_every_channel(
+    drives: Drives, prototype: VehicleDescription
+) -> None:
+    fit, confirm = drives(compliance=5e-4)
+    found = diagnose_vehicle([fit], [confirm], prototype)
+    (effect,) = found.diagnosis.effects
+    assert (effect.name, effect.where) == ("elasticity", "drive_fl")
+    assert effect.parameters["compliance"].value == pytest.approx(5e-4, rel=0.05)
+    models: list[Any] = [make(found.findings, prototype.prior) for make in (plain_model, extended_model)]
+    gaps = channel_gaps([confirm], prototype, *models)
+    assert gaps[Channel.KINEMATIC].closed > 0.98
+    assert gaps[Channel.DYNAMIC].closed > 0.98
+    assert gaps[Channel.OUTCOME].closed > 0.8
