@@ -16,10 +16,11 @@ from ident.estimate.equations import ROWS, RowsOfStep
 from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.gap.problem import Block, Candidate, Channel, Nominal, Problem, Variant
 from ident.gap.vehicle import rows
+from ident.gap.vehicle.askew import beside_sliding, stands_askew
 from ident.gap.vehicle.library import DRIFTS, ONE_SIDED, SHAPES, TermCause, placed_parameters, term_causes
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
-from ident.gap.vehicle.sliding import ALONG, ALONG_STD, SlidingCause, adhesion, sliding_cause, sliding_causes
+from ident.gap.vehicle.sliding import ALONG, ALONG_STD, ANY_WHEEL, SlidingCause, adhesion, sliding_cause, sliding_causes
 from ident.gap.vehicle.transforms import Setting, TransformCause, transform_cause, transform_causes
 from ident.records.record import Record, Step, base_step
 from ident.vehicle.description import VehicleDescription
@@ -103,6 +104,8 @@ class Context:
         geometry: of the vehicle.
         processing: filters and thresholds.
         parameters: p (11,) at which columns are taken.
+        known: the same, by which effects with a memory tell the forces inside the vehicle; a refit does not move them,
+            for rows that hardly show a parameter (B_w) let it go anywhere.
         formulas: the equations, effects that are given in them.
         given: effects with a memory that are part of the model too.
         kept: rows of every source for the parameters asked for last.
@@ -111,6 +114,7 @@ class Context:
     geometry: Geometry
     processing: Processing
     parameters: Array
+    known: Array
     formulas: rows.Formulas
     given: tuple[tuple[TransformCause | SlidingCause, Array], ...] = ()
     kept: dict[int, tuple[bytes, Array]] = field(default_factory=dict)
@@ -122,7 +126,7 @@ class Context:
 
     def setting(self, source: Source) -> Setting:
         """What effects with a memory need beside the signals of a source."""
-        return Setting(self.geometry, self.parameters, source.sample_time)
+        return Setting(self.geometry, self.known, source.sample_time)
 
     def inputs(self, source: Source) -> Array:
         """Measured signals of a source, the given effects with a memory taken out."""
@@ -183,11 +187,12 @@ def build_problem(
     tables = [_table(source, context, units) for source in sources]
     blocks = [block for source, table in zip(sources, tables, strict=True) for block in _blocks(source, table, context)]
     columns = iter(range(_COLUMNS, _COLUMNS + len(units)))
+    candidates = [_candidate(cause, columns, sources, tables, context) for cause in causes]
     return Problem(
         names=PARAMETER_NAMES,
         units=tuple(PARAMETER_UNITS.values()),
         blocks=tuple(blocks),
-        candidates=tuple(_candidate(cause, columns, sources, tables, context) for cause in causes),
+        candidates=tuple(_askew_ones(candidates, sources, context)),
         nominal=Nominal(model.values, model.std) if model else None,
     )
 
@@ -209,9 +214,9 @@ def make_context(
     """Context of some sources; without a model, parameters are fitted to them."""
     terms = _formulas(tuple(_frozen(term_of(effect)) for effect in given if effect.name in TERMS))
     memories = tuple(_memory(effect) for effect in given if effect.name not in TERMS)
-    context = Context(vehicle.geometry, processing, vehicle.prior.values, terms, memories)
+    context = Context(vehicle.geometry, processing, vehicle.prior.values, vehicle.prior.values, terms, memories)
     values = model.values if model else fitted_parameters(sources, vehicle, context)
-    return replace(context, parameters=values)
+    return replace(context, parameters=values, known=values)
 
 
 _FrozenTerm = tuple[EffectName, str, tuple[tuple[str, float], ...]]
@@ -413,9 +418,7 @@ def _candidate(
 
 def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Candidate:
     """What was slid, as it was found; the friction coefficient by the traction that it took."""
-    acting = [source.spec.mode not in (None, Mode.ALIGNMENT) for source in sources]
-    slid = _contribution(cause, acting, sources, context)(np.ones(1), context.parameters)
-    travelling = [source for source, acts in zip(sources, acting, strict=True) if acts]
+    slid, travelling = _slid(cause, sources, context), [source for source in sources if _travels(source)]
     held = [adhesion(context.inputs(source), cause.wheels, context.setting(source)) for source in travelling]
     friction = max(held, default=0.0) / ALONG
     return Candidate(
@@ -426,6 +429,33 @@ def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -
         least=0.0,
         spread=(friction * ALONG_STD / ALONG,),
     )
+
+
+def _askew_ones(candidates: Sequence[Candidate], sources: Sequence[Source], context: Context) -> Iterator[Candidate]:
+    """The candidates, sliding beside those that stand askew."""
+    slid = _slid(ANY_WHEEL, sources, context)
+    rolling = [mask for source in sources for mask in [_nothing_slides(source, context)] * len(source.coordinates)]
+    for candidate in candidates:
+        yield beside_sliding(candidate, slid, rolling) if stands_askew(candidate) else candidate
+
+
+def _travels(source: Source) -> bool:
+    return source.spec.mode not in (None, Mode.ALIGNMENT)
+
+
+def _slid(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Sequence[Array | None]:
+    """What sliding adds to every block, (N,)."""
+    acting = [_travels(source) for source in sources]
+    return _contribution(cause, acting, sources, context)(np.ones(1), context.parameters)
+
+
+def _nothing_slides(source: Source, context: Context) -> NDArray[np.bool_] | None:
+    """Rows of a kinematic source that no sliding reaches through the filter; None for other sources."""
+    if source.channel is not Channel.KINEMATIC or not _travels(source):
+        return None
+    slides = ANY_WHEEL.sliding(context.inputs(source), context.setting(source)).any(axis=1)
+    width = 2 * round(context.processing.guard / source.sample_time) + 1
+    return np.asarray(~ndimage.binary_dilation(slides, np.ones(width, dtype=bool))[:: source.factor], dtype=np.bool_)
 
 
 def _acting(variants: Sequence[Variant], sources: Sequence[Source]) -> list[bool]:

@@ -9,7 +9,7 @@ by more than creep. How far a friction coefficient can be told from that, see `A
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -36,6 +36,12 @@ SLIDING: Final = 5e-3
 LEAST: Final = 1e-3
 """Speed that it must run ahead by as well [m/s]."""
 
+MOVING: Final = 0.02
+"""Speed below which nothing is said: at rest, and at the ends of a record, all that is left is noise [m/s]."""
+
+HELD: Final = 10.0
+"""Weight of the wheels' not moving sideways against that of their rolling, where the chassis' twist is told."""
+
 ALONG: Final = 0.8
 """Part of the friction cone that the traction has filled when a wheel slides; the rest acts across its plane [-]."""
 
@@ -50,10 +56,12 @@ class SlidingCause:
     Attributes:
         where: the chassis, which is the floor under all wheels, or one wheel.
         wheels: numbers of those.
+        fewest: of them that must have slid; one alone is no sign of a slippery floor.
     """
 
     where: str
     wheels: tuple[int, ...]
+    fewest: int = 1
     name: EffectName = EffectName.SLIP
 
     def without(self, inputs: Array, sizes: Array, setting: Setting) -> Array:
@@ -67,8 +75,7 @@ class SlidingCause:
     def sliding(self, inputs: Array, setting: Setting) -> Array:
         """Speed of each contact over the floor along the plane of its wheel (N, wheels) [m/s]; zero where it rolls.
 
-        The wheels of a slippery floor have none that surely rolls: the one that is least ahead is taken to. A single
-        one that slides is no sign of a slippery floor.
+        Of all wheels none surely rolls: the one that is least ahead is taken to.
         """
         pull = np.stack([traction(inputs, wheel, setting) for wheel in self.wheels], axis=1)
         speed = setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, self.wheels]
@@ -78,9 +85,13 @@ class SlidingCause:
             forward = np.sign(pull) * ahead_of_others(inputs, setting)
             forward = forward - forward.min(axis=1, keepdims=True)
         slides = np.stack([_slides(*columns) for columns in zip(forward.T, np.abs(speed).T, strict=True)], axis=1)
-        if np.sum(slides.any(axis=0)) < min(2, len(self.wheels)):
+        if np.sum(slides.any(axis=0)) < self.fewest:
             return np.zeros_like(forward)
         return np.where(slides, np.sign(pull) * forward, 0.0)
+
+
+ANY_WHEEL: Final = SlidingCause(CHASSIS[0], tuple(range(len(WHEEL_PLACES))))
+"""Whatever slides, for whatever reason."""
 
 
 def sliding_causes() -> list[SlidingCause]:
@@ -90,7 +101,9 @@ def sliding_causes() -> list[SlidingCause]:
 
 def sliding_cause(where: str) -> SlidingCause:
     """One of them."""
-    return SlidingCause(where, (WHEEL_PLACES.index(where),) if where in WHEEL_PLACES else tuple(range(4)))
+    if where in WHEEL_PLACES:
+        return SlidingCause(where, (WHEEL_PLACES.index(where),))
+    return replace(ANY_WHEEL, fewest=2)
 
 
 def adhesion(inputs: Array, wheels: tuple[int, ...], setting: Setting) -> float:
@@ -111,18 +124,19 @@ def ahead_of_others(inputs: Array, setting: Setting, wheel: int | None = None) -
     """Speed (N, 4) [m/s] that the wheels run ahead of the floor, its twist by odometry; without one wheel, if given."""
     matrix = kinematics.constraint_matrix(inputs[:, SLICES["alpha"]], setting.geometry)
     rates = np.hstack([inputs[:, SLICES["alpha_rate"]], inputs[:, SLICES["beta_rate"]]])
-    kept = [row for row in range(8) if wheel is None or row != 4 + wheel]
+    weights = np.repeat([HELD**2, 1.0], 4)
+    if wheel is not None:
+        weights[4 + wheel] = 0.0
     chassis, measured = matrix[:, :, :3], np.einsum("nij,nj->ni", matrix[:, :, 3:], rates)
-    used = chassis[:, kept]
-    normal = np.einsum("nki,nkj->nij", used, used)
-    twist = -np.linalg.solve(normal, np.einsum("nki,nk->ni", used, measured[:, kept])[..., None])
+    normal = np.einsum("nki,k,nkj->nij", chassis, weights, chassis)
+    twist = -np.linalg.solve(normal, np.einsum("nki,k,nk->ni", chassis, weights, measured)[..., None])
     left = (chassis @ twist)[:, 4:, 0] + measured[:, 4:]
     return zero_phase(-left, LOAD_CUTOFF, setting.sample_time)
 
 
 def _slides(forward: Array, speed: Array) -> Mask:
     """Stretches (N,) in which a wheel runs ahead, forward of its traction, and somewhere by more than creep."""
-    ahead, _ = ndimage.label(forward > CREEPING * speed)
+    ahead, _ = ndimage.label((forward > CREEPING * speed) & (speed > MOVING))
     sure = (forward > SLIDING * speed) & (forward > LEAST)
     return np.asarray(np.isin(ahead, np.unique(ahead[sure])) & (ahead > 0))
 

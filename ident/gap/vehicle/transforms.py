@@ -6,6 +6,7 @@ motors, rear units that do not follow the front ones. Everything is driven by re
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -87,14 +88,39 @@ def _gear_with_play(inputs: Array, place: int, sizes: Array, setting: Setting) -
 
 def _soft_coupling(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
     (compliance,) = sizes
-    return _rear_behind_front(inputs, place, compliance * _coupling_load(inputs, place, setting), setting)
+    passed = _play(_coupling_load(inputs, place, setting), _unit_friction(place, setting))
+    return _rear_behind_front(inputs, place, compliance * passed, setting)
 
 
 def _coupling_with_play(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
-    (gap,) = sizes
-    friction = setting[("d_cl", "d_cr")[place]]
-    flank = np.tanh(_coupling_load(inputs, place, setting) / (CONTACT_SHARE * friction))
-    return _rear_behind_front(inputs, place, gap / 2 * flank, setting)
+    """Play, and the compliance of its flanks: no contact is rigid."""
+    gap, compliance = sizes
+    load, friction = _coupling_load(inputs, place, setting), _unit_friction(place, setting)
+    twist = gap / 2 * _relay(load, friction) + compliance * _play(load, friction)
+    return _rear_behind_front(inputs, place, twist, setting)
+
+
+def _unit_friction(side: int, setting: Setting) -> float:
+    """Dry friction that holds each of the two units of a side [Nm]."""
+    return setting[("d_cl", "d_cr")[side]] / 2
+
+
+def _play(load: Array, friction: float) -> Array:
+    """Load (N,) that a spring holds when dry friction holds what it moves: it follows, `friction` behind."""
+    return _followed(load, lambda held, now: min(max(held, now - friction), now + friction))
+
+
+def _relay(load: Array, friction: float) -> Array:
+    """Flank (N,), +1 or -1, at which a body lies that dry friction holds; 0 before it is first pushed over."""
+    return _followed(load, lambda held, now: math.copysign(1.0, now) if abs(now) > friction else held)
+
+
+def _followed(load: Array, law: Callable[[float, float], float]) -> Array:
+    held, found = 0.0, np.empty_like(load)
+    for index, now in enumerate(load.tolist()):
+        held = law(held, now)
+        found[index] = held
+    return found
 
 
 def _gear_load(inputs: Array, wheel: int, setting: Setting) -> Array:
@@ -134,7 +160,7 @@ def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> 
 
 
 def _rear_behind_front(inputs: Array, side: int, twist: Array, setting: Setting) -> Array:
-    changed = inputs.copy()
+    changed, twist = inputs.copy(), zero_phase(twist, LOAD_CUTOFF, setting.sample_time)
     changed[:, SLICES["twist"].start + side] += twist
     changed[:, SLICES["twist_rate"].start + side] += differentiate(twist, setting.sample_time)
     return changed
@@ -173,7 +199,7 @@ _TRANSFORMS: Final[Mapping[tuple[EffectName, str], tuple[Transform, tuple[float,
         (EffectName.ELASTICITY, _DRIVE): (_soft_gear, (1e-4,)),
         (EffectName.ELASTICITY, _SIDE): (_soft_coupling, (1e-5,)),
         (EffectName.BACKLASH, _DRIVE): (_gear_with_play, (1e-3, 1e-5)),
-        (EffectName.BACKLASH, _SIDE): (_coupling_with_play, (1e-3,)),
+        (EffectName.BACKLASH, _SIDE): (_coupling_with_play, (1e-3, 1e-5)),
     }
 )
 

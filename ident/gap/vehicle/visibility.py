@@ -117,7 +117,8 @@ def sights_of(experiment: str, vehicle: VehicleDescription) -> Mapping[str, Sigh
 
 def _problem(drives: Sequence[Drive], given: Sequence[Effect], vehicle: VehicleDescription) -> Problem:
     # At the vehicle file's parameters: an experiment of few steps does not show all of them.
-    effects = [name for name in EffectName if name is not EffectName.PARAMETER_CHANGE]
+    unseen = (EffectName.PARAMETER_CHANGE, EffectName.SLIP)  # sliding is found in records, not foretold
+    effects = [name for name in EffectName if name not in unseen]
     problem = build_problem([ideal_record(drives, vehicle)], vehicle, vehicle.prior, given=given, effects=effects)
     return replace(problem, nominal=None)
 
