@@ -64,9 +64,11 @@ def shares(rows: Rows, floors: Array, before: Series) -> tuple[Share, ...]:
     power: dict[tuple[str, str, str, str], float] = {}
     for index, (block, kept) in enumerate(rows.blocks):
         excess = _excess(block, kept, before[index], floors[index])
+        whole = max(float(excess.sum()), 0.0)
         for region, mask in _regions(block, kept).items():
             key = (str(block.channel), block.step, block.coordinate, region)
-            power[key] = power.get(key, 0.0) + max(float(excess[mask].sum()), 0.0)
+            # Where noise prevails, what is above it in a region can exceed what is above it in all of them.
+            power[key] = power.get(key, 0.0) + min(max(float(excess[mask].sum()), 0.0), whole)
     total = sum(value for key, value in power.items() if key[-1] == ALL)
     found = [Share(*key, share=value / total if total > 0 else 0.0) for key, value in power.items()]
     return tuple(sorted(found, key=lambda share: -share.share))

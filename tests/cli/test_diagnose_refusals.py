@@ -68,7 +68,8 @@ def test_a_value_that_is_no_number_is_named(quasi: Quasi, record: Callable[..., 
 
 def test_a_vehicle_that_stands_still_is_refused(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
     def still(segment: Segment) -> Segment:
-        return replace(segment, wheel_angles=0 * segment.wheel_angles, steering_angles=0 * segment.steering_angles)
+        held = np.repeat(segment.steering_angles[:1], len(segment.time), axis=0)
+        return replace(segment, wheel_angles=0 * segment.wheel_angles, steering_angles=held)
 
     assert "does not move" in _refused(quasi, tmp_path, record(1, still))
 
@@ -98,3 +99,18 @@ def test_a_model_that_cannot_be_read_is_named(
 
 def test_a_vehicle_that_nobody_knows_is_named(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
     assert "lorry" in _refused(quasi, tmp_path, record(1), "--vehicle", "lorry")
+
+
+def test_records_of_another_vehicle_are_refused(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
+    complaint = _refused(quasi, tmp_path, record(1), "--vehicle", "compact")
+    assert "its wheels roll 1.20 rad per rad of steering, which for this vehicle is 0.64" in complaint
+    assert "--vehicle" in complaint
+
+
+def test_a_posture_that_is_not_that_of_the_step_is_refused(
+    quasi: Quasi, record: Callable[..., Path], tmp_path: Path
+) -> None:
+    def ahead(segment: Segment) -> Segment:
+        return replace(segment, steering_angles=0 * segment.steering_angles) if segment.step == "rotation" else segment
+
+    assert "step rotation: alpha_l is 0.00 rad on average" in _refused(quasi, tmp_path, record(1, ahead))

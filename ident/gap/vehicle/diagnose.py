@@ -13,6 +13,7 @@ from ident.gap.diagnosis import Diagnosis
 from ident.gap.judge import Findings, judge
 from ident.gap.problem import Problem
 from ident.gap.split import split_problem
+from ident.gap.vehicle.belonging import refuse_other_vehicle
 from ident.gap.vehicle.build import build_problem
 from ident.gap.vehicle.experiments import hidden_effects, next_experiment
 from ident.records.record import Record
@@ -65,13 +66,15 @@ def diagnose_vehicle(
         effects: that are looked for.
 
     Raises:
-        RecordError: a record holds none of the steps of a diagnosis, or the confirming records none of those fitted.
+        RecordError: a record is of another vehicle, does not move or holds none of the steps of a diagnosis, or the
+            confirming records hold none of those fitted.
         DataFileError: a parameter of the model is zero.
     """
     if isinstance(model, Parameters):
         model = ExtendedModel(model)
     if model is not None:
         _refuse_zero(model.parameters)
+    refuse_other_vehicle((*fit, *confirm), vehicle.geometry)
     hidden = hidden_effects(segment.step for record in fit for segment in record.segments)
     shown = [name for name in effects if name not in hidden]
     fitted = _problem(fit, vehicle, model, shown)
