@@ -14,7 +14,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from ident.estimate.filters import differentiate, zero_phase
 from ident.gap.vehicle.rows import SLICES
@@ -31,7 +30,7 @@ CREEPING: Final = 3e-4
 """Part of its speed by which a wheel that rolls may run ahead: sliding begins and ends there [-]."""
 
 SLIDING: Final = 5e-3
-"""Part of its speed that a wheel must run ahead by, at some time between, for it to have slid [-]."""
+"""Part of its speed that a wheel must run ahead by somewhere in a step for it to have slid in it [-]."""
 
 LEAST: Final = 1e-3
 """Speed that it must run ahead by as well [m/s]."""
@@ -135,10 +134,10 @@ def ahead_of_others(inputs: Array, setting: Setting, wheel: int | None = None) -
 
 
 def _slides(forward: Array, speed: Array) -> Mask:
-    """Stretches (N,) in which a wheel runs ahead, forward of its traction, and somewhere by more than creep."""
-    ahead, _ = ndimage.label((forward > CREEPING * speed) & (speed > MOVING))
-    sure = (forward > SLIDING * speed) & (forward > LEAST)
-    return np.asarray(np.isin(ahead, np.unique(ahead[sure])) & (ahead > 0))
+    """Where (N,) a wheel runs ahead, forward of its traction, if anywhere by more than any creep."""
+    ahead, moves = forward > CREEPING * speed, speed > MOVING
+    sure = moves & (forward > SLIDING * speed) & (forward > LEAST)
+    return np.asarray(ahead & moves & sure.any(), dtype=np.bool_)
 
 
 def _roll(inputs: Array, wheel: int, ahead: Array, setting: Setting) -> None:
