@@ -36,6 +36,7 @@ class Limits:
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
         named: what one effect must close, over that and what all leave, where a remainder repeats.
         improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
+        widening: share of the held-out gap by which an effect may seem to widen it.
         minor: log evidence over that of the strongest effect above which one counts that closes less.
         share: of the gap that is left, which an effect must close to count all the same.
     """
@@ -47,6 +48,7 @@ class Limits:
     explained: float = 0.5
     named: float = 2 / 3
     improvement: float = 0.01
+    widening: float = 0.1
     minor: float = 0.05
     share: float = 0.1
 
@@ -183,11 +185,13 @@ class _Judgement:
         )
 
     def worthwhile(self) -> tuple[int, ...]:
-        """The effects without the least one, if the held-out gap is no larger without it."""
+        """The effects without one that widens the held-out gap, or without the least one if that closes a trifle."""
         variants = self.found.variants
+        closed = [self._closed(index) for index in range(len(variants))]
+        if closed and min(closed) < -self.limits.widening:
+            return self._others(int(np.argmin(closed)))
         if len(variants) < 2:
             return variants
-        closed = [self._closed(index) for index in range(len(variants))]
         evidence = [self._log_evidence(index) for index in range(len(variants))]
         least = int(np.argmin(evidence))
         minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
@@ -249,8 +253,9 @@ class _Judgement:
         return Verdict.UNKNOWN if unknown else Verdict.EFFECT
 
     def _named(self) -> float:
-        """What the effect that closes most closes, in what it closes and all of them leave."""
-        most = max(self._closed(index) for index in range(len(self.found.variants)))
+        """What the effect that closes most closes, alone or beside the others, in that and what all of them leave."""
+        beside = max(self._closed(index) for index in range(len(self.found.variants)))
+        most = max(beside, *(self._gap((variant,)).closed for variant in self.found.variants))
         return max(most, 0.0) / max(most + self._left(), np.finfo(float).tiny)
 
     def _predictable(self) -> bool:
@@ -299,12 +304,12 @@ class _Judgement:
 
 
 def ordered(causes: Iterable[Cause]) -> tuple[Cause, ...]:
-    """By the share of the held-out gap that they close, to a tenth, then by evidence; none surer than those before it.
+    """By the share of the held-out gap that they close, to a half, then by evidence; none surer than those before it.
 
     What is found beside another cause is right only as far as that one is.
     """
     found: list[Cause] = []
-    for cause in sorted(causes, key=lambda cause: (-round(cause.closed, 1), -cause.log_evidence)):
+    for cause in sorted(causes, key=lambda cause: (-round(2 * cause.closed), -cause.log_evidence)):
         surest = min([cause.probability, *(other.probability for other in found[-1:])])
         found.append(replace(cause, probability=surest))
     return tuple(found)
