@@ -74,19 +74,24 @@ class SlidingCause:
     def sliding(self, inputs: Array, setting: Setting) -> Array:
         """Speed of each contact over the floor along the plane of its wheel (N, wheels) [m/s]; zero where it rolls.
 
-        Of all wheels none surely rolls: the one that is least ahead is taken to.
+        Where several slide none surely rolls: the one that is least ahead is taken to.
         """
-        pull = np.stack([traction(inputs, wheel, setting) for wheel in self.wheels], axis=1)
-        speed = setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, self.wheels]
+        speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, self.wheels])
+        sense = np.sign(np.stack([traction(inputs, wheel, setting) for wheel in self.wheels], axis=1))
         if len(self.wheels) == 1:
-            forward = np.sign(pull) * ahead_of_others(inputs, setting, self.wheels[0])[:, self.wheels]
+            forward = sense * ahead_of_others(inputs, setting, self.wheels[0])[:, self.wheels]
         else:
-            forward = np.sign(pull) * ahead_of_others(inputs, setting)
+            forward = sense * ahead_of_others(inputs, setting)
             forward = forward - forward.min(axis=1, keepdims=True)
-        slides = np.stack([_slides(*columns) for columns in zip(forward.T, np.abs(speed).T, strict=True)], axis=1)
-        if np.sum(slides.any(axis=0)) < self.fewest:
-            return np.zeros_like(forward)
-        return np.where(slides, np.sign(pull) * forward, 0.0)
+        slides = np.stack([_slides(*columns) for columns in zip(forward.T, speed.T, strict=True)], axis=1)
+        sliding = np.flatnonzero(slides.any(axis=0))
+        slid = np.where(slides, sense * forward, 0.0)
+        if len(sliding) < self.fewest:
+            return np.zeros_like(slid)
+        if len(sliding) == 1 < len(self.wheels):
+            alone = replace(self, wheels=(self.wheels[sliding[0]],))
+            slid[:, sliding] = alone.sliding(inputs, setting)
+        return slid
 
 
 ANY_WHEEL: Final = SlidingCause(CHASSIS[0], tuple(range(len(WHEEL_PLACES))))
