@@ -114,3 +114,28 @@ def test_a_posture_that_is_not_that_of_the_step_is_refused(
         return replace(segment, steering_angles=0 * segment.steering_angles) if segment.step == "rotation" else segment
 
     assert "step rotation: alpha_l is 0.00 rad on average" in _refused(quasi, tmp_path, record(1, ahead))
+
+
+def _thinned(segment: Segment, every: int, most: int | None = None) -> Segment:
+    kept = slice(None, most, every)
+    return Segment(
+        step=segment.step,
+        sample_time=segment.sample_time * every,
+        time=segment.time[kept],
+        motor_torques=segment.motor_torques[kept],
+        wheel_angles=segment.wheel_angles[kept],
+        steering_angles=segment.steering_angles[kept],
+        period=segment.period[kept],
+    )
+
+
+def test_a_record_that_is_sampled_too_slowly_is_refused(
+    quasi: Quasi, record: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = record(1, lambda segment: _thinned(segment, 5))
+    assert "is sampled every 20 ms, too slowly" in _refused(quasi, tmp_path, path)
+
+
+def test_a_step_of_a_few_samples_is_refused(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
+    path = record(1, lambda segment: _thinned(segment, 1, 10 if segment.step == "rotation" else None))
+    assert "step rotation has 10 samples" in _refused(quasi, tmp_path, path)

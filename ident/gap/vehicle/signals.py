@@ -8,7 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.estimate.filters import Processing, differentiate, second_derivative, zero_phase
+from ident.errors import RecordError
+from ident.estimate.filters import FILTER_ORDER, Processing, differentiate, second_derivative, zero_phase
 from ident.gap.vehicle.rows import INPUTS, SLICES
 from ident.records.record import Record, Segment
 from ident.vehicle import kinematics
@@ -18,6 +19,12 @@ Array = NDArray[np.float64]
 
 DECIMATED: Final = 8.0
 """Rows kept per period of the filter's cutoff: what it passes has died away at half of that rate."""
+
+PASSED: Final = 0.95
+"""Largest cutoff of the smoothing filter, in units of the Nyquist frequency."""
+
+SHORTEST: Final = 6 * (FILTER_ORDER + 1)
+"""Samples that a segment must have beyond; the filter continues its ends by half as many."""
 
 
 @dataclass(frozen=True)
@@ -59,14 +66,34 @@ class Signals:
 
 
 def signals_of(record: Record, geometry: Geometry, processing: Processing) -> list[Signals]:
-    """Signals of all segments; the heading goes on from segment to segment."""
+    """Signals of all segments; the heading goes on from segment to segment.
+
+    Raises:
+        RecordError: a segment is sampled too slowly for the filters, or too short for them.
+    """
     heading, found = 0.0, []
     for segment in record.segments:
+        _refuse_unfilterable(segment, record.source, processing)
         signals = _signals(segment, record.source, processing)
         turned = _turned(signals, geometry)
         found.append(replace(signals, heading=heading + turned))
         heading += float(turned[-1])
     return found
+
+
+def _refuse_unfilterable(segment: Segment, source: str, processing: Processing) -> None:
+    limit = PASSED * np.pi / processing.signal_cutoff
+    if segment.sample_time > limit:
+        raise RecordError(
+            f"{source}, step {segment.step} is sampled every {segment.sample_time * 1e3:.3g} ms, too slowly to tell "
+            "friction from inertia where the motion reverses.",
+            f"Record at least every {limit * 1e3:.3g} ms.",
+        )
+    if len(segment) <= SHORTEST:
+        raise RecordError(
+            f"{source}, step {segment.step} has {len(segment)} samples, too few for the filters.",
+            "Cut it out of the record, or record more of it.",
+        )
 
 
 def _signals(segment: Segment, source: str, processing: Processing) -> Signals:
