@@ -82,10 +82,12 @@ class Variant:
         columns: one (N, k) a block, None where it does not act; filtered like the block.
         start: coefficients of the columns (k,) -> values of all parameters of the candidate. None: they are the same,
             those of what may come along behind the parameters.
+        bent: the candidate's contribution says more than these columns; without it, a refit takes the columns alone.
     """
 
     columns: tuple[Array | None, ...]
     start: Callable[[Array], Array] | None = None
+    bent: bool = True
 
 
 @dataclass(frozen=True)

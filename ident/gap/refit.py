@@ -232,7 +232,7 @@ def _unknown(
     finish = variant.start or _same
     columns = tuple(part for candidate in candidates for part in candidate.variants[column.variant].columns)
     stated, spread = len(candidates[0].parameters), candidates[0].spread
-    if candidates[0].contribution is None or not by_form:
+    if candidates[0].contribution is None or not by_form or not variant.bent:
         place = slice(first, first + len(coefficients))
         return _Unknown(candidates[0].key, stated, spread, place, None, columns, finish), coefficients
 

@@ -401,7 +401,7 @@ def _candidate(
         variants: tuple[Variant, ...] = tuple(_probed(cause, sources, context))
     else:
         variants = tuple(
-            Variant(_picked([next(columns) for _ in variant.units], tables), variant.start)
+            Variant(_picked([next(columns) for _ in variant.units], tables), variant.start, variant.bent)
             for variant in cause.variants
         )
     linear = isinstance(cause, TermCause) and SHAPES[cause.name].is_linear

@@ -87,10 +87,12 @@ class UnitVariant:
     Attributes:
         units: one a column.
         start: coefficients of the columns -> values of all parameters, in the order of the effect's.
+        bent: whether the rows depend on more than the columns show.
     """
 
     units: tuple[UnitTerm, ...]
     start: Callable[[Array], Array]
+    bent: bool = True
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,7 @@ def term_causes(names: Sequence[EffectName]) -> list[TermCause]:
 def _variants(name: EffectName, where: str) -> list[UnitVariant]:
     shape = SHAPES[name]
     grid = itertools.product(*shape.tried.values())
-    alone = [_variant(name, where, replace(shape, angle=None), {})] if shape.simple else []
+    alone = [replace(_variant(name, where, replace(shape, angle=None), {}), bent=False)] if shape.simple else []
     return alone + [_variant(name, where, shape, dict(zip(shape.tried, values, strict=True))) for values in grid]
 
 
