@@ -1,46 +1,92 @@
 """The lane change with and without the effect in the feed-forward, on an emulated vehicle that has it.
 
     python examples/closed_loop_benefit.py "asymmetric_coulomb@steering_left=6Nm" --seeds 3
+    python examples/closed_loop_benefit.py "asymmetric_coulomb@steering_left=6Nm" --diagnose
 
-The model's parameters are the emulator's truth and the effect's size is exact, so that what is compared is the
-feed-forward alone.
+Without `--diagnose` the model's parameters are the emulator's truth and the effect's size is exact, so that what is
+compared is the feed-forward alone. With it, nothing is known: two campaigns are driven and diagnosed, the models
+compared are refitted from them without and with what was found, and a lane change that took no part says how far the
+gap shrinks.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 
 import numpy as np
 
 from hil.campaign.folder import network_file_of
 from hil.closed_loop import Tracking, track_lane_change
+from hil.exam.driving import drive
 from hil.network import load_network
 from hil.truth import truth_of
-from ident.campaign.plan import make_plan
-from ident.records.record import Step
-from ident.vehicle.description import load_vehicle
+from ident.campaign.plan import Plan, make_plan
+from ident.gap.vehicle.closing import channel_gaps, extended_model, plain_model
+from ident.gap.vehicle.diagnose import diagnose_vehicle
+from ident.records.record import Record, Step
+from ident.vehicle.description import VehicleDescription, load_vehicle
 from ident.vehicle.effect_text import parse_effect
+from ident.vehicle.effects import Effect
 from ident.vehicle.extended import ExtendedModel
+
+FOUR = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION)
+FIRST_SEED = 1001
+"""Of the campaigns' noise; the lane changes that are tracked have 1, 2, ..."""
 
 
 def main() -> None:
     """Drive and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("effects", nargs="+", type=parse_effect)
     parser.add_argument("--vehicle", default="prototype")
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--diagnose", action="store_true", help="find the effects instead of knowing them")
     arguments = parser.parse_args()
+    vehicle, effects = load_vehicle(arguments.vehicle), tuple(arguments.effects)
+    if arguments.diagnose:
+        models = _found(vehicle, arguments.vehicle, effects)
+    else:
+        truth = truth_of(arguments.vehicle)
+        models = ExtendedModel(truth), ExtendedModel(truth, effects)
+    plan = _plan(vehicle, arguments.vehicle, [Step.LANE_CHANGE], 1)
     network = network_file_of(arguments.vehicle)
-    vehicle, truth = load_vehicle(arguments.vehicle), truth_of(arguments.vehicle)
-    cycle = load_network(network).cycle_period
-    plan = make_plan(vehicle, np.random.default_rng(1), steps=[Step.LANE_CHANGE], periods=4, cycle=cycle)
-    effects = tuple(arguments.effects)
-    for name, model in (("plain", ExtendedModel(truth)), ("with effect", ExtendedModel(truth, effects))):
+    for name, model in zip(("plain", "with effect"), models, strict=True):
         runs = [
             track_lane_change(plan, model, prototype=arguments.vehicle, seed=seed, network=network, effects=effects)
             for seed in range(1, arguments.seeds + 1)
         ]
         print(f"{name:<12} {_mean(runs)}")
+
+
+def _plan(vehicle: VehicleDescription, name: str, steps: Sequence[Step], seed: int) -> Plan:
+    cycle = load_network(network_file_of(name)).cycle_period
+    return make_plan(vehicle, np.random.default_rng(seed), steps=steps, periods=4, cycle=cycle)
+
+
+def _found(vehicle: VehicleDescription, name: str, effects: tuple[Effect, ...]) -> tuple[ExtendedModel, ExtendedModel]:
+    """Models refitted without and with what a diagnosis finds; prints it, and the gaps of the lane change."""
+    campaigns = [
+        drive(_plan(vehicle, name, steps, seed), name, FIRST_SEED + seed, effects)
+        for seed, steps in ((2, FOUR), (3, (*FOUR, Step.LANE_CHANGE)))
+    ]
+    fit, (confirm, unseen) = campaigns[0], _split(campaigns[1])
+    findings = diagnose_vehicle([fit], [confirm], vehicle).findings
+    models = plain_model(findings, vehicle.prior), extended_model(findings, vehicle.prior)
+    for effect in models[1].effects:
+        print("found", effect, *(f"{key} {value.value:.4g}" for key, value in effect.parameters.items()))
+    for channel, gap in channel_gaps([unseen], vehicle, *models, repeated=[confirm]).items():
+        print(f"lane change, {channel}: {gap.before:.2f} times the noise, {gap.after:.2f} with what was found")
+    return models
+
+
+def _split(record: Record) -> tuple[Record, Record]:
+    """The four steps, and the lane change."""
+    parts = (
+        [segment for segment in record.segments if (segment.step == Step.LANE_CHANGE) is changing]
+        for changing in (False, True)
+    )
+    return Record(next(parts), record.source), Record(next(parts), "lane change")
 
 
 def _mean(runs: list[Tracking]) -> str:

@@ -86,7 +86,12 @@ def _guessed_where_unseen(refit: Refit, problem: Problem, guesses: Parameters) -
 
 
 def channel_gaps(
-    records: Sequence[Record], vehicle: VehicleDescription, before: ExtendedModel, after: ExtendedModel
+    records: Sequence[Record],
+    vehicle: VehicleDescription,
+    before: ExtendedModel,
+    after: ExtendedModel,
+    *,
+    repeated: Sequence[Record] = (),
 ) -> Mapping[Channel, Gap]:
     """Gap of two models on records, by channel, in units of the noise between repeats of each coordinate.
 
@@ -94,14 +99,19 @@ def channel_gaps(
         records: that neither model was fitted to; a lane change counts too.
         vehicle: its geometry.
         before, after: the models.
+        repeated: further records of the vehicle, for the noise alone, where those above repeat nothing.
 
     Raises:
         RecordError: a record has no step that the model describes.
     """
     processing = Processing()
-    sources = [s for record in records for s in sources_of(record, vehicle.geometry, tuple(ROWS), processing)]
-    first, second = (list(_series(sources, vehicle, model, processing)) for model in (before, after))
-    floors = _floors(second)
+
+    def left_by(model: ExtendedModel, some: Sequence[Record]) -> list[Series]:
+        sources = [s for record in some for s in sources_of(record, vehicle.geometry, tuple(ROWS), processing)]
+        return list(_series(sources, vehicle, model, processing))
+
+    first, second = left_by(before, records), left_by(after, records)
+    floors = _floors([*second, *(left_by(after, repeated) if repeated else ())])
     return {channel: _gap(channel, first, second, floors) for channel in Channel}
 
 

@@ -14,7 +14,7 @@ from ident.gap.vehicle.closing import channel_gaps, extended_model, plain_model
 from ident.gap.vehicle.diagnose import diagnose_vehicle
 from ident.records.record import Record, Segment
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.effects import EffectName, make_effect
+from ident.vehicle.effects import EFFECTS, EffectName, make_effect
 from ident.vehicle.extended import ExtendedModel
 
 Drives = Callable[..., tuple[Record, Record]]
@@ -22,6 +22,10 @@ Drives = Callable[..., tuple[Record, Record]]
 
 def biased(segment: Segment) -> Segment:
     return replace(segment, motor_torques=segment.motor_torques - np.array([0, 0, 0.05, 0]))
+
+
+def flawed(record: Record, flaw: Callable[[Segment], Segment]) -> Record:
+    return replace(record, segments=[flaw(segment) for segment in record.segments])
 
 
 def worn(segment: Segment) -> Segment:
@@ -46,6 +50,45 @@ def test_the_right_radius_closes_the_kinematic_gap(prototype: VehicleDescription
     right = make_effect(EffectName.WHEEL_RADIUS, "wheel_fl", {"error": -0.0005})
     gaps = channel_gaps([unseen], prototype, ExtendedModel(prototype.prior), ExtendedModel(prototype.prior, (right,)))
     assert gaps[Channel.KINEMATIC].closed > 0.95
+
+
+def late(segment: Segment) -> Segment:
+    """The left encoder is 8 ms late."""
+    angle = np.interp(segment.time - 0.008, segment.time, segment.steering_angles[:, 0])
+    return replace(segment, steering_angles=np.stack([angle, segment.steering_angles[:, 1]], axis=1))
+
+
+def test_the_right_delay_of_an_encoder_closes_what_is_read_too_late(
+    prototype: VehicleDescription, drives: Drives
+) -> None:
+    _, unseen = drives(prototype, late)
+    right = make_effect(EffectName.TIME_DELAY, "encoder_left", {"delay": 0.008})
+    gaps = channel_gaps([unseen], prototype, ExtendedModel(prototype.prior), ExtendedModel(prototype.prior, (right,)))
+    assert gaps[Channel.KINEMATIC].closed > 0.9
+    assert gaps[Channel.OUTCOME].after <= gaps[Channel.OUTCOME].before
+
+
+def test_a_model_may_have_every_effect_there_is(prototype: VehicleDescription, drives: Drives) -> None:
+    """Each at its last place, hardly of any size: all channels stay where they were."""
+    _, unseen = drives(prototype, lambda segment: segment)
+    sizes = {EffectName.SLIP: 0.6, EffectName.ELASTICITY: 1e-6}
+    effects = tuple(
+        make_effect(name, spec.places[-1], {spec.size.name: sizes.get(name, 1e-9)}) for name, spec in EFFECTS.items()
+    )
+    plain = ExtendedModel(prototype.prior)
+    for gap in channel_gaps([unseen], prototype, plain, ExtendedModel(prototype.prior, effects)).values():
+        assert gap.after == pytest.approx(gap.before, abs=0.05)
+
+
+def test_the_noise_may_come_from_other_records(prototype: VehicleDescription, drives: Drives) -> None:
+    """A single repeat has no noise of its own to be measured in."""
+    repeated, unseen = drives(prototype, biased)
+    once = flawed(unseen, lambda segment: replace(segment, period=np.full(len(segment), -1)))
+    right = make_effect(EffectName.TORQUE_BIAS, "drive_fr", {"bias": 0.05})
+    models = ExtendedModel(prototype.prior), ExtendedModel(prototype.prior, (right,))
+    gaps = channel_gaps([once], prototype, *models, repeated=[repeated])
+    assert gaps[Channel.DYNAMIC].closed > 0.9
+    assert np.isnan(channel_gaps([once], prototype, *models)[Channel.DYNAMIC].before)
 
 
 def test_nothing_is_found_where_nothing_is_missing(prototype: VehicleDescription, drives: Drives) -> None:
