@@ -27,8 +27,6 @@ VISIBLE: Final = 0.02
 BESIDE: Final = 4.0
 """Log evidence that what comes along with an effect must bring more than the price of its number: few effects do not
 come alone, one in fifty by this."""
-HIDDEN: Final = 1.0
-"""Log evidence that a column costs which shows nothing: the same effect without it is simpler."""
 RANK: Final = 1e-7
 """Smallest singular value, relative to the largest, of a baseline column that counts."""
 
@@ -196,8 +194,7 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
     scale = np.array([_scatter(found, amplitudes, variant, white.stretch) for variant in range(len(layout))])
     scale = _shared(found, amplitudes, best, scale)
     spread = np.maximum(found.ratios(surrogates).mean(axis=0) / np.maximum(sizes, 1), 1.0)
-    widths = np.array([column.place.stop - column.place.start for column in layout])
-    price = 0.5 * sizes * math.log(len(white.target)) + HIDDEN * (widths - sizes)
+    price = 0.5 * sizes * math.log(len(white.target))
     for several in found.bounded:
         price[several.variant] += BESIDE * (sizes[several.variant] - 1)
     tested = np.where(competing, 0.5 * ratios / spread - price, -np.inf)

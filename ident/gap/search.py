@@ -36,6 +36,9 @@ CONTENDERS: Final = 12
 SAME: Final = 0.9999
 """Cosine of two columns that are one and the same."""
 
+SIMPLER: Final = 3.0
+"""Log evidence that a further column of the same candidate must bring."""
+
 SILENT = 1e-12
 """Rms, in whatever unit, of a group that leaves nothing at all, as ideal records do."""
 
@@ -207,11 +210,24 @@ class Regression:
     def slot(self, given: Sequence[int], whitener: Whitener) -> Slot:
         """What may stand beside the variants given."""
         evidence = self.evidence(whitener, given)
-        best: dict[int, int] = {}
-        for variant in np.argsort(evidence.log_evidence)[::-1].tolist():
-            if np.isfinite(evidence.log_evidence[variant]):
-                best.setdefault(self.owners[variant], variant)
-        return Slot(evidence, tuple(best.values()))
+        found = evidence.log_evidence
+        contenders: dict[int, list[int]] = {}
+        for variant in np.flatnonzero(np.isfinite(found)).tolist():
+            contenders.setdefault(self.owners[variant], []).append(variant)
+        best = [self._simplest(variants, found) for variants in contenders.values()]
+        return Slot(evidence, tuple(sorted(best, key=lambda variant: -float(found[variant]))))
+
+    def _simplest(self, variants: Sequence[int], log_evidence: Array) -> int:
+        """The best variant of a candidate, or one of fewer columns that is nearly as good."""
+        best = max(variants, key=lambda variant: float(log_evidence[variant]))
+        width = {variant: self._width(variant) for variant in variants}
+        close = [variant for variant in variants if log_evidence[variant] > log_evidence[best] - SIMPLER]
+        narrow = [variant for variant in close if width[variant] < width[best]]
+        return max(narrow, key=lambda variant: float(log_evidence[variant])) if narrow else best
+
+    def _width(self, variant: int) -> int:
+        place = self.rows.layout[variant].place
+        return place.stop - place.start
 
     def prior_residual(self, baseline: Array) -> Array:
         """What is known beforehand of the parameters, minus these, in standard deviations; empty without a model."""
