@@ -25,9 +25,10 @@ def test_of_the_plain_vehicle_nothing_is_missing_and_its_parameters_come_out(
     assert found.diagnosis.verdict is Verdict.NONE
     p, g = extended_model(found.findings, prototype.prior).parameters, prototype.geometry
     wheel = 2 * g.lever_ratio**2
-    for name, merged in (("C_l", wheel), ("C_r", wheel), ("m_ch", 4 / g.wheel_radius**2)):
+    # An inertia of the steering asks for a tenth of what its friction does: without noise 2 % of it stay unsure.
+    for name, merged, part in (("C_l", wheel, 0.05), ("C_r", wheel, 0.05), ("m_ch", 4 / g.wheel_radius**2, 0.002)):
         expected = plain_truth[name] + merged * plain_truth["B_w"]
-        assert p[name] + merged * p["B_w"] == pytest.approx(expected, rel=0.02), name
+        assert p[name] + merged * p["B_w"] == pytest.approx(expected, rel=part), name
     for name in ("d_vw", "d_cw"):
         assert p[name] == pytest.approx(plain_truth[name], rel=0.01), name
     for side in "lr":
