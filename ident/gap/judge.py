@@ -39,6 +39,7 @@ class Limits:
         widening: share of the held-out gap by which an effect may seem to widen it.
         minor: log evidence over that of the strongest effect above which one counts that closes less.
         share: of the gap that is left, which an effect must close to count all the same.
+        trifle: share of the whole gap that it must close in any case.
     """
 
     deviations: float = 3.0
@@ -51,6 +52,7 @@ class Limits:
     widening: float = 0.1
     minor: float = 0.05
     share: float = 0.1
+    trifle: float = 1e-3
 
 
 @dataclass(frozen=True)
@@ -195,7 +197,8 @@ class _Judgement:
         evidence = [self._log_evidence(index) for index in range(len(variants))]
         least = int(np.argmin(evidence))
         minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
-        return self._others(least) if minor and closed[least] < self.limits.share * self._left() else variants
+        needed = max(self.limits.trifle, self.limits.share * self._left())
+        return self._others(least) if minor and closed[least] < needed else variants
 
     def _left(self) -> float:
         """Share of the removable held-out gap that all effects leave."""

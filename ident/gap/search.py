@@ -219,15 +219,15 @@ class Regression:
 
     def _simplest(self, variants: Sequence[int], log_evidence: Array) -> int:
         """The best variant of a candidate, or one of fewer columns that is nearly as good."""
-        best = max(variants, key=lambda variant: float(log_evidence[variant]))
+        best: int = max(variants, key=lambda variant: float(log_evidence[variant]))
         width = {variant: self._width(variant) for variant in variants}
         close = [variant for variant in variants if log_evidence[variant] > log_evidence[best] - SIMPLER]
         narrow = [variant for variant in close if width[variant] < width[best]]
-        return max(narrow, key=lambda variant: float(log_evidence[variant])) if narrow else best
+        return max(narrow or [best], key=lambda variant: float(log_evidence[variant]))
 
     def _width(self, variant: int) -> int:
         place = self.rows.layout[variant].place
-        return place.stop - place.start
+        return int(place.stop - place.start)
 
     def prior_residual(self, baseline: Array) -> Array:
         """What is known beforehand of the parameters, minus these, in standard deviations; empty without a model."""
