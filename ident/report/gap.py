@@ -147,11 +147,14 @@ def _doubtful(findings: Findings) -> Mapping[str, float]:
 
 
 def _parameters(findings: Findings) -> list[tuple[str, str, str, str]]:
-    before, after = findings.before, findings.after
+    after, nominal = findings.after, findings.problem.nominal
+    values, deviations = findings.before.baseline, findings.before.baseline_std
+    if nominal is not None:
+        values, deviations = nominal.values, nominal.std
     return [
         (
             name,
-            digits.with_std(float(before.baseline[index]), float(before.baseline_std[index])),
+            digits.with_std(float(values[index]), float(deviations[index])),
             digits.with_std(float(after.baseline[index]), float(after.baseline_std[index])),
             digits.unit_text(unit),
         )

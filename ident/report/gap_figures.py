@@ -78,7 +78,7 @@ def residual_figures(findings: Findings) -> list[tuple[str, str, Figure]]:
     """Key, title and figure of what the model leaves, before and after; the largest gap over its noise first."""
     drawn: list[tuple[str, str, Figure]] = []
     blocks = findings.problem.blocks
-    before, after = findings.before.blocks[: len(blocks)], findings.after.blocks[: len(blocks)]
+    before, after = _judged(findings), findings.after.blocks[: len(blocks)]
     rows = make_rows(replace(findings.problem, candidates=()))
     floors = noise_floors(rows, after, rows.target - rows.stack(list(after)))
     sizes = [_size(*one) for one in zip(blocks, before, floors.tolist(), strict=True)]
@@ -91,6 +91,14 @@ def residual_figures(findings: Findings) -> list[tuple[str, str, Figure]]:
         title = f"{block.step} · {block.coordinate}{channel}: {significant(sizes[index], 2)} times the noise"
         drawn.append((f"residual-{index}", title, _residual(block, models)))
     return drawn
+
+
+def _judged(findings: Findings) -> Sequence[Array]:
+    """The model of every fitted block that is judged: as given, or refitted without the causes."""
+    blocks, nominal = findings.problem.blocks, findings.problem.nominal
+    if nominal is None:
+        return findings.before.blocks[: len(blocks)]
+    return [block.baseline @ nominal.values for block in blocks]
 
 
 def _size(block: Block, model: Array, floor: float) -> float:

@@ -48,7 +48,7 @@ class Series:
 def extended_model(findings: Findings, guesses: Parameters) -> ExtendedModel:
     """The parameters refitted jointly with the effects that were found, and these effects.
 
-    A changed parameter is none of them: its new value is among the parameters.
+    A changed parameter is one of them; the parameters are those of the model that was judged.
 
     Args:
         findings: of a diagnosis.
@@ -57,7 +57,7 @@ def extended_model(findings: Findings, guesses: Parameters) -> ExtendedModel:
     """
     refit = findings.after
     effects = []
-    for cause in (cause for cause in findings.causes if not cause.candidate.drift):
+    for cause in findings.causes:
         names = [entry.name for entry in cause.candidate.parameters]
         values = dict(zip(names, cause.part.values.tolist(), strict=True))
         std = dict(zip(names, cause.part.std.tolist(), strict=True))
