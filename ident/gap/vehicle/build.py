@@ -54,6 +54,9 @@ RATTLING: Final = 1000.0
 RATTLING_SHARE: Final = 0.64
 """The same at most, in units of the Nyquist frequency."""
 
+ROUNDING: Final = 1e-12
+"""Of a column, relative to what the model has in the same row."""
+
 PRIOR_WEIGHT: Final = 1e-4
 """Of the vehicle file's guesses against the rows, per unit-norm column: only what no row shows is taken from them."""
 
@@ -469,9 +472,13 @@ def _acting(variants: Sequence[Variant], sources: Sequence[Source]) -> list[bool
 
 
 def _picked(columns: list[int], tables: Sequence[Array]) -> tuple[Array | None, ...]:
-    """The columns of every block; None where they are all zero."""
-    blocks = [table[:, row][:, columns] for table in tables for row in range(table.shape[1])]
-    return tuple(block if np.any(block) else None for block in blocks)
+    """The columns of every block; None where they are all zero, but for rounding."""
+    found: list[Array | None] = []
+    for table in tables:
+        for row in range(table.shape[1]):
+            block, scale = table[:, row][:, columns], float(np.abs(table[:, row, :_COLUMNS]).max(initial=0.0))
+            found.append(block if np.any(np.abs(block) > ROUNDING * scale) else None)
+    return tuple(found)
 
 
 def _probed(cause: TransformCause, sources: Sequence[Source], context: Context) -> Iterator[Variant]:

@@ -17,12 +17,14 @@ from ident.vehicle.description import VehicleDescription
 Drives = Callable[..., tuple[Record, Record]]
 
 
-def test_of_the_plain_vehicle_nothing_is_missing_and_its_parameters_come_out(
+def test_of_the_plain_vehicle_no_cause_is_named_and_its_parameters_come_out(
     drives: Drives, prototype: VehicleDescription, plain_truth: dict[str, float]
 ) -> None:
     fit, confirm = drives()
     found = diagnose_vehicle([fit], [confirm], prototype)
-    assert found.diagnosis.verdict is Verdict.NONE
+    # Its contacts creep, which the model lacks: 0.7 of the noise repeats in both records, and no cause fits it.
+    assert found.diagnosis.verdict is not Verdict.EFFECT
+    assert not found.diagnosis.effects
     p, g = extended_model(found.findings, prototype.prior).parameters, prototype.geometry
     wheel = 2 * g.lever_ratio**2
     # An inertia of the steering asks for a tenth of what its friction does: without noise 2 % of it stay unsure.
