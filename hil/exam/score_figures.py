@@ -19,7 +19,7 @@ _EDGE: Final = 56
 _WIDTH: Final = 320
 
 _CELL: Final = 24
-_LABEL: Final = 170
+_LABEL: Final = 205
 _HEAD: Final = 150
 _VERDICTS: Final = ("none", "unknown", "failed")
 
