@@ -11,7 +11,7 @@ from typing import Final
 from hil.exam.driving import drive
 from hil.exam.noise_units import Noise, SizeInNoise, noise_of, size_in_noise
 from hil.exam.plans import plan_exam
-from hil.exam.probes import DRIFTS, IDLE, KINEMATIC, SHARES, SIGNED, THRESHOLDS, Probe, all_probes
+from hil.exam.probes import IDLE, KINEMATIC, SHARES, SIGNED, THRESHOLDS, Probe, all_probes
 from hil.exam.quiet import drive_quietly
 from hil.exam.sealing import effect_of
 from hil.exam.sizes import EffectSize
@@ -19,6 +19,7 @@ from hil.exam.workers import run_all
 from hil.truth import truth_of
 from ident.campaign.plan import Plan
 from ident.errors import UserError
+from ident.gap.vehicle.library import DRIFTS
 from ident.records.record import Record
 from ident.vehicle.description import load_vehicle
 from ident.vehicle.geometry import Geometry

@@ -20,12 +20,13 @@ from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.plans import plans_from_text
 from ident.campaign.plan import Plan
 from ident.campaign.reference import STEERING_LOOPS, sample_times
+from ident.gap.evidence import orthonormal
 from ident.gap.problem import Candidate, Problem
 from ident.gap.rows import Column, make_rows
 from ident.gap.search import least_squares
 from ident.gap.vehicle.build import build_problem
 from ident.gap.vehicle.library import DRIFTS, ONE_SIDED
-from ident.gap.vehicle.visibility import VISIBLE, orthonormal, row_noise
+from ident.gap.vehicle.visibility import RANK, VISIBLE, row_noise
 from ident.records.record import Record, Segment, make_segment
 from ident.vehicle.description import load_vehicle
 from ident.vehicle.effects import EFFECTS, EffectName
@@ -117,7 +118,7 @@ def identities(problem: Problem) -> Identities:
     """
     rows = make_rows(problem)
     scale = row_noise(rows)[:, None]
-    baseline, columns = orthonormal(rows.baseline / scale), rows.columns / scale
+    baseline, columns = orthonormal(rows.baseline / scale, RANK), rows.columns / scale
     beside = columns - baseline @ (baseline.T @ columns)
     groups: Mapping[bool, list[_Cause]] = {
         drift: [
@@ -170,7 +171,7 @@ class _Cause:
 
 def _cause(candidate: Candidate, layout: Sequence[Column], number: int, left: Array, whole: Array) -> _Cause | None:
     """None where nothing is to be seen of it."""
-    own = [column for column in layout if column.candidate == number and column.place.stop > column.place.start]
+    own = [column for column in layout if column.candidate == number and column.width > 0]
     spaces = [left[:, column.place] for column in own]
     injected = next((index for index, column in enumerate(own) if _is_injected(candidate, column)), None)
     if injected is None:
@@ -186,7 +187,7 @@ def _is_injected(candidate: Candidate, column: Column) -> bool:
     start = candidate.variants[column.variant].start
     if start is None:
         return True
-    values = start(np.eye(column.place.stop - column.place.start)[0])
+    values = start(np.eye(column.width)[0])
     defaults = [parameter.default for parameter in EFFECTS[EffectName(candidate.effect)].parameters]
     return all(
         default is None or bool(np.isclose(value, default)) for default, value in zip(defaults, values, strict=True)

@@ -18,11 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.campaign.steps import EXCITATIONS
 from ident.estimate.equations import Equations, motion_of, usable_equations
 from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.estimate.noise import noise_floor
-from ident.gap.vehicle.build import CREEP, TURNING_CREEP
-from ident.records.record import Record, Segment, Step, base_step
+from ident.gap.vehicle.build import granted_creep
+from ident.records.record import Record, Segment, Step
 from ident.vehicle import kinematics
 from ident.vehicle.geometry import Geometry
 
@@ -136,6 +137,5 @@ def _slip_size(plain: Segment, changed: Segment, noise: Array, geometry: Geometr
 def _slip_noise(segment: Segment, geometry: Geometry) -> Array:
     slips, moving = _slips(segment, geometry)
     speed = geometry.wheel_radius * motion_of(segment, geometry, _PROCESSING).rates[moving, 5:]
-    steering = base_step(segment.step) in (Step.STEERING_LEFT, Step.STEERING_RIGHT)
-    creep = (TURNING_CREEP if steering else CREEP) * _rms(speed)
+    creep = granted_creep(EXCITATIONS[Step(segment.step)].mode, speed)
     return np.asarray(np.hypot(np.sqrt(np.mean(slips[moving] ** 2, axis=0)), creep))

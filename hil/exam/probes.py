@@ -26,9 +26,6 @@ SIGNED: Final = frozenset(
 )
 """Effects that go both ways."""
 
-DRIFTS: Final = frozenset({EffectName.PAYLOAD, EffectName.PARAMETER_CHANGE})
-"""Effects that the model's own columns absorb: measured without that."""
-
 KINEMATIC: Final = frozenset({EffectName.WHEEL_RADIUS, EffectName.TIME_DELAY})
 """Effects that break the rolling constraints, and are measured there where no torque shows them."""
 

@@ -42,18 +42,16 @@ class EffectSize:
     known: bool
 
     def physical(self, noise_units: float) -> float:
-        """Size that amounts to so many noise units."""
-        return physical_size(self.points, noise_units)
+        """Size that amounts to so many noise units.
 
-
-def physical_size(points: Sequence[tuple[float, float]], noise_units: float) -> float:
-    """Straight lines through (size, noise units), both axes logarithmic; in proportion beyond the points."""
-    sizes, units = zip(*points, strict=True)
-    if noise_units <= units[0]:
-        return float(sizes[0] * noise_units / units[0])
-    if noise_units >= units[-1]:
-        return float(sizes[-1] * noise_units / units[-1])
-    return float(np.exp(np.interp(math.log(noise_units), np.log(units), np.log(sizes))))
+        Straight lines through the points, both axes logarithmic; in proportion beyond them.
+        """
+        sizes, units = zip(*self.points, strict=True)
+        if noise_units <= units[0]:
+            return float(sizes[0] * noise_units / units[0])
+        if noise_units >= units[-1]:
+            return float(sizes[-1] * noise_units / units[-1])
+        return float(np.exp(np.interp(math.log(noise_units), np.log(units), np.log(sizes))))
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ def closed_alone(findings: Findings, problems: Sequence[Problem], keys: Collecti
             for column in trial.rows.layout
             if (candidate := candidates[column.candidate]).effect == name
             and (name not in given or candidate.key in keys)
-            and column.place.stop > column.place.start
+            and column.width > 0
         ]
         if chosen:
             found.append(trial.alone(chosen))

@@ -143,12 +143,12 @@ def directions(white: White, layout: Sequence[Column], rows: Mask | None = None)
     return Directions(np.hstack(parts), tuple(places), low, small, residual, np.array(volumes), tuple(bounded))
 
 
-def orthonormal(columns: Array) -> Array:
-    """Orthonormal basis of columns of any scale, dependent ones left out."""
+def orthonormal(columns: Array, rank: float = RANK) -> Array:
+    """Orthonormal basis of columns of any scale; singular values up to `rank` of the largest are left out."""
     norms = np.linalg.norm(columns, axis=0)
     scaled = columns[:, norms > 0] / norms[norms > 0]
     vectors, singular, _ = np.linalg.svd(scaled, full_matrices=False)
-    return np.asarray(vectors[:, singular > RANK * singular.max(initial=0.0)])
+    return np.asarray(vectors[:, singular > rank * singular.max(initial=0.0)])
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -189,7 +190,7 @@ class _Judgement:
     def worthwhile(self) -> tuple[int, ...]:
         """The effects without one that widens the held-out gap, or without the least one if that closes a trifle."""
         variants = self.found.variants
-        closed = [self._closed(index) for index in range(len(variants))]
+        closed = self._closed
         if closed and min(closed) < -self.limits.widening:
             return self._others(int(np.argmin(closed)))
         if len(variants) < 2:
@@ -197,13 +198,18 @@ class _Judgement:
         evidence = [self._log_evidence(index) for index in range(len(variants))]
         least = int(np.argmin(evidence))
         minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
-        needed = max(self.limits.trifle, self.limits.share * self._left())
+        needed = max(self.limits.trifle, self.limits.share * self._left)
         return self._others(least) if minor and closed[least] < needed else variants
 
+    @cached_property
+    def _whole(self) -> Gap:
+        """With all effects, as their columns."""
+        return self._gap(self.found.variants)
+
+    @property
     def _left(self) -> float:
         """Share of the removable held-out gap that all effects leave."""
-        gap = self._gap(self.found.variants)
-        return max(1 - gap.closed, 0.0)
+        return max(1 - self._whole.closed, 0.0)
 
     def _log_evidence(self, index: int) -> float:
         return float(self.found.slots[index].evidence.log_evidence[self.found.variants[index]])
@@ -229,11 +235,13 @@ class _Judgement:
     def _gap(self, variants: Sequence[int], *, exact: bool = False) -> Gap:
         return held_out_gap(self.rows, self.floors, self.untouched, self._held_out_models(variants, exact=exact))
 
-    def _closed(self, index: int) -> float:
-        """Share of the removable held-out gap that one effect closes, the others given; all as their columns."""
-        whole, without = self._gap(self.found.variants), self._gap(self._others(index))
+    @cached_property
+    def _closed(self) -> list[float]:
+        """Share of the removable held-out gap that each effect closes, the others given; all as their columns."""
+        whole = self._whole
         removable = whole.before**2 - whole.floor**2
-        return (without.after**2 - whole.after**2) / removable if removable > 0 else 0.0
+        without = [self._gap(self._others(index)).after for index in range(len(self.found.variants))]
+        return [(after**2 - whole.after**2) / removable if removable > 0 else 0.0 for after in without]
 
     def _others(self, index: int) -> tuple[int, ...]:
         return tuple(other for place, other in enumerate(self.found.variants) if place != index)
@@ -257,9 +265,8 @@ class _Judgement:
 
     def _named(self) -> float:
         """What the effect that closes most closes, alone or beside the others, in that and what all of them leave."""
-        beside = max(self._closed(index) for index in range(len(self.found.variants)))
-        most = max(beside, *(self._gap((variant,)).closed for variant in self.found.variants))
-        return max(most, 0.0) / max(most + self._left(), np.finfo(float).tiny)
+        most = max(*self._closed, *(self._gap((variant,)).closed for variant in self.found.variants))
+        return max(most, 0.0) / max(most + self._left, np.finfo(float).tiny)
 
     def _predictable(self) -> bool:
         """Whether a smooth function of the states predicts what the effects leave, and it is no trifle."""
@@ -279,7 +286,7 @@ class _Judgement:
 
     def _causes(self) -> tuple[Cause, ...]:
         made = [self._cause(index, variant) for index, variant in enumerate(self.found.variants)]
-        return ordered(made)
+        return _ordered(made)
 
     def _cause(self, index: int, variant: int) -> Cause:
         slot, settings = self.found.slots[index], calibration()
@@ -292,7 +299,7 @@ class _Judgement:
             probability=min(ranked.probability, settings.ceiling),
             log_evidence=self._log_evidence(index),
             log_predictive=float(slot.evidence.log_predictive[variant]),
-            closed=self._closed(index),
+            closed=self._closed[index],
             biased=self._biased(self._others(index)),
         )
 
@@ -306,7 +313,7 @@ class _Judgement:
         return dict(zip(self.problems[0].names, shift.tolist(), strict=True))
 
 
-def ordered(causes: Iterable[Cause]) -> tuple[Cause, ...]:
+def _ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
     """By the share of the held-out gap that they close, to a half, then by evidence; none surer than those before it.
 
     What is found beside another cause is right only as far as that one is.

@@ -143,7 +143,7 @@ class _Model:
         parts, taken = [linear[: self.size]], self.size
         for variant in variants:
             column = self.rows.layout[variant]
-            width = column.place.stop - column.place.start
+            width = column.width
             unknown, start = _unknown(
                 problems, column, linear[taken : taken + width], sum(len(p) for p in parts), exact
             )
@@ -214,11 +214,12 @@ class _Model:
         scale[scale == 0] = 1.0
         inverse = np.linalg.pinv(jacobian.T / scale[:, None] @ (jacobian / scale), rcond=1e-12, hermitian=True)
         stretch = self.regression.stretch[self.chosen]
-        scores = (jacobian / scale)[: len(stretch)] * residual[: len(stretch), None]
+        scaled = jacobian / scale
+        scores = scaled[: len(stretch)] * residual[: len(stretch), None]
         starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
         sums = np.add.reduceat(scores, starts, axis=0)
         freedom = len(starts) / max(len(starts) - 1, 1)
-        prior = (jacobian / scale)[len(stretch) :]
+        prior = scaled[len(stretch) :]
         robust = inverse @ (freedom * sums.T @ sums + prior.T @ prior) @ inverse
         lift = np.sqrt(np.maximum(np.diag(inverse) / np.maximum(np.diag(robust), np.finfo(float).tiny), 1.0))
         return np.asarray(robust * np.outer(lift, lift) / np.outer(scale, scale))

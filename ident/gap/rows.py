@@ -59,6 +59,11 @@ class Column:
     least: float
     negligible: float
 
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return int(self.place.stop - self.place.start)
+
 
 @dataclass(frozen=True)
 class Rows:

@@ -116,12 +116,12 @@ class Regression:
         """Variants of several columns each of which is a variant by itself, with those."""
         norms = np.linalg.norm(self.rows.columns, axis=0)
         unit = self.rows.columns / np.where(norms > 0, norms, 1.0)
-        places = [column.place for column in self.rows.layout]
-        alone = {place.start: variant for variant, place in enumerate(places) if place.stop == place.start + 1}
+        layout = self.rows.layout
+        alone = {column.place.start: variant for variant, column in enumerate(layout) if column.width == 1}
         found = {}
-        for variant, place in enumerate(places):
-            cosines = np.abs(unit[:, place].T @ unit[:, list(alone)])
-            if place.stop > place.start + 1 and np.all(cosines.max(axis=1, initial=0.0) > SAME):
+        for variant, column in enumerate(layout):
+            cosines = np.abs(unit[:, column.place].T @ unit[:, list(alone)])
+            if column.width > 1 and np.all(cosines.max(axis=1, initial=0.0) > SAME):
                 found[variant] = tuple(list(alone.values())[best] for best in cosines.argmax(axis=1).tolist())
         return found
 
@@ -150,18 +150,21 @@ class Regression:
     def _colour(self, variants: Sequence[int], order: int = ORDER) -> Whitener:
         """Colour of what the baseline and these variants leave, fitted by turns with them."""
         design = np.hstack([self.rows.baseline, self.columns_of(variants)])
-        weighted = np.column_stack([design, self.rows.target]) / self._scale[:, None]
-        residual = self.rows.target - design @ least_squares(weighted[:, :-1], weighted[:, -1])
+        residual = self.rows.target - design @ self._level(design)
         whitener = fit_whitener(self.rows, residual, design.shape[1], order, self._repeats)
         white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
         residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
         return fit_whitener(self.rows, residual, design.shape[1], order, self._repeats)
 
+    def _level(self, design: Array) -> Array:
+        """Coefficients of some columns (n, k), every group in units of what the baseline leaves of it."""
+        weighted = np.column_stack([design, self.rows.target]) / self._scale[:, None]
+        return least_squares(weighted[:, :-1], weighted[:, -1])
+
     @cached_property
     def _repeats(self) -> Sequence[Colour]:
         """Colour of what differs between repeats: of measurement and motion, the model taken off."""
-        weighted = np.column_stack([self.rows.baseline, self.rows.target]) / self._scale[:, None]
-        parameters = least_squares(weighted[:, :-1], weighted[:, -1])
+        parameters = self._level(self.rows.baseline)
         residuals = [block.target - block.baseline @ parameters for block, _ in self.rows.blocks]
         return colours_of_repeats(self.rows, residuals)
 
@@ -220,14 +223,10 @@ class Regression:
     def _simplest(self, variants: Sequence[int], log_evidence: Array) -> int:
         """The best variant of a candidate, or one of fewer columns that is nearly as good."""
         best: int = max(variants, key=lambda variant: float(log_evidence[variant]))
-        width = {variant: self._width(variant) for variant in variants}
+        width = {variant: self.rows.layout[variant].width for variant in variants}
         close = [variant for variant in variants if log_evidence[variant] > log_evidence[best] - SIMPLER]
         narrow = [variant for variant in close if width[variant] < width[best]]
         return max(narrow or [best], key=lambda variant: float(log_evidence[variant]))
-
-    def _width(self, variant: int) -> int:
-        place = self.rows.layout[variant].place
-        return int(place.stop - place.start)
 
     def prior_residual(self, baseline: Array) -> Array:
         """What is known beforehand of the parameters, minus these, in standard deviations; empty without a model."""

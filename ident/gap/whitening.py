@@ -85,12 +85,13 @@ def colours_of_repeats(rows: Rows, residuals: Sequence[Array]) -> tuple[Colour, 
         residuals: of every block, (N,), of any model: what repeats in them cancels.
     """
     groups = int(rows.group.max(initial=-1)) + 1
+    ages = row_ages(rows)
     sums, counts, means = np.zeros((groups, ORDER + 1)), np.zeros(groups, dtype=int), np.zeros(groups)
     for (_, kept), place, residual in zip(rows.blocks, rows.block_slices, residuals, strict=True):
         repeats, length = kept.samples.shape
         if repeats < 2 or length == 0:
             continue
-        group, age = rows.group[place.start], row_ages(rows)[place]
+        group, age = rows.group[place.start], ages[place]
         deviations = residual[kept.samples] - residual[kept.samples].mean(axis=0)
         for lag in range(ORDER + 1):
             later = np.flatnonzero(age >= lag)
@@ -116,10 +117,10 @@ def fit_whitener(
     `repeats` are the colours of `colours_of_repeats`; without them, only what is left has one.
     """
     inflation = len(rows) / max(len(rows) - freedom_lost, 1.0)
-    tolerated = _tolerated(rows)
+    tolerated, age = _tolerated(rows), row_ages(rows)
     predictors = []
     for group in range(int(rows.group.max(initial=-1)) + 1):
-        colour = _colour(residual, row_ages(rows), rows.group == group, inflation)
+        colour = _colour(residual, age, rows.group == group, inflation)
         known = repeats[group] if repeats is not None else Colour(colour.covariance, 0)
         if known.count and colour.covariance[0] <= PREVAILING * known.covariance[0]:
             colour = known

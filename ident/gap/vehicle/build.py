@@ -378,8 +378,13 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
 def tolerated_creep(source: Source, geometry: Geometry) -> float:
     """Speed of the contacts (rms) that creep may take from rolling [m/s]."""
     speed = geometry.wheel_radius * source.inputs[:, rows.SLICES["beta_rate"]]
-    creep = TURNING_CREEP if source.spec.mode is Mode.ALIGNMENT else CREEP
-    return creep * float(np.sqrt(np.mean(speed[source.moving[0]] ** 2)))
+    return granted_creep(source.spec.mode, speed[source.moving[0]])
+
+
+def granted_creep(mode: Mode | None, speed: Array) -> float:
+    """The same of contacts that roll at some speeds (..., 4) [m/s] in a mode."""
+    creep = TURNING_CREEP if mode is Mode.ALIGNMENT else CREEP
+    return creep * float(np.sqrt(np.mean(speed**2)))
 
 
 def _unit(channel: Channel, coordinate: str) -> str:

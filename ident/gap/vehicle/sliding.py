@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from ident.estimate.filters import differentiate, zero_phase
 from ident.gap.vehicle.rows import SLICES
-from ident.gap.vehicle.transforms import LOAD_CUTOFF, Setting
+from ident.gap.vehicle.transforms import LOAD_CUTOFF, Setting, contact_force
 from ident.vehicle import kinematics
 from ident.vehicle.effect_terms import GRAVITY
 from ident.vehicle.effects import CHASSIS, WHEEL_PLACES, EffectName
-from ident.vehicle.parameters import COULOMB_EPSILON
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -117,11 +116,8 @@ def adhesion(inputs: Array, wheels: tuple[int, ...], setting: Setting) -> float:
 
 
 def traction(inputs: Array, wheel: int, setting: Setting) -> Array:
-    """Force of the floor on a wheel along its plane (N,), positive where it drives forward [N]."""
-    rate, acceleration = (inputs[:, SLICES[name].start + wheel] for name in ("beta_rate", "beta_acceleration"))
-    lost = setting["d_vw"] * rate + setting["d_cw"] * np.tanh(rate / COULOMB_EPSILON) + setting["B_w"] * acceleration
-    drive = setting.geometry.gear_ratio * inputs[:, SLICES["torques"].start + wheel]
-    return zero_phase((drive - lost) / setting.geometry.wheel_radius, LOAD_CUTOFF, setting.sample_time)
+    """`contact_force`, smoothed."""
+    return zero_phase(contact_force(inputs, wheel, setting), LOAD_CUTOFF, setting.sample_time)
 
 
 def ahead_of_others(inputs: Array, setting: Setting, wheel: int | None = None) -> Array:

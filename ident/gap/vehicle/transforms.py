@@ -21,11 +21,9 @@ from ident.gap.vehicle.signals import shifted
 from ident.vehicle.effects import DRIVES, EFFECTS, ENCODERS, STEERING, EffectName
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
+from ident.vehicle.springs import MOTOR_SHARE
 
 Array = NDArray[np.float64]
-
-MOTOR_SHARE: Final = 0.5
-"""Share of B_w taken to lie on the motor's side of a gear that gives way."""
 
 LOAD_CUTOFF: Final = 150.0
 """Of the filter on the torque that twists a coupling [rad/s], which is differentiated twice."""
@@ -137,11 +135,12 @@ def _coupling_load(inputs: Array, side: int, setting: Setting) -> Array:
     """Torque that turns both units of a side the same way, against the coupling (N,) [Nm]."""
     g = setting.geometry
     outward = (1.0, -1.0)[side]
-    force = sum(_contact_force(inputs, wheel, setting) for wheel in (2 * side, 2 * side + 1))
+    force = sum(contact_force(inputs, wheel, setting) for wheel in (2 * side, 2 * side + 1))
     return zero_phase(-outward * g.wheel_offset * np.asarray(force) / 2, LOAD_CUTOFF, setting.sample_time)
 
 
-def _contact_force(inputs: Array, wheel: int, setting: Setting) -> Array:
+def contact_force(inputs: Array, wheel: int, setting: Setting) -> Array:
+    """Force of the floor on a wheel along its plane (N,), positive where it drives forward [N]."""
     rate, acceleration = (inputs[:, SLICES[name].start + wheel] for name in ("beta_rate", "beta_acceleration"))
     lost = setting["d_vw"] * rate + setting["d_cw"] * np.tanh(rate / COULOMB_EPSILON) + setting["B_w"] * acceleration
     drive = setting.geometry.gear_ratio * inputs[:, SLICES["torques"].start + wheel]

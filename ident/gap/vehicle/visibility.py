@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.gap.evidence import orthonormal
 from ident.gap.problem import Channel, Problem, Variant
 from ident.gap.rows import Rows, make_rows
 from ident.gap.vehicle.build import build_problem
@@ -23,6 +24,9 @@ VISIBLE: Final = 0.02
 
 ALIKE: Final = 0.98
 """Cosine of the angle between what two causes leave, from which they count as one."""
+
+RANK: Final = 1e-6
+"""Smallest singular value, relative to the largest, of a baseline column that counts."""
 
 NEGLIGIBLE: Final = 1e-3
 """Norm of a column, over the largest one of the same cause, that means nothing."""
@@ -52,7 +56,7 @@ def sights(problem: Problem) -> Mapping[str, Sight]:
     """What the rows of a problem show of every candidate, by key."""
     rows = make_rows(problem)
     scale = row_noise(rows)
-    baseline = orthonormal(rows.baseline / scale[:, None])
+    baseline = orthonormal(rows.baseline / scale[:, None], RANK)
     found = [_left(rows.columns[:, column.place] / scale[:, None], baseline) for column in rows.layout]
     owners = [problem.candidates[column.candidate].key for column in rows.layout]
     return {
@@ -71,14 +75,6 @@ def row_noise(rows: Rows) -> Array:
         rms = float(np.sqrt(np.mean(rows.target[place] ** 2))) if place.stop > place.start else 1.0
         scale[place] = block.tolerance if block.channel is Channel.KINEMATIC else NOISE * rms
     return scale
-
-
-def orthonormal(columns: Array) -> Array:
-    """Basis (n, rank) of the space of some columns, of any scale."""
-    norms = np.linalg.norm(columns, axis=0)
-    used = columns[:, norms > 0] / norms[norms > 0]
-    vectors, singular, _ = np.linalg.svd(used, full_matrices=False)
-    return np.asarray(vectors[:, singular > 1e-6 * singular.max(initial=0.0)])
 
 
 def _left(columns: Array, baseline: Array) -> Array:
