@@ -162,6 +162,7 @@ class Evidence:
         scale: (V,) how much more than white noise the ratio scatters, at least 1; the variant itself taken away before.
             Variants that point where the best one does have its scale: what tells them apart is the fit, not the noise.
         log_evidence: (V,) half the scaled ratio, less the price of its coefficients; -inf where nothing is visible.
+        log_fitted: (V,) half the scaled ratio in the fitted rows alone.
         log_predictive: (V,) log Bayes factor of the confirming rows, given the fitted ones; 0 without any.
         significance: probability of so large a maximum over all variants without any effect.
     """
@@ -171,6 +172,7 @@ class Evidence:
     surrogates: Array
     scale: Array
     log_evidence: Array
+    log_fitted: Array
     log_predictive: Array
     significance: float
 
@@ -199,13 +201,15 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
         price[several.variant] += BESIDE * (sizes[several.variant] - 1)
     tested = np.where(competing, 0.5 * ratios / spread - price, -np.inf)
     by_chance = np.where((sizes > 0) & ~excluded, 0.5 * found.ratios(surrogates) / spread - price, -np.inf)
+    log_fitted, log_predictive = _in_turn(white, layout, found, amplitudes, scale)
     return Evidence(
         directions=found,
         amplitudes=amplitudes,
         surrogates=surrogates,
         scale=scale,
         log_evidence=np.where(competing, 0.5 * ratios / scale - price, -np.inf),
-        log_predictive=_predictive(white, layout, found, amplitudes, scale),
+        log_fitted=log_fitted,
+        log_predictive=log_predictive,
         significance=significance(tested.max(initial=-np.inf), by_chance.max(axis=1, initial=-np.inf)),
     )
 
@@ -235,8 +239,19 @@ def significance(found: float, by_chance: Array) -> float:
 
 
 def _shared(found: Directions, amplitudes: Array, best: int, scale: Array) -> Array:
-    """Scale (V,) of every variant, that of the best one as far as both point the same way."""
-    return np.asarray(scale + _overlap(found, amplitudes, best) * (scale[best] - scale))
+    """Scale (V,) of every variant, that of the best one as far as either explains what the other does."""
+    alike = np.maximum(_overlap(found, amplitudes, best), _within(found, amplitudes, best))
+    return np.asarray(scale + alike * (scale[best] - scale))
+
+
+def _within(found: Directions, amplitudes: Array, variant: int) -> Array:
+    """Share (V,) of the square of what every variant explains that one of them can explain too."""
+    towards = amplitudes[:, None] * (found.basis.T @ found.basis[:, found.places[variant]])
+    sums = np.vstack([np.zeros((1, towards.shape[1])), np.cumsum(towards, axis=0)])
+    starts, stops = ([getattr(place, end) for place in found.places] for end in ("start", "stop"))
+    covered = np.sum((sums[stops] - sums[starts]) ** 2, axis=1)
+    whole = np.maximum(found.lengths(amplitudes), np.finfo(float).tiny)
+    return np.asarray(np.minimum(covered / whole, 1.0))
 
 
 def _overlap(found: Directions, amplitudes: Array, variant: int) -> Array:
@@ -247,17 +262,21 @@ def _overlap(found: Directions, amplitudes: Array, variant: int) -> Array:
     return np.asarray(np.minimum(share, 1.0))
 
 
-def _predictive(white: White, layout: Sequence[Column], found: Directions, amplitudes: Array, scale: Array) -> Array:
-    """Log Bayes factor that the confirming rows add, the coefficients known from the fit as well as it shows them.
+def _in_turn(
+    white: White, layout: Sequence[Column], found: Directions, amplitudes: Array, scale: Array
+) -> tuple[Array, Array]:
+    """Half the scaled ratio of the fitted rows, and the log Bayes factor that the confirming rows add to it.
 
-    For Gaussian noise and flat priors it is half the gain of the likelihood ratio less half the gain of the
-    log-determinant: a coefficient that the fit got wrong predicts the confirming rows worse than none.
+    The coefficients are known from the fit as well as it shows them. For Gaussian noise and flat priors the factor is
+    half the gain of the likelihood ratio less half the gain of the log-determinant: a coefficient that the fit got
+    wrong predicts the confirming rows worse than none.
     """
+    whole = 0.5 * found.ratios(amplitudes) / scale
     if not white.confirming.any():
-        return np.zeros(len(layout))
+        return whole, np.zeros(len(layout))
     fitted = directions(white, layout, ~white.confirming)
-    before = fitted.ratios(fitted.basis.T @ fitted.residual)
-    return np.asarray(0.5 * (found.ratios(amplitudes) - before) / scale - 0.5 * (found.volume - fitted.volume))
+    before = 0.5 * fitted.ratios(fitted.basis.T @ fitted.residual) / scale
+    return before, np.asarray(whole - before - 0.5 * (found.volume - fitted.volume))
 
 
 def cosines(evidence: Evidence, index: int) -> Array:

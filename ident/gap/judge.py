@@ -38,6 +38,8 @@ class Limits:
         named: what one effect must close, over that and what all leave, where a remainder repeats.
         improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
         widening: share of the held-out gap by which an effect may seem to widen it.
+        measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.
+        sure: log Bayes factor of the confirming rows from which an effect stands although it seems to, by accident.
         minor: log evidence over that of the strongest effect above which one counts that closes less.
         share: of the gap that is left, which an effect must close to count all the same.
         trifle: share of the whole gap that it must close in any case.
@@ -51,6 +53,8 @@ class Limits:
     named: float = 2 / 3
     improvement: float = 0.01
     widening: float = 0.1
+    measurable: float = 0.05
+    sure: float = 5.0
     minor: float = 0.05
     share: float = 0.1
     trifle: float = 1e-3
@@ -191,8 +195,10 @@ class _Judgement:
         """The effects without one that widens the held-out gap, or without the least one if that closes a trifle."""
         variants = self.found.variants
         closed = self._closed
-        if closed and min(closed) < -self.limits.widening:
-            return self._others(int(np.argmin(closed)))
+        widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
+        refuted = [index for index in widened if self._measurable() or self._log_predictive(index) < self.limits.sure]
+        if refuted:
+            return self._others(min(refuted, key=lambda index: closed[index]))
         if len(variants) < 2:
             return variants
         evidence = [self._log_evidence(index) for index in range(len(variants))]
@@ -213,6 +219,13 @@ class _Judgement:
 
     def _log_evidence(self, index: int) -> float:
         return float(self.found.slots[index].evidence.log_evidence[self.found.variants[index]])
+
+    def _log_predictive(self, index: int) -> float:
+        return float(self.found.slots[index].evidence.log_predictive[self.found.variants[index]])
+
+    def _measurable(self) -> bool:
+        """Whether the held-out gap that effects could close is more than an accident of the noise."""
+        return self._whole.before**2 > (1 + self.limits.measurable) * self._whole.floor**2
 
     def _doubtful(self) -> Mapping[str, float]:
         rest = self.found.rest
@@ -289,8 +302,8 @@ class _Judgement:
         return _ordered(made)
 
     def _cause(self, index: int, variant: int) -> Cause:
-        slot, settings = self.found.slots[index], calibration()
-        ranked = rank(self.regression, slot, variant, settings)
+        settings = calibration()
+        ranked = rank(self.regression, self.found.slots[index], variant, settings)
         candidate = self.problems[0].candidates[self.regression.owners[variant]]
         return Cause(
             candidate=candidate,
@@ -298,7 +311,7 @@ class _Judgement:
             ranked=ranked,
             probability=min(ranked.probability, settings.ceiling),
             log_evidence=self._log_evidence(index),
-            log_predictive=float(slot.evidence.log_predictive[variant]),
+            log_predictive=self._log_predictive(index),
             closed=self._closed[index],
             biased=self._biased(self._others(index)),
         )

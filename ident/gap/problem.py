@@ -104,6 +104,7 @@ class Candidate:
         least: what the coefficients of a variant must reach, 0 for a play or a mass; if the data want one smaller,
             this is not the cause. None: anything is possible.
         negligible: size of the coefficient of a single column up to which it means nothing, in its unit.
+        excluded: the records speak against it, so that no others can bring it back.
         spread: standard deviations of the parameters that come with the way they are told, beyond the scatter of the
             rows; empty where there are none.
     """
@@ -116,6 +117,7 @@ class Candidate:
     drift: bool = False
     least: float | None = None
     negligible: float = 0.0
+    excluded: bool = False
     spread: tuple[float, ...] = ()
 
     @property

@@ -164,6 +164,8 @@ def _candidate_columns(problems: Sequence[Problem], kept: Sequence[Kept]) -> tup
     for index, candidates in enumerate(zip(*(problem.candidates for problem in problems), strict=True)):
         for number in range(len(candidates[0].variants)):
             series = [column for candidate in candidates for column in candidate.variants[number].columns]
+            if any(candidate.excluded for candidate in candidates):
+                series = [None] * len(series)
             width = next((column.shape[1] for column in series if column is not None), 0)
             stacks.append(_stack(kept, series, width))
             layout.append(Column(index, number, slice(end, end + width), *_bounds(candidates[0], width)))

@@ -51,6 +51,7 @@ class Settings:
         level: largest probability by chance, over all candidates at once, at which an effect is believed.
         pair_level: the same over all pairs.
         least: smallest log evidence, its price paid: noise is never quite what surrogates make of it.
+        fitted: smallest log likelihood ratio of the fitted rows alone: what they do not show, nothing can confirm.
         confirmation: smallest log Bayes factor of the confirming rows; 0 will do where the evidence is clear.
         clear: log evidence of that.
         stretch: rows of the stretches whose sign a surrogate flips, well beyond the memory of whitened rows.
@@ -63,6 +64,7 @@ class Settings:
     level: float = 0.02
     pair_level: float = 0.01
     least: float = 3.5
+    fitted: float = 2.0
     confirmation: float = 1.0
     clear: float = 20.0
     stretch: int = 30
@@ -211,9 +213,13 @@ class Regression:
         return gather(self.white(whitener, given), self.rows.layout, self.signs, excluded)
 
     def slot(self, given: Sequence[int], whitener: Whitener) -> Slot:
-        """What may stand beside the variants given."""
+        """What may stand beside the variants given.
+
+        Clear evidence of the fitted rows alone, or of the confirming rows alone, is an event of one drive: no cause.
+        """
         evidence = self.evidence(whitener, given)
-        found = evidence.log_evidence
+        once = (evidence.log_fitted < self.settings.fitted) | (evidence.log_predictive < 0)
+        found = np.where(once & (evidence.log_evidence > self.settings.clear), -np.inf, evidence.log_evidence)
         contenders: dict[int, list[int]] = {}
         for variant in np.flatnonzero(np.isfinite(found)).tolist():
             contenders.setdefault(self.owners[variant], []).append(variant)
@@ -298,10 +304,11 @@ def _grown(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _believed(slot: Slot, variant: int, settings: Settings) -> bool:
-    """Larger than chance over all candidates, and confirmed."""
+    """Larger than chance over all candidates, seen in the fit, and confirmed."""
     evidence, found = slot.evidence, slot.evidence.log_evidence[variant]
     confirmed = evidence.log_predictive[variant] >= (0.0 if found > settings.clear else settings.confirmation)
-    return bool(confirmed and evidence.significance <= settings.level and found > settings.least)
+    large = found > settings.least and evidence.log_fitted[variant] >= settings.fitted
+    return bool(confirmed and large and evidence.significance <= settings.level)
 
 
 def _settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
@@ -318,7 +325,7 @@ def _revised(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     whitener = regression.whitener(taken)
     for index, variant in enumerate(taken):
         slot = regression.slot(_without(taken, index), whitener)
-        best = slot.variants[0]
+        best = slot.variants[0] if slot.variants else variant
         log_evidence = slot.evidence.log_evidence
         if log_evidence[best] > log_evidence[variant] + regression.settings.lead:
             return (*taken[:index], best, *taken[index + 1 :])

@@ -20,7 +20,16 @@ from ident.gap.vehicle.askew import beside_sliding, stands_askew
 from ident.gap.vehicle.library import DRIFTS, ONE_SIDED, SHAPES, TermCause, placed_parameters, term_causes
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
-from ident.gap.vehicle.sliding import ALONG, ALONG_STD, ANY_WHEEL, SlidingCause, adhesion, sliding_cause, sliding_causes
+from ident.gap.vehicle.sliding import (
+    ALONG,
+    ALONG_STD,
+    ANY_WHEEL,
+    SlidingCause,
+    adhesion,
+    slides_alone,
+    sliding_cause,
+    sliding_causes,
+)
 from ident.gap.vehicle.transforms import Setting, TransformCause, transform_cause, transform_causes
 from ident.records.record import Record, Step, base_step
 from ident.vehicle.description import VehicleDescription
@@ -426,8 +435,10 @@ def _candidate(
 
 def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Candidate:
     """What was slid, as it was found; the friction coefficient by the traction that it took."""
-    slid, travelling = _slid(cause, sources, context), [source for source in sources if _travels(source)]
-    held = [adhesion(context.inputs(source), cause.wheels, context.setting(source)) for source in travelling]
+    travelling = [source for source in sources if _travels(source)]
+    drives = [(context.inputs(source), context.setting(source)) for source in travelling]
+    slid = _slid(cause, sources, context)
+    held = [adhesion(inputs, cause.wheels, setting) for inputs, setting in drives]
     friction = max(held, default=0.0) / ALONG
     return Candidate(
         effect=cause.name,
@@ -435,6 +446,7 @@ def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -
         parameters=placed_parameters(cause.name, cause.where),
         variants=(Variant(tuple(_side_by_side([column]) for column in slid), lambda _: np.array([friction])),),
         least=0.0,
+        excluded=not slides_alone(cause, drives),
         spread=(friction * ALONG_STD / ALONG,),
     )
 

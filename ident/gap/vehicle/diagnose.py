@@ -22,8 +22,8 @@ from ident.vehicle.effects import EffectName
 from ident.vehicle.extended import ExtendedModel
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
-LEAST_STD: Final = 1e-3
-"""Standard deviation that a model's value has at least, relative to the value: nobody knows friction better."""
+UNSTATED_STD: Final = 1e-3
+"""Standard deviation of a model's value that comes without one, relative to the value."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,8 @@ def _problem(
         return build_problem(records, vehicle, effects=effects)
     problem = build_problem(records, vehicle, model.parameters, given=model.effects, effects=effects)
     assert problem.nominal is not None
-    std = np.maximum(problem.nominal.std, LEAST_STD * np.abs(problem.nominal.values))
+    stated = problem.nominal.std
+    std = np.where(stated > 0, stated, UNSTATED_STD * np.abs(problem.nominal.values))
     return replace(problem, nominal=replace(problem.nominal, std=std))
 
 

@@ -9,6 +9,7 @@ by more than creep. How far a friction coefficient can be told from that, see `A
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -39,6 +40,10 @@ MOVING: Final = 0.02
 
 HELD: Final = 10.0
 """Weight of the wheels' not moving sideways against that of their rolling, where the chassis' twist is told."""
+
+ALONE: Final = 0.9
+"""Part of all the time that wheels surely slide in which it must be one wheel, for the floor under it to be the cause:
+what sets wheels against each other (see `ident.gap.vehicle.askew`) makes several of them slide [-]."""
 
 ALONG: Final = 0.8
 """Part of the friction cone that the traction has filled when a wheel slides; the rest acts across its plane [-]."""
@@ -134,11 +139,33 @@ def ahead_of_others(inputs: Array, setting: Setting, wheel: int | None = None) -
     return zero_phase(-left, LOAD_CUTOFF, setting.sample_time)
 
 
+def slides_alone(cause: SlidingCause, drives: Iterable[tuple[Array, Setting]]) -> bool:
+    """Whether hardly any wheel but those of a cause slides in the signals (N, INPUTS) of some drives."""
+    times = np.zeros(len(WHEEL_PLACES))
+    for inputs, setting in drives:
+        times += setting.sample_time * np.sum(surely_sliding(inputs, setting), axis=0)
+    return bool(times[list(cause.wheels)].sum() >= ALONE * times.sum())
+
+
+def surely_sliding(inputs: Array, setting: Setting) -> Mask:
+    """Where (N, 4) each wheel runs ahead of what the others roll, forward of its traction, by more than any creep."""
+    speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]])
+    wheels = range(len(WHEEL_PLACES))
+    ahead = [
+        np.sign(traction(inputs, wheel, setting)) * ahead_of_others(inputs, setting, wheel)[:, wheel]
+        for wheel in wheels
+    ]
+    return np.stack([_surely(one, speed[:, wheel]) for wheel, one in zip(wheels, ahead, strict=True)], axis=1)
+
+
 def _slides(forward: Array, speed: Array) -> Mask:
     """Where (N,) a wheel runs ahead, forward of its traction, if anywhere by more than any creep."""
-    ahead, moves = forward > CREEPING * speed, speed > MOVING
-    sure = moves & (forward > SLIDING * speed) & (forward > LEAST)
-    return np.asarray(ahead & moves & sure.any(), dtype=np.bool_)
+    ahead = (forward > CREEPING * speed) & (speed > MOVING)
+    return np.asarray(ahead & _surely(forward, speed).any(), dtype=np.bool_)
+
+
+def _surely(forward: Array, speed: Array) -> Mask:
+    return np.asarray((speed > MOVING) & (forward > SLIDING * speed) & (forward > LEAST), dtype=np.bool_)
 
 
 def _roll(inputs: Array, wheel: int, ahead: Array, setting: Setting) -> None:
