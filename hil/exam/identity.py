@@ -7,7 +7,7 @@ the answers. What is scored of a name or a place depends on whether it can be to
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -25,6 +25,7 @@ from ident.gap.problem import Candidate, Problem
 from ident.gap.rows import Column, make_rows
 from ident.gap.search import least_squares
 from ident.gap.vehicle.build import build_problem
+from ident.gap.vehicle.experiments import hidden_effects
 from ident.gap.vehicle.library import DRIFTS, ONE_SIDED
 from ident.gap.vehicle.visibility import RANK, VISIBLE, row_noise
 from ident.records.record import Record, Segment, make_segment
@@ -64,15 +65,24 @@ class Identity:
 class Identities:
     """Identities by key of a cause and sign of its size."""
 
-    def __init__(self, alike: Mapping[tuple[str, bool], Sequence[str]]) -> None:
-        """`alike`: keys that look the same, by key of the cause and whether its size is positive."""
+    def __init__(self, alike: Mapping[tuple[str, bool], Sequence[str]], hidden: Collection[str] = ()) -> None:
+        """What looks the same.
+
+        Args:
+            alike: keys that look the same, by key of the cause and whether its size is positive.
+            hidden: names of effects that these steps cannot show beside the parameters: all that they do, changed
+                values of the model do as well.
+        """
         self._alike = alike
+        self._hidden = frozenset(hidden)
 
     def of(self, effect: Injected) -> Identity:
         """Identity of an effect; its own name and place alone where the library has no candidate for it."""
-        keys = self._alike.get((f"{effect.name}@{effect.where}", effect.size > 0), ())
-        pairs = [key.split("@") for key in keys]
+        key = f"{effect.name}@{effect.where}"
+        pairs = [other.split("@") for other in self._alike.get((key, effect.size > 0), ())]
         names = frozenset(name for name, _ in pairs)
+        if effect.name in self._hidden:
+            names |= frozenset(map(str, DRIFTS))
         return Identity(
             names | {effect.name},
             frozenset(where for name, where in pairs if name == effect.name) | {effect.where},
@@ -137,7 +147,8 @@ def identities(problem: Problem) -> Identities:
             for group in groups.values()
             for cause in group
             for positive in (True, False)
-        }
+        },
+        hidden_effects(block.step for block in problem.blocks),
     )
 
 

@@ -162,7 +162,8 @@ class Evidence:
         scale: (V,) how much more than white noise the ratio scatters, at least 1; the variant itself taken away before.
             Variants that point where the best one does have its scale: what tells them apart is the fit, not the noise.
         log_evidence: (V,) half the scaled ratio, less the price of its coefficients; -inf where nothing is visible.
-        log_fitted: (V,) half the scaled ratio in the fitted rows alone.
+        log_fitted: (V,) half the scaled ratio in the fitted rows alone; of all rows, where in those the parameters
+            absorb what is there.
         log_predictive: (V,) log Bayes factor of the confirming rows, given the fitted ones; 0 without any.
         significance: probability of so large a maximum over all variants without any effect.
     """
@@ -276,7 +277,10 @@ def _in_turn(
         return whole, np.zeros(len(layout))
     fitted = directions(white, layout, ~white.confirming)
     before = 0.5 * fitted.ratios(fitted.basis.T @ fitted.residual) / scale
-    return before, np.asarray(whole - before - 0.5 * (found.volume - fitted.volume))
+    factor = whole - before - 0.5 * (found.volume - fitted.volume)
+    there = np.any(white.columns[~white.confirming] != 0, axis=0)
+    absorbed = (fitted.sizes == 0) & np.array([bool(there[column.place].any()) for column in layout])
+    return np.where(absorbed, whole, before), np.asarray(factor)
 
 
 def cosines(evidence: Evidence, index: int) -> Array:

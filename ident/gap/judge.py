@@ -50,7 +50,7 @@ class Limits:
     repeating: float = 0.5
     creeping: float = 1.5
     explained: float = 0.5
-    named: float = 2 / 3
+    named: float = 0.85
     improvement: float = 0.01
     widening: float = 0.1
     measurable: float = 0.05

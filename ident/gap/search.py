@@ -52,8 +52,8 @@ class Settings:
         pair_level: the same over all pairs.
         least: smallest log evidence, its price paid: noise is never quite what surrogates make of it.
         fitted: smallest log likelihood ratio of the fitted rows alone: what they do not show, nothing can confirm.
-        confirmation: smallest log Bayes factor of the confirming rows; 0 will do where the evidence is clear.
-        clear: log evidence of that.
+        confirmation: smallest log Bayes factor of the confirming rows.
+        clear: log evidence from which what only one of the two shows is taken for an event, not for a cause in doubt.
         stretch: rows of the stretches whose sign a surrogate flips, well beyond the memory of whitened rows.
         stretches: that there shall be at least; short records have shorter ones.
         surrogates: how many.
@@ -63,9 +63,9 @@ class Settings:
 
     level: float = 0.02
     pair_level: float = 0.01
-    least: float = 3.5
-    fitted: float = 2.0
-    confirmation: float = 1.0
+    least: float = 2.5
+    fitted: float = 1.0
+    confirmation: float = 0.5
     clear: float = 20.0
     stretch: int = 30
     stretches: int = 24
@@ -218,7 +218,7 @@ class Regression:
         Clear evidence of the fitted rows alone, or of the confirming rows alone, is an event of one drive: no cause.
         """
         evidence = self.evidence(whitener, given)
-        once = (evidence.log_fitted < self.settings.fitted) | (evidence.log_predictive < 0)
+        once = ~_in_both(evidence, self.settings)
         found = np.where(once & (evidence.log_evidence > self.settings.clear), -np.inf, evidence.log_evidence)
         contenders: dict[int, list[int]] = {}
         for variant in np.flatnonzero(np.isfinite(found)).tolist():
@@ -305,10 +305,15 @@ def _grown(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
 
 def _believed(slot: Slot, variant: int, settings: Settings) -> bool:
     """Larger than chance over all candidates, seen in the fit, and confirmed."""
-    evidence, found = slot.evidence, slot.evidence.log_evidence[variant]
-    confirmed = evidence.log_predictive[variant] >= (0.0 if found > settings.clear else settings.confirmation)
-    large = found > settings.least and evidence.log_fitted[variant] >= settings.fitted
-    return bool(confirmed and large and evidence.significance <= settings.level)
+    evidence = slot.evidence
+    large = evidence.log_evidence[variant] > settings.least and evidence.significance <= settings.level
+    return bool(large and _in_both(evidence, settings)[variant])
+
+
+def _in_both(evidence: Evidence, settings: Settings) -> Mask:
+    """Variants (V,) that the fitted rows show and the confirming ones confirm."""
+    shown = evidence.log_fitted >= settings.fitted
+    return np.asarray(shown & (evidence.log_predictive >= settings.confirmation))
 
 
 def _settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
