@@ -33,6 +33,7 @@ class Limits:
         deviations: by which a smooth function must predict the confirming rows for there to be a remainder.
         size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
         repeating: the same, above which there is a remainder whether or not it can be predicted.
+        beside: the same beside effects that are named.
         creeping: the same of rows with a tolerance, whose noise is that.
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
         named: what one effect must close, over that and what all leave, where a remainder repeats.
@@ -48,9 +49,10 @@ class Limits:
     deviations: float = 3.0
     size: float = 0.25
     repeating: float = 0.5
+    beside: float = 0.35
     creeping: float = 1.5
     explained: float = 0.5
-    named: float = 0.85
+    named: float = 0.9
     improvement: float = 0.01
     widening: float = 0.1
     measurable: float = 0.05
@@ -290,9 +292,9 @@ class _Judgement:
     def _repeating(self) -> bool:
         """Whether what the model leaves repeats in every record, and is well above the noise."""
         creeping = {block.label for block, _ in self.rows.blocks if block.tolerance > 0}
+        usual = self.limits.beside if self.found.variants else self.limits.repeating
         sizes = lasting(self.rows, self.floors, self.after.blocks)
-        limits = {label: self.limits.creeping if label in creeping else self.limits.repeating for label in sizes}
-        return any(size > limits[label] for label, size in sizes.items())
+        return any(size > (self.limits.creeping if label in creeping else usual) for label, size in sizes.items())
 
     def _sizes(self, models: Sequence[Array]) -> Mapping[str, float]:
         return repeated(self.rows, self.floors, models)
