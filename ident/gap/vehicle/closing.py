@@ -15,8 +15,9 @@ from ident.gap.diagnosis import Gap
 from ident.gap.judge import Findings
 from ident.gap.problem import Channel, Problem
 from ident.gap.refit import Refit
-from ident.gap.vehicle.build import PRIOR_WEIGHT, Source, make_context, sources_of, tolerated_creep
+from ident.gap.vehicle.context import PRIOR_WEIGHT, make_context
 from ident.gap.vehicle.outcome import outcomes
+from ident.gap.vehicle.sources import Source, sources_of, tolerated_creep
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EffectName, make_effect

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.gap.problem import Channel
-from ident.gap.vehicle.build import Source
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.signals import shifted
+from ident.gap.vehicle.sources import Source
 from ident.vehicle import kinematics
 from ident.vehicle.extended import ExtendedModel
 from ident.vehicle.geometry import Geometry

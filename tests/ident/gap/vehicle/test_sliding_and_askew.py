@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from ident.estimate.filters import Processing, differentiate, zero_phase
 from ident.gap.problem import Candidate, Channel, Variant
 from ident.gap.vehicle.askew import beside_sliding
-from ident.gap.vehicle.build import Source, sources_of
 from ident.gap.vehicle.ideal import Drive, ideal_record
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.sliding import sliding_cause, traction
+from ident.gap.vehicle.sources import Source, sources_of
 from ident.gap.vehicle.transforms import Setting, transform_cause
 from ident.records.record import Step
 from ident.vehicle.description import VehicleDescription

@@ -1,0 +1,132 @@
+"""Causes as candidates: columns of every block, and bounds of their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from ident.gap.problem import Candidate, Channel, Variant
+from ident.gap.vehicle.askew import beside_sliding, stands_askew
+from ident.gap.vehicle.context import FORMULAS_KEPT, MODEL_COLUMNS, Context
+from ident.gap.vehicle.contribution import Cause, acting_in, contribution_of, side_by_side
+from ident.gap.vehicle.library import DRIFTS, ONE_SIDED, SHAPES, TermCause, placed_parameters, term_causes
+from ident.gap.vehicle.sliding import (
+    ALONG,
+    ALONG_STD,
+    ANY_WHEEL,
+    SlidingCause,
+    adhesion,
+    slides_alone,
+    sliding_causes,
+)
+from ident.gap.vehicle.sources import Source
+from ident.gap.vehicle.transforms import TransformCause, transform_causes
+from ident.vehicle.effects import EffectName
+
+Array = NDArray[np.float64]
+
+ROUNDING: Final = 1e-12
+"""Of a column, relative to what the model has in the same row."""
+
+
+@lru_cache(maxsize=FORMULAS_KEPT)
+def causes_of(effects: tuple[EffectName, ...], judged: bool) -> tuple[Cause, ...]:
+    """Causes with these names, changed values only where a model is judged."""
+    names = tuple(name for name in effects if judged or name not in DRIFTS)
+    sliding = sliding_causes() if EffectName.SLIP in names else []
+    return (*term_causes(names), *transform_causes(names), *sliding)
+
+
+def candidate_of(
+    cause: Cause, columns: Iterator[int], sources: Sequence[Source], tables: Sequence[Array], context: Context
+) -> Candidate:
+    """A cause as a candidate; `columns` are the numbers of those in the tables that come next."""
+    if isinstance(cause, SlidingCause):
+        return _sliding(cause, sources, context)
+    if isinstance(cause, TransformCause):
+        variants: tuple[Variant, ...] = tuple(_probed(cause, sources, context))
+    else:
+        variants = tuple(
+            Variant(_picked([next(columns) for _ in variant.units], tables), variant.start, variant.bent)
+            for variant in cause.variants
+        )
+    linear = isinstance(cause, TermCause) and SHAPES[cause.name].is_linear
+    return Candidate(
+        effect=cause.name,
+        where=cause.where,
+        parameters=placed_parameters(cause.name, cause.where),
+        variants=variants,
+        contribution=None if linear else contribution_of(cause, acting_in(variants, sources), sources, context),
+        drift=cause.name in DRIFTS,
+        least=0.0 if cause.name in ONE_SIDED else None,
+    )
+
+
+def with_askew_ones(
+    candidates: Sequence[Candidate], sources: Sequence[Source], context: Context
+) -> Iterator[Candidate]:
+    """The candidates, sliding beside those that stand askew."""
+    slid = _slid(ANY_WHEEL, sources, context)
+    rolling = [mask for source in sources for mask in [_nothing_slides(source, context)] * len(source.coordinates)]
+    for candidate in candidates:
+        yield beside_sliding(candidate, slid, rolling) if stands_askew(candidate) else candidate
+
+
+def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Candidate:
+    """What was slid, as it was found; the friction coefficient by the traction that it took."""
+    travelling = [source for source in sources if source.travels]
+    drives = [(context.inputs(source), context.setting(source)) for source in travelling]
+    slid = _slid(cause, sources, context)
+    held = [adhesion(inputs, cause.wheels, setting) for inputs, setting in drives]
+    friction = max(held, default=0.0) / ALONG
+    return Candidate(
+        effect=cause.name,
+        where=cause.where,
+        parameters=placed_parameters(cause.name, cause.where),
+        variants=(Variant(tuple(side_by_side([column]) for column in slid), lambda _: np.array([friction])),),
+        least=0.0,
+        excluded=not slides_alone(cause, drives),
+        spread=(friction * ALONG_STD / ALONG,),
+    )
+
+
+def _slid(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Sequence[Array | None]:
+    """What sliding adds to every block, (N,)."""
+    acting = [source.travels for source in sources]
+    return contribution_of(cause, acting, sources, context)(np.ones(1), context.parameters)
+
+
+def _nothing_slides(source: Source, context: Context) -> NDArray[np.bool_] | None:
+    """Rows of a kinematic source that no sliding reaches through the filter; None for other sources."""
+    if source.channel is not Channel.KINEMATIC or not source.travels:
+        return None
+    slides = ANY_WHEEL.sliding(context.inputs(source), context.setting(source)).any(axis=1)
+    width = 2 * round(context.processing.guard / source.sample_time) + 1
+    return np.asarray(~ndimage.binary_dilation(slides, np.ones(width, dtype=bool))[:: source.factor], dtype=np.bool_)
+
+
+def _picked(columns: list[int], tables: Sequence[Array]) -> tuple[Array | None, ...]:
+    """The columns of every block; None where they are all zero, but for rounding."""
+    found: list[Array | None] = []
+    for table in tables:
+        for row in range(table.shape[1]):
+            block, scale = table[:, row][:, columns], float(np.abs(table[:, row, :MODEL_COLUMNS]).max(initial=0.0))
+            found.append(block if np.any(np.abs(block) > ROUNDING * scale) else None)
+    return tuple(found)
+
+
+def _probed(cause: TransformCause, sources: Sequence[Source], context: Context) -> Iterator[Variant]:
+    """The effect alone, then with what may come along."""
+    exact = contribution_of(cause, [True] * len(sources), sources, context)
+    changes: list[Sequence[Array | None]] = []
+    for place, probe in enumerate(cause.probes):
+        sizes = np.zeros(len(cause.probes))
+        sizes[place] = probe
+        found = exact(sizes, context.parameters)
+        changes.append([None if change is None else change / probe for change in found])
+        yield Variant(tuple(side_by_side(columns) for columns in zip(*changes, strict=True)))

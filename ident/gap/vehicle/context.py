@@ -1,0 +1,154 @@
+"""What all rows share: geometry, filter, values of the model, equations, and effects that the model has already."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.estimate.filters import Processing, zero_phase
+from ident.gap.problem import Channel
+from ident.gap.vehicle import rows
+from ident.gap.vehicle.sliding import SlidingCause, sliding_cause
+from ident.gap.vehicle.sources import Source
+from ident.gap.vehicle.transforms import Setting, TransformCause, transform_cause
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effect_terms import TERMS, EffectTerm, term_of
+from ident.vehicle.effects import Effect, EffectName
+from ident.vehicle.geometry import Geometry
+from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES, Parameters
+
+Array = NDArray[np.float64]
+
+PRIOR_WEIGHT: Final = 1e-4
+"""Of the vehicle file's guesses against the rows, per unit-norm column: only what no row shows is taken from them."""
+
+FORMULAS_KEPT: Final = 4
+"""Libraries of causes, and sets of given effects, whose generated formulas a process keeps."""
+
+AT_ONCE: Final = 16
+"""Columns that pass the filter together: it makes several copies of them."""
+
+MODEL_COLUMNS: Final = 1 + len(PARAMETER_NAMES)
+"""Columns of a table before those of the causes: residual at p = 0, then Θ."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What all rows share.
+
+    Attributes:
+        geometry: of the vehicle.
+        processing: filters and thresholds.
+        parameters: p (11,) at which columns are taken.
+        known: the same, by which effects with a memory tell the forces inside the vehicle; a refit does not move them,
+            for rows that hardly show a parameter (B_w) let it go anywhere.
+        formulas: the equations, effects that are given in them.
+        given: effects with a memory that are part of the model too.
+        kept: rows of every source for the parameters asked for last.
+    """
+
+    geometry: Geometry
+    processing: Processing
+    parameters: Array
+    known: Array
+    formulas: rows.Formulas
+    given: tuple[tuple[TransformCause | SlidingCause, Array], ...] = ()
+    kept: dict[int, tuple[bytes, Array]] = field(default_factory=dict)
+
+    @property
+    def constants(self) -> tuple[Array, Array, Array]:
+        """What the formulas take beside the inputs."""
+        return self.geometry.as_vector(), np.array([COULOMB_EPSILON]), self.parameters
+
+    def setting(self, source: Source) -> Setting:
+        """What effects with a memory need beside the signals of a source."""
+        return Setting(self.geometry, self.known, source.sample_time)
+
+    def inputs(self, source: Source) -> Array:
+        """Measured signals of a source, the given effects with a memory taken out."""
+        inputs, setting = source.inputs, self.setting(source)
+        for cause, sizes in self.given:
+            inputs = cause.without(inputs, sizes, setting)
+        return inputs
+
+    def plain(self, source: Source) -> Array:
+        """The rows of a source without any further effect (M, rows, 1); the last ones are kept."""
+        asked, kept = self.parameters.tobytes(), self.kept.get(id(source))
+        if kept is not None and kept[0] == asked:
+            return kept[1]
+        exact = self.formulas.exact(source.channel, source.spec)
+        rows_now = exact(self.inputs(source), *self.constants, np.zeros(0))
+        self.kept[id(source)] = (asked, rows_now)
+        return rows_now
+
+    def filtered(self, values: Array, source: Source) -> Array:
+        """Columns (M, ...) through the filter, thinned to the rows of the source's blocks."""
+        flat = values.reshape(len(values), -1)
+        thinned = [
+            zero_phase(part, self.processing.cutoff, source.sample_time)[:: source.factor]
+            for part in np.split(flat, range(AT_ONCE, flat.shape[1], AT_ONCE), axis=1)
+        ]
+        return np.hstack(thinned).reshape(-1, *values.shape[1:])
+
+
+def make_context(
+    sources: Sequence[Source],
+    vehicle: VehicleDescription,
+    model: Parameters | None,
+    given: Sequence[Effect],
+    processing: Processing,
+) -> Context:
+    """Context of some sources; without a model, parameters are fitted to them."""
+    terms = _formulas(tuple(_frozen(term_of(effect)) for effect in given if effect.name in TERMS))
+    memories = tuple(_memory(effect) for effect in given if effect.name not in TERMS)
+    context = Context(vehicle.geometry, processing, vehicle.prior.values, vehicle.prior.values, terms, memories)
+    values = model.values if model else fitted_parameters(sources, vehicle, context)
+    return replace(context, parameters=values, known=values)
+
+
+def fitted_parameters(sources: Sequence[Source], vehicle: VehicleDescription, context: Context) -> Array:
+    """p (11,) by least squares over the dynamic rows; what they do not show stays at the vehicle file's guesses."""
+    prior = vehicle.prior.values
+    normal, right = np.zeros((2, len(prior), len(prior)))[0], np.zeros(len(prior))
+    for source in sources:
+        if source.channel is Channel.DYNAMIC:
+            table = table_of(source, context, [])
+            for row, moving in enumerate(source.moving):
+                kept = table[moving[:: source.factor], row]
+                theta = kept[:, 1:MODEL_COLUMNS] * prior
+                normal += theta.T @ theta
+                right += theta.T @ (-kept[:, 0] - theta.sum(axis=1))
+    scale = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
+    weighted = normal / np.outer(scale, scale) + PRIOR_WEIGHT * np.eye(len(prior))
+    return np.asarray(prior * (1 + np.linalg.solve(weighted, right / scale) / scale))
+
+
+def table_of(source: Source, context: Context, units: Sequence[rows.UnitTerm]) -> Array:
+    """Filtered residual at p = 0, regressor and columns of a source: (N, rows, 12 + units)."""
+    function = context.formulas.linearised(source.channel, source.spec, units)
+    entries = function.entries(context.inputs(source), *context.constants)
+    return function.matrices(context.filtered(entries.T, source).T)
+
+
+_FrozenTerm = tuple[EffectName, str, tuple[tuple[str, float], ...]]
+
+
+def _frozen(term: EffectTerm) -> _FrozenTerm:
+    return term.name, term.where, tuple(term.values.items())
+
+
+@lru_cache(maxsize=FORMULAS_KEPT)
+def _formulas(given: tuple[_FrozenTerm, ...]) -> rows.Formulas:
+    return rows.Formulas([EffectTerm(name, where, dict(values)) for name, where, values in given])
+
+
+def _memory(effect: Effect) -> tuple[TransformCause | SlidingCause, Array]:
+    """What takes an effect that is no term out of the signals, with its sizes."""
+    if effect.name is EffectName.SLIP:
+        return sliding_cause(effect.where), np.ones(1)
+    return transform_cause(effect.name, effect.where), np.array([effect.size])

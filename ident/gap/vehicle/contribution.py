@@ -1,0 +1,75 @@
+"""What a cause adds to the rows, exactly, for numbers of its own and of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.gap.problem import Variant
+from ident.gap.vehicle.context import Context
+from ident.gap.vehicle.library import TermCause
+from ident.gap.vehicle.sliding import SlidingCause
+from ident.gap.vehicle.sources import Source
+from ident.gap.vehicle.transforms import TransformCause
+
+Array = NDArray[np.float64]
+Cause = TermCause | TransformCause | SlidingCause
+
+
+def contribution_of(
+    cause: Cause, acting: Sequence[bool], sources: Sequence[Source], context: Context
+) -> Callable[[Array, Array], Sequence[Array | None]]:
+    """What the cause adds to every block, exactly, for numbers of its own and of the model."""
+
+    def contribution(values: Array, parameters: Array) -> list[Array | None]:
+        found: list[Array | None] = []
+        for source, acts in zip(sources, acting, strict=True):
+            if not acts:
+                found += [None] * len(source.coordinates)
+                continue
+            change = _change(cause, source, context, values, parameters)
+            if change is None:
+                found += [None] * len(source.coordinates)
+                continue
+            columns = context.filtered(change, source).T
+            found += [column if np.any(column) else None for column in columns]
+        return found
+
+    return contribution
+
+
+def _change(cause: Cause, source: Source, context: Context, values: Array, parameters: Array) -> Array | None:
+    """The same for one source before the filter (M, rows); None where it is zero."""
+    context = replace(context, parameters=parameters)
+    inputs, plain = context.inputs(source), context.formulas.exact(source.channel, source.spec)
+    if isinstance(cause, TermCause):
+        exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)
+        after = exact(inputs, *context.constants, values)
+    else:
+        changed = cause.without(inputs, values, context.setting(source))
+        seen = [element for argument, element in plain.inputs if argument == 0]
+        if np.array_equal(changed[:, seen], inputs[:, seen]):
+            return None
+        after = plain(changed, *context.constants, np.zeros(0))
+    return np.asarray((after - context.plain(source))[..., 0])
+
+
+def acting_in(variants: Sequence[Variant], sources: Sequence[Source]) -> list[bool]:
+    """Whether any column of a cause acts in any row of each source."""
+    acting, end = [], 0
+    for source in sources:
+        blocks = slice(end, end + len(source.coordinates))
+        acting.append(any(column is not None for variant in variants for column in variant.columns[blocks]))
+        end = blocks.stop
+    return acting
+
+
+def side_by_side(columns: Sequence[Array | None]) -> Array | None:
+    """Columns (N,) as one array, None for zeros; None where all are."""
+    there = [column for column in columns if column is not None]
+    if not there:
+        return None
+    return np.stack([np.zeros_like(there[0]) if column is None else column for column in columns], axis=1)

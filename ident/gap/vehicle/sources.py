@@ -1,0 +1,181 @@
+"""Rows of records before they are evaluated: which samples of which step, in which channel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from ident.errors import RecordError
+from ident.estimate.equations import ROWS, RowsOfStep
+from ident.estimate.filters import Processing, moving_rows, zero_phase
+from ident.gap.problem import Channel
+from ident.gap.vehicle import rows
+from ident.gap.vehicle.signals import Signals, decimation, signals_of
+from ident.records.record import Record, Step, base_step
+from ident.vehicle.geometry import Geometry
+from ident.vehicle.modes import Mode
+
+Array = NDArray[np.float64]
+
+DIAGNOSED: Final = tuple(step for step in ROWS if step is not Step.LANE_CHANGE)
+"""Steps that causes are looked for in; the lane change is kept for judging what was found."""
+
+OVERSAMPLED: Final = 3.0
+"""Rate at which rows are evaluated, in units of the cutoff of the smoothed signals over π."""
+
+ASKEW: Final = 0.4
+"""Steering angle beyond which a wheel that steers at standstill pushes the chassis aside [rad]."""
+
+CREEP: Final = 3e-4
+"""Part of the rolling speed by which a wheel may creep, as any tyre does at some percent of its adhesion [-]."""
+
+TURNING_CREEP: Final = 1e-3
+"""The same for wheels that turn about their steering axes at standstill, where the chassis is held by creep alone."""
+
+RATTLING: Final = 1000.0
+"""Bandwidth of the signals [rad/s]: motors on the compliance of their gears' teeth rattle more slowly than that."""
+
+RATTLING_SHARE: Final = 0.64
+"""The same at most, in units of the Nyquist frequency."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Rows of one channel of one segment before they are evaluated.
+
+    Attributes:
+        channel: kinematic or dynamic.
+        step: the segment's own name.
+        spec: rows that the step has.
+        inputs: (M, INPUTS) at a rate that the smoothed signals allow.
+        sample_time: of them [s].
+        factor: every how manieth becomes a row of a block.
+        moving: (M,) rows to be used.
+        period: (M,).
+        record: for messages.
+    """
+
+    channel: Channel
+    step: str
+    spec: RowsOfStep
+    inputs: Array
+    sample_time: float
+    factor: int
+    moving: tuple[NDArray[np.bool_], ...]
+    period: NDArray[np.int64]
+    record: str
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of its rows, a block each."""
+        return rows.coordinates(self.channel, self.spec)
+
+    @property
+    def travels(self) -> bool:
+        """Whether the vehicle drives in it, wheels steered or not."""
+        return self.spec.mode not in (None, Mode.ALIGNMENT)
+
+
+def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], processing: Processing) -> list[Source]:
+    """Rows of a record that belong to the steps; of those in which nothing moves there are none.
+
+    Raises:
+        RecordError: it has none of the steps, or moves in none of them.
+    """
+    found = [
+        source
+        for signals in signals_of(record, geometry, processing)
+        if (spec := _spec(signals.segment.step, steps)) is not None
+        for source in _sources(signals, spec, processing)
+    ]
+    if not found:
+        raise RecordError(
+            f"{record.source} holds none of the steps of a diagnosis.",
+            f"It needs some of {', '.join(steps)} by these names in the channel step.",
+        )
+    moving = [source for source in found if any(mask.any() for mask in source.moving)]
+    if not moving:
+        raise RecordError(
+            f"{record.source} does not move in any step of a diagnosis.",
+            "Record a drive: angles of wheels and steering must change.",
+        )
+    return moving
+
+
+def processing_of(records: Sequence[Record]) -> Processing:
+    """Filters of the estimate, but signals that still show a motor that rattles in its gear."""
+    usual = Processing()
+    nyquist = min((np.pi / segment.sample_time for record in records for segment in record.segments), default=0.0)
+    return replace(usual, signal_cutoff=float(np.clip(RATTLING_SHARE * nyquist, usual.signal_cutoff, RATTLING)))
+
+
+def _spec(step: str, steps: Sequence[Step]) -> RowsOfStep | None:
+    base = base_step(step)
+    return ROWS[base] if base is not None and base in steps else None
+
+
+def _sources(signals: Signals, spec: RowsOfStep, processing: Processing) -> Iterable[Source]:
+    segment = signals.segment
+    factor = decimation(segment, processing.cutoff)
+    most = max(1, int(np.pi / (OVERSAMPLED * processing.signal_cutoff * segment.sample_time)))
+    stride = next(stride for stride in range(min(most, factor), 0, -1) if factor % stride == 0)
+    inputs = signals.as_inputs()
+    inputs[:, rows.SLICES["torques"]] = zero_phase(
+        inputs[:, rows.SLICES["torques"]], processing.signal_cutoff, segment.sample_time
+    )
+    common = {
+        "step": segment.step,
+        "spec": spec,
+        "inputs": inputs[::stride],
+        "sample_time": segment.sample_time * stride,
+        "factor": factor // stride,
+        "period": segment.period[::stride],
+        "record": signals.record,
+    }
+    dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)
+    yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
+    names = rows.kinematic_coordinates(spec)
+    if names:
+        rolling = _rolling(signals, spec, processing)[::stride]
+        yield Source(channel=Channel.KINEMATIC, moving=(rolling,) * len(names), **common)  # type: ignore[arg-type]
+
+
+def _moving(signals: Signals, spec: RowsOfStep, coordinate: str, processing: Processing) -> NDArray[np.bool_]:
+    joints = [joint - 3 for joint in spec.joints]
+    if spec.mode is None:
+        joints = [2 + spec.coordinates.index(coordinate)]
+    elif coordinate == "x":
+        joints = [2, 3, 4, 5]
+    return moving_rows(signals.joint_rates[:, joints], processing, signals.segment.sample_time)
+
+
+def _rolling(signals: Signals, spec: RowsOfStep, processing: Processing) -> NDArray[np.bool_]:
+    """Rows in or near motion, away from the ends of the filter: where nothing moves, no constraint can be broken.
+
+    Steering at standstill, wheels that stand askew push the chassis aside, and what holds it there creeps.
+    """
+    dt = signals.segment.sample_time
+    width = 2 * round(processing.guard / dt) + 1
+    moving = np.any(np.abs(signals.joint_rates) > processing.moving, axis=1)
+    near = ndimage.binary_dilation(moving, np.ones(width, dtype=bool))
+    near[: width // 2] = near[-(width // 2) :] = False
+    if spec.mode is Mode.ALIGNMENT:
+        near &= np.all(np.abs(signals.alpha) < ASKEW, axis=1)
+    return np.asarray(near)
+
+
+def tolerated_creep(source: Source, geometry: Geometry) -> float:
+    """Speed of the contacts (rms) that creep may take from rolling [m/s]."""
+    speed = geometry.wheel_radius * source.inputs[:, rows.SLICES["beta_rate"]]
+    return granted_creep(source.spec.mode, speed[source.moving[0]])
+
+
+def granted_creep(mode: Mode | None, speed: Array) -> float:
+    """The same of contacts that roll at some speeds (..., 4) [m/s] in a mode."""
+    creep = TURNING_CREEP if mode is Mode.ALIGNMENT else CREEP
+    return creep * float(np.sqrt(np.mean(speed**2)))
