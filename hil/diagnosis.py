@@ -17,7 +17,7 @@ from hil.network import load_network
 from ident.errors import RecordError, UserError
 from ident.gap.axis.diagnose import diagnose_axis
 from ident.gap.diagnosis import Diagnosis, write_diagnosis
-from ident.gap.judge import Findings
+from ident.gap.findings import Findings
 from ident.gap.vehicle.diagnose import diagnose_vehicle
 from ident.records.axis_record import AxisRecord, read_axis_record
 from ident.records.record import Record

@@ -20,10 +20,9 @@ from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.plans import plans_from_text
 from ident.campaign.plan import Plan
 from ident.campaign.reference import STEERING_LOOPS, sample_times
-from ident.gap.evidence import orthonormal
+from ident.gap.linear import least_squares, orthonormal
 from ident.gap.problem import Candidate, Problem
 from ident.gap.rows import Column, make_rows
-from ident.gap.search import least_squares
 from ident.gap.vehicle.build import build_problem
 from ident.gap.vehicle.experiments import hidden_effects
 from ident.gap.vehicle.library import DRIFTS, ONE_SIDED

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.gap.judge import Findings
+from ident.gap.findings import Findings
+from ident.gap.linear import least_squares
 from ident.gap.problem import Problem
 from ident.gap.remainder import held_out_gap, noise_floors
 from ident.gap.rows import Column, Rows, make_rows
-from ident.gap.search import least_squares
 
 Array = NDArray[np.float64]
 

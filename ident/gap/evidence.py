@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.gap.linear import orthonormal
 from ident.gap.rows import Column
 
 Array = NDArray[np.float64]
@@ -27,8 +28,6 @@ VISIBLE: Final = 0.02
 BESIDE: Final = 4.0
 """Log evidence that what comes along with an effect must bring more than the price of its number: few effects do not
 come alone, one in fifty by this."""
-RANK: Final = 1e-7
-"""Smallest singular value, relative to the largest, of a baseline column that counts."""
 
 
 @dataclass(frozen=True)
@@ -141,14 +140,6 @@ def directions(white: White, layout: Sequence[Column], rows: Mask | None = None)
         end += count
     low, small = np.array(bounds).reshape(-1, 2).T
     return Directions(np.hstack(parts), tuple(places), low, small, residual, np.array(volumes), tuple(bounded))
-
-
-def orthonormal(columns: Array, rank: float = RANK) -> Array:
-    """Orthonormal basis of columns of any scale; singular values up to `rank` of the largest are left out."""
-    norms = np.linalg.norm(columns, axis=0)
-    scaled = columns[:, norms > 0] / norms[norms > 0]
-    vectors, singular, _ = np.linalg.svd(scaled, full_matrices=False)
-    return np.asarray(vectors[:, singular > rank * singular.max(initial=0.0)])
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.gap.linear import least_squares
+from ident.gap.regression import Regression
 from ident.gap.rows import Rows
-from ident.gap.search import Regression, least_squares
 from ident.gap.whitening import Whitener
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from ident.gap.evidence import cosines
-from ident.gap.search import Regression, Slot
+from ident.gap.regression import Regression, Slot
 from ident.vehicle.quantities import read_toml
 
 ALIKE: Final = 0.995

@@ -14,10 +14,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.gap.linear import least_squares
 from ident.gap.problem import Problem, Variant
 from ident.gap.refit import Part, refit
+from ident.gap.regression import Regression
 from ident.gap.rows import Column
-from ident.gap.search import Regression, extended, least_squares
+from ident.gap.search import extended
 from ident.gap.whitening import Whitener
 
 Array = NDArray[np.float64]

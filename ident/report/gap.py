@@ -13,7 +13,7 @@ from markupsafe import Markup
 from plotly import offline
 
 from ident.gap.diagnosis import Diagnosis, Verdict, write_whole
-from ident.gap.judge import Cause, Findings
+from ident.gap.findings import Cause, Findings
 from ident.report import digits
 from ident.report.gap_figures import Figure, map_figure, residual_figures
 from ident.report.gap_summary import gap_line, next_text, plain, verdict_line

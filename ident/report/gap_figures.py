@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.gap.diagnosis import Share
-from ident.gap.judge import Findings
+from ident.gap.findings import Findings
 from ident.gap.problem import Block, Channel
 from ident.gap.remainder import ALL, noise_floors
 from ident.gap.rows import kept_rows, make_rows

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from ident.gap.diagnosis import Diagnosis, NamedEffect, Share, Verdict
-from ident.gap.judge import Findings
+from ident.gap.findings import Findings
 from ident.report.digits import percent, significant, unit_text, with_std
 
 MOST_CAUSES: Final = 4

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ident.gap.axis.problem import axis_problem, axis_reference, refuse_other_axes
-from ident.gap.judge import Findings, judge
+from ident.gap.findings import Findings
+from ident.gap.judge import judge
 from ident.gap.split import split_problem
 from ident.records.axis_record import AxisRecord
 

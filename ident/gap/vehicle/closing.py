@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ident.estimate.equations import ROWS
 from ident.estimate.filters import Processing
 from ident.gap.diagnosis import Gap
-from ident.gap.judge import Findings
+from ident.gap.findings import Findings
 from ident.gap.problem import Channel, Problem
 from ident.gap.refit import Refit
 from ident.gap.vehicle.context import PRIOR_WEIGHT, make_context

@@ -10,7 +10,8 @@ import numpy as np
 
 from ident.errors import DataFileError, RecordError
 from ident.gap.diagnosis import Diagnosis
-from ident.gap.judge import Findings, judge
+from ident.gap.findings import Findings
+from ident.gap.judge import judge
 from ident.gap.problem import Problem
 from ident.gap.split import split_problem
 from ident.gap.vehicle.belonging import refuse_other_vehicle

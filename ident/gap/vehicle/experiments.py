@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from ident.gap.judge import Findings
+from ident.gap.findings import Findings
 from ident.gap.vehicle.ideal import DIAGNOSTIC
 from ident.gap.vehicle.library import DRIFTS
 from ident.gap.vehicle.visibility import Sight

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.gap.evidence import orthonormal
+from ident.gap.linear import orthonormal
 from ident.gap.problem import Channel, Problem, Variant
 from ident.gap.rows import Rows, make_rows
 from ident.gap.vehicle.build import build_problem

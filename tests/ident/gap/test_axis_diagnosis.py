@@ -16,7 +16,7 @@ from ident.gap.axis.candidates import delayed, in_gap
 from ident.gap.axis.diagnose import diagnose_axis
 from ident.gap.axis.motion import derivative, with_repeats
 from ident.gap.diagnosis import Verdict
-from ident.gap.judge import Findings
+from ident.gap.findings import Findings
 from ident.records.axis_record import AxisRecord, read_axis_record
 
 Make = Callable[..., Any]

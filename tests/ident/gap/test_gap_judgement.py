@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from ident.errors import UserError
 from ident.gap.diagnosis import Gap, Verdict, write_diagnosis
-from ident.gap.judge import Findings, judge
+from ident.gap.findings import Findings
+from ident.gap.judge import judge
 from ident.gap.problem import Nominal, Problem, Variant
 from ident.gap.split import split_problem
 

@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from ident.gap.diagnosis import Diagnosis, Gap, NamedEffect, Share, Verdict
-from ident.gap.judge import Findings, judge
+from ident.gap.findings import Findings
+from ident.gap.judge import judge
 from ident.gap.problem import Block, Candidate, Channel, Problem, Variant
 from ident.report.gap import GapReport, render_gap_report
 from ident.report.gap_figures import map_figure, residual_figures

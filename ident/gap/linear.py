@@ -1,0 +1,28 @@
+"""Linear algebra on columns of any scale."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+RANK: Final = 1e-7
+"""Smallest singular value, relative to the largest, of a baseline column that counts."""
+
+
+def orthonormal(columns: Array, rank: float = RANK) -> Array:
+    """Orthonormal basis of columns of any scale; singular values up to `rank` of the largest are left out."""
+    norms = np.linalg.norm(columns, axis=0)
+    scaled = columns[:, norms > 0] / norms[norms > 0]
+    vectors, singular, _ = np.linalg.svd(scaled, full_matrices=False)
+    return np.asarray(vectors[:, singular > rank * singular.max(initial=0.0)])
+
+
+def least_squares(design: Array, target: Array) -> Array:
+    """Coefficients of columns of any scale; of dependent ones, the smallest."""
+    scale = np.linalg.norm(design, axis=0)
+    scale[scale == 0] = 1.0
+    return np.asarray(np.linalg.lstsq(design / scale, target, rcond=1e-7)[0] / scale)

@@ -1,0 +1,275 @@
+"""The rows as one whitened regression, and what may stand in each place of an explanation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.gap.evidence import Directions, Evidence, White, directions, gather
+from ident.gap.linear import least_squares
+from ident.gap.problem import Problem
+from ident.gap.rows import Rows
+from ident.gap.whitening import ORDER, Colour, Whitener, colours_of_repeats, fit_whitener
+
+Array = NDArray[np.float64]
+
+Mask = NDArray[np.bool_]
+
+LARGE: Final = 0.2
+"""Part of the sum of squares, colour apart, from which a candidate is taken off too: whitening can hide it."""
+
+ROWS_PER_CONTENDER: Final = 40
+
+CONTENDING: Final = 12.0
+"""Likelihood ratio from which a candidate is taken off: what chance alone seldom reaches is not taken for noise."""
+
+CONTENDERS: Final = 12
+"""Candidates that are taken off before the colour of the noise is found."""
+
+SAME: Final = 0.9999
+"""Cosine of two columns that are one and the same."""
+
+SIMPLER: Final = 3.0
+"""Log evidence that a further column of the same candidate must bring."""
+
+SILENT = 1e-12
+"""Rms, in whatever unit, of a group that leaves nothing at all, as ideal records do."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Thresholds of the search.
+
+    Attributes:
+        level: largest probability by chance, over all candidates at once, at which an effect is believed.
+        pair_level: the same over all pairs.
+        least: smallest log evidence, its price paid: noise is never quite what surrogates make of it.
+        fitted: smallest log likelihood ratio of the fitted rows alone: what they do not show, nothing can confirm.
+        confirmation: smallest log Bayes factor of the confirming rows.
+        clear: log evidence from which what only one of the two shows is taken for an event, not for a cause in doubt.
+        stretch: rows of the stretches whose sign a surrogate flips, well beyond the memory of whitened rows.
+        stretches: that there shall be at least; short records have shorter ones.
+        surrogates: how many.
+        most: effects named at most.
+        lead: log evidence by which another candidate must beat one already taken to replace it.
+    """
+
+    level: float = 0.02
+    pair_level: float = 0.01
+    least: float = 2.5
+    fitted: float = 1.0
+    confirmation: float = 0.5
+    clear: float = 20.0
+    stretch: int = 30
+    stretches: int = 24
+    surrogates: int = 600
+    most: int = 4
+    lead: float = 0.5
+
+
+@dataclass(frozen=True)
+class Slot:
+    """What may stand in one place of the explanation, the others given.
+
+    Attributes:
+        evidence: of every variant.
+        variants: the best one of every candidate, best first.
+    """
+
+    evidence: Evidence
+    variants: tuple[int, ...]
+
+    @property
+    def log_evidence(self) -> Array:
+        """Of the variants, against nothing in this place."""
+        return self.evidence.log_evidence[list(self.variants)]
+
+
+class Regression:
+    """Rows of the problems, whitened as the effects taken so far let them be, and the evidence for every candidate."""
+
+    def __init__(self, problem: Problem, rows: Rows, settings: Settings, seed: int) -> None:
+        """`seed` draws the signs of the surrogates."""
+        self.problem = problem
+        self.rows = rows
+        self.settings = settings
+        self.seed = seed
+        length = max(1, min(settings.stretch, len(rows) // settings.stretches))
+        self.stretch = _stretches(rows, length)
+        nominal = problem.nominal
+        self._prior = 0 if nominal is None else len(nominal.values)
+        count = int(np.unique(self.stretch).size) + self._prior
+        self.signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(settings.surrogates, count))
+
+    @cached_property
+    def owners(self) -> list[int]:
+        """Candidate of every variant."""
+        return [column.candidate for column in self.rows.layout]
+
+    @cached_property
+    def wholes(self) -> dict[int, tuple[int, ...]]:
+        """Variants of several columns each of which is a variant by itself, with those."""
+        norms = np.linalg.norm(self.rows.columns, axis=0)
+        unit = self.rows.columns / np.where(norms > 0, norms, 1.0)
+        layout = self.rows.layout
+        alone = {column.place.start: variant for variant, column in enumerate(layout) if column.width == 1}
+        found = {}
+        for variant, column in enumerate(layout):
+            cosines = np.abs(unit[:, column.place].T @ unit[:, list(alone)])
+            if column.width > 1 and np.all(cosines.max(axis=1, initial=0.0) > SAME):
+                found[variant] = tuple(list(alone.values())[best] for best in cosines.argmax(axis=1).tolist())
+        return found
+
+    def key(self, variant: int) -> str:
+        """Key of a variant's candidate."""
+        return self.problem.candidates[self.owners[variant]].key
+
+    def columns_of(self, variants: Sequence[int]) -> Array:
+        """Raw columns (n, ...) of some variants."""
+        places = [self.rows.columns[:, self.rows.layout[variant].place] for variant in variants]
+        return np.hstack([np.zeros((len(self.rows), 0)), *places])
+
+    def whitener(self, variants: Sequence[int]) -> Whitener:
+        """Colour of the noise: of what these variants and, on top, the best of the others cannot explain.
+
+        Were the colour that of the whole residual, an effect of long memory would be taken for noise of long memory
+        and whitened away. What the best candidates can explain is therefore taken off first, believed or not.
+        """
+        plain, flat = self._colour(variants), self._colour(variants, order=0)
+        best = self._best(directions(self.white(plain, variants), self.rows.layout), variants, CONTENDING)
+        level = directions(self.white(flat, variants), self.rows.layout)
+        large = self._best(level, variants, LARGE * float(level.residual @ level.residual))
+        most = min(CONTENDERS, len(self.rows) // ROWS_PER_CONTENDER)
+        return self._colour((*variants, *_one_each([*large[:most], *best[:most]], self.owners)))
+
+    def _colour(self, variants: Sequence[int], order: int = ORDER) -> Whitener:
+        """Colour of what the baseline and these variants leave, fitted by turns with them."""
+        design = np.hstack([self.rows.baseline, self.columns_of(variants)])
+        residual = self.rows.target - design @ self._level(design)
+        whitener = fit_whitener(self.rows, residual, design.shape[1], order, self._repeats)
+        white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
+        residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
+        return fit_whitener(self.rows, residual, design.shape[1], order, self._repeats)
+
+    def _level(self, design: Array) -> Array:
+        """Coefficients of some columns (n, k), every group in units of what the baseline leaves of it."""
+        weighted = np.column_stack([design, self.rows.target]) / self._scale[:, None]
+        return least_squares(weighted[:, :-1], weighted[:, -1])
+
+    @cached_property
+    def _repeats(self) -> Sequence[Colour]:
+        """Colour of what differs between repeats: of measurement and motion, the model taken off."""
+        parameters = self._level(self.rows.baseline)
+        residuals = [block.target - block.baseline @ parameters for block, _ in self.rows.blocks]
+        return colours_of_repeats(self.rows, residuals)
+
+    @cached_property
+    def _scale(self) -> Array:
+        """Rms (n,) of what the baseline alone leaves of the group of a row: groups have different units."""
+        scale = np.ones(len(self.rows))
+        for group in np.unique(self.rows.group):
+            place = self.rows.group == group
+            baseline, target = self.rows.baseline[place], self.rows.target[place]
+            left = target - baseline @ least_squares(baseline, target)
+            size = float(np.sqrt(np.mean(left**2)))
+            scale[place] = size if size > SILENT else 1.0
+        return scale
+
+    def _best(self, found: Directions, given: Sequence[int], least: float) -> list[int]:
+        """The best variant of every candidate that is not given, by likelihood ratio, if that exceeds `least`."""
+        ratios = found.ratios(found.basis.T @ found.residual)
+        taken = {self.owners[variant] for variant in given}
+        best: dict[int, int] = {}
+        for variant in np.argsort(ratios)[::-1].tolist():
+            if self.owners[variant] not in taken and ratios[variant] > least:
+                best.setdefault(self.owners[variant], variant)
+        return list(best.values())
+
+    def white(self, whitener: Whitener, given: Sequence[int]) -> White:
+        """Whitened rows, variants that are given beside the baseline."""
+        rows = self.rows
+        taken = self.columns_of(given)
+        values = np.column_stack([rows.target, rows.baseline, taken, rows.columns])
+        white = whitener.apply(rows, values)
+        confirming, stretch = rows.confirming, self.stretch
+        if self._prior:
+            white = np.vstack([white, self._prior_rows(values.shape[1])])
+            confirming = np.append(confirming, np.zeros(self._prior, dtype=bool))
+            stretch = np.append(stretch, stretch.max(initial=0) + 1 + np.arange(self._prior))
+        split = 1 + rows.baseline.shape[1] + taken.shape[1]
+        return White(white[:, 0], white[:, 1:split], white[:, split:], stretch, confirming)
+
+    def evidence(self, whitener: Whitener, given: Sequence[int]) -> Evidence:
+        """Evidence for every variant beside those given; candidates of those given do not compete."""
+        taken = {self.owners[variant] for variant in given}
+        excluded = np.array([owner in taken for owner in self.owners], dtype=bool)
+        return gather(self.white(whitener, given), self.rows.layout, self.signs, excluded)
+
+    def slot(self, given: Sequence[int], whitener: Whitener) -> Slot:
+        """What may stand beside the variants given.
+
+        Clear evidence of the fitted rows alone, or of the confirming rows alone, is an event of one drive: no cause.
+        """
+        evidence = self.evidence(whitener, given)
+        once = ~in_both(evidence, self.settings)
+        found = np.where(once & (evidence.log_evidence > self.settings.clear), -np.inf, evidence.log_evidence)
+        contenders: dict[int, list[int]] = {}
+        for variant in np.flatnonzero(np.isfinite(found)).tolist():
+            contenders.setdefault(self.owners[variant], []).append(variant)
+        best = [self._simplest(variants, found) for variants in contenders.values()]
+        return Slot(evidence, tuple(sorted(best, key=lambda variant: -float(found[variant]))))
+
+    def _simplest(self, variants: Sequence[int], log_evidence: Array) -> int:
+        """The best variant of a candidate, or one of fewer columns that is nearly as good."""
+        best: int = max(variants, key=lambda variant: float(log_evidence[variant]))
+        width = {variant: self.rows.layout[variant].width for variant in variants}
+        close = [variant for variant in variants if log_evidence[variant] > log_evidence[best] - SIMPLER]
+        narrow = [variant for variant in close if width[variant] < width[best]]
+        return max(narrow or [best], key=lambda variant: float(log_evidence[variant]))
+
+    def prior_residual(self, baseline: Array) -> Array:
+        """What is known beforehand of the parameters, minus these, in standard deviations; empty without a model."""
+        nominal = self.problem.nominal
+        return np.zeros(0) if nominal is None else (nominal.values - baseline) / nominal.std
+
+    def prior_jacobian(self, width: int) -> Array:
+        """Derivative of what `prior_residual` is compared with, by `width` values, the parameters in front."""
+        nominal = self.problem.nominal
+        if nominal is None:
+            return np.zeros((0, width))
+        return np.eye(len(nominal.std), width) / nominal.std[:, None]
+
+    def _prior_rows(self, width: int) -> Array:
+        parameters = self.rows.baseline.shape[1]
+        target = self.prior_residual(np.zeros(parameters))
+        return np.column_stack([target, self.prior_jacobian(width - 1)])
+
+
+def in_both(evidence: Evidence, settings: Settings) -> Mask:
+    """Variants (V,) that the fitted rows show and the confirming ones confirm."""
+    shown = evidence.log_fitted >= settings.fitted
+    return np.asarray(shown & (evidence.log_predictive >= settings.confirmation))
+
+
+def _one_each(variants: Sequence[int], owners: Sequence[int]) -> tuple[int, ...]:
+    """The first variant of every candidate."""
+    first: dict[int, int] = {}
+    for variant in variants:
+        first.setdefault(owners[variant], variant)
+    return tuple(first.values())
+
+
+def _stretches(rows: Rows, length: int) -> NDArray[np.int64]:
+    """Number (n,) of the stretch of a run that every row belongs to."""
+    number, first = np.zeros(len(rows), dtype=np.int64), 0
+    for run in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows.run) != 0) + 1):
+        if run.size:
+            count = max(1, round(run.size / length))
+            number[run] = first + np.arange(run.size) * count // run.size
+            first += count
+    return number
