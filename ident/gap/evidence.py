@@ -156,6 +156,7 @@ class Evidence:
         log_fitted: (V,) half the scaled ratio in the fitted rows alone; of all rows, where in those the parameters
             absorb what is there.
         log_predictive: (V,) log Bayes factor of the confirming rows, given the fitted ones; 0 without any.
+        confirming: (V,) share of the confirming rows in the power of what each variant adds, as it was fitted.
         significance: probability of so large a maximum over all variants without any effect.
     """
 
@@ -166,6 +167,7 @@ class Evidence:
     log_evidence: Array
     log_fitted: Array
     log_predictive: Array
+    confirming: Array
     significance: float
 
 
@@ -202,6 +204,7 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
         log_evidence=np.where(competing, 0.5 * ratios / scale - price, -np.inf),
         log_fitted=log_fitted,
         log_predictive=log_predictive,
+        confirming=np.array([_confirming(white, column, found, amplitudes, v) for v, column in enumerate(layout)]),
         significance=significance(tested.max(initial=-np.inf), by_chance.max(axis=1, initial=-np.inf)),
     )
 
@@ -272,6 +275,15 @@ def _in_turn(
     there = np.any(white.columns[~white.confirming] != 0, axis=0)
     absorbed = (fitted.sizes == 0) & np.array([bool(there[column.place].any()) for column in layout])
     return np.where(absorbed, whole, before), np.asarray(factor)
+
+
+def _confirming(white: White, column: Column, found: Directions, amplitudes: Array, variant: int) -> float:
+    place, whole = found.places[variant], white.columns[:, column.place]
+    if place.stop == place.start:
+        return 0.0
+    coefficients = np.linalg.lstsq(found.basis[:, place].T @ whole, amplitudes[place], rcond=None)[0]
+    power = (whole @ coefficients) ** 2
+    return float(power[white.confirming].sum() / max(power.sum(), np.finfo(float).tiny))
 
 
 def cosines(evidence: Evidence, index: int) -> Array:

@@ -51,6 +51,7 @@ class Settings:
         least: smallest log evidence, its price paid: noise is never quite what surrogates make of it.
         fitted: smallest log likelihood ratio of the fitted rows alone: what they do not show, nothing can confirm.
         confirmation: smallest log Bayes factor of the confirming rows.
+        part: of what a cause does, that the fitted rows must show, and the confirming ones.
         clear: log evidence from which what only one of the two shows is taken for an event, not for a cause in doubt.
         stretch: rows of the stretches whose sign a surrogate flips, well beyond the memory of whitened rows.
         stretches: that there shall be at least; short records have shorter ones.
@@ -64,6 +65,7 @@ class Settings:
     least: float = 2.5
     fitted: float = 1.0
     confirmation: float = 0.5
+    part: float = 0.01
     clear: float = 20.0
     stretch: int = 30
     stretches: int = 24
@@ -252,8 +254,9 @@ class Regression:
 
 def in_both(evidence: Evidence, settings: Settings) -> Mask:
     """Variants (V,) that the fitted rows show and the confirming ones confirm."""
-    shown = evidence.log_fitted >= settings.fitted
-    return np.asarray(shown & (evidence.log_predictive >= settings.confirmation))
+    shown = (evidence.log_fitted >= settings.fitted) & (evidence.confirming < 1 - settings.part)
+    confirmed = (evidence.log_predictive >= settings.confirmation) & (evidence.confirming > settings.part)
+    return np.asarray(shown & confirmed)
 
 
 def _one_each(variants: Sequence[int], owners: Sequence[int]) -> tuple[int, ...]:

@@ -61,6 +61,12 @@ def test_more_mass_may_be_a_payload_and_less_may_not(known: Identities) -> None:
     assert names(known, "payload", "chassis", 20.0) == {"parameter_change", "payload"}
 
 
+def test_what_the_steps_cannot_show_is_what_changed_values_do(known: Identities) -> None:
+    for name, where in (("torque_gain", "drive_fl"), ("com_offset", "chassis"), ("steering_unit_mass", "chassis")):
+        assert names(known, name, where) == {name, "parameter_change", "payload"}
+    assert names(known, "gear_loss", "wheels") == {"gear_loss"}
+
+
 def test_another_inertia_alone_is_no_payload(known: Identities) -> None:
     for size in (-0.05, 0.05):
         assert names(known, "parameter_change", "C_ch", size) == {"parameter_change"}

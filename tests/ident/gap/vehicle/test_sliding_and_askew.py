@@ -11,7 +11,7 @@ from ident.gap.problem import Candidate, Channel, Variant
 from ident.gap.vehicle.askew import beside_sliding
 from ident.gap.vehicle.ideal import Drive, ideal_record
 from ident.gap.vehicle.rows import SLICES
-from ident.gap.vehicle.sliding import sliding_cause, traction
+from ident.gap.vehicle.sliding import slides_alone, sliding_cause, traction
 from ident.gap.vehicle.sources import Source, sources_of
 from ident.gap.vehicle.transforms import Setting, transform_cause
 from ident.records.record import Step
@@ -80,6 +80,16 @@ def test_two_wheels_that_slide_make_a_slippery_floor(straight: Source, setting: 
 def test_a_wheel_that_runs_ahead_against_its_pull_does_not_slide(straight: Source, setting: Setting) -> None:
     inputs, _ = sliding(straight, setting, [2], sense=-1.0)
     assert not np.any(sliding_cause("wheel_fr").sliding(inputs, setting))
+
+
+@pytest.mark.parametrize(("wheels", "alone"), [([2], True), ([0, 2], False), ([0, 1, 2, 3], False)])
+def test_the_floor_under_one_wheel_is_no_cause_where_others_slide(
+    straight: Source, setting: Setting, wheels: list[int], alone: bool
+) -> None:
+    inputs, _ = sliding(straight, setting, wheels)
+    drives = [(straight.inputs, setting), (inputs, setting)]
+    assert slides_alone(sliding_cause("wheel_fr"), drives) is (alone or len(wheels) == 4)
+    assert slides_alone(sliding_cause("chassis"), drives)
 
 
 def test_what_slid_is_taken_off_speed_and_torque_of_the_wheel(straight: Source, setting: Setting) -> None:
