@@ -45,7 +45,7 @@ class Limits:
         sure: log Bayes factor of the confirming rows from which an effect stands although it seems to, by accident.
         minor: log evidence over that of the strongest effect above which one counts that closes less.
         share: of the gap that is left, which an effect must close to count all the same.
-        trifle: share of the whole gap that it must close in any case.
+        trifle: power, over the noise's, by which it must lower the held-out gap in any case.
     """
 
     deviations: float = 3.0
@@ -54,14 +54,14 @@ class Limits:
     beside: float = 0.35
     creeping: float = 1.5
     explained: float = 0.5
-    named: float = 0.9
+    named: float = 0.75
     improvement: float = 0.01
     widening: float = 0.1
     measurable: float = 0.05
     sure: float = 5.0
     minor: float = 0.05
     share: float = 0.1
-    trifle: float = 1e-3
+    trifle: float = 5e-3
 
 
 def judge(
@@ -138,13 +138,19 @@ class _Judgement:
         evidence = [self._log_evidence(index) for index in range(len(variants))]
         least = int(np.argmin(evidence))
         minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
-        needed = max(self.limits.trifle, self.limits.share * self._left)
+        trifle = self.limits.trifle * self._whole.floor**2 / max(self._removable, np.finfo(float).tiny)
+        needed = max(trifle, self.limits.share * self._left)
         return self._others(least) if minor and closed[least] < needed else variants
 
     @cached_property
     def _whole(self) -> Gap:
         """With all effects, as their columns."""
         return self._gap(self.found.variants)
+
+    @property
+    def _removable(self) -> float:
+        """Power of the held-out gap above the noise."""
+        return self._whole.before**2 - self._whole.floor**2
 
     @property
     def _left(self) -> float:
@@ -159,7 +165,7 @@ class _Judgement:
 
     def _measurable(self) -> bool:
         """Whether the held-out gap that effects could close is more than an accident of the noise."""
-        return self._whole.before**2 > (1 + self.limits.measurable) * self._whole.floor**2
+        return self._removable > self.limits.measurable * self._whole.floor**2
 
     def _doubtful(self) -> Mapping[str, float]:
         rest = self.found.rest
@@ -185,8 +191,7 @@ class _Judgement:
     @cached_property
     def _closed(self) -> list[float]:
         """Share of the removable held-out gap that each effect closes, the others given; all as their columns."""
-        whole = self._whole
-        removable = whole.before**2 - whole.floor**2
+        whole, removable = self._whole, self._removable
         without = [self._gap(self._others(index)).after for index in range(len(self.found.variants))]
         return [(after**2 - whole.after**2) / removable if removable > 0 else 0.0 for after in without]
 

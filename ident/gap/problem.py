@@ -83,11 +83,13 @@ class Variant:
         start: coefficients of the columns (k,) -> values of all parameters of the candidate. None: they are the same,
             those of what may come along behind the parameters.
         bent: the candidate's contribution says more than these columns; without it, a refit takes the columns alone.
+        beside: how many of the columns, the last ones, only come along with the effect.
     """
 
     columns: tuple[Array | None, ...]
     start: Callable[[Array], Array] | None = None
     bent: bool = True
+    beside: int = 0
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,7 @@ class Column:
         place: among all columns.
         least: value that all of its coefficients must reach, -inf where there is none such.
         negligible: size that its one coefficient must exceed.
+        beside: columns, the last ones, that only come along.
     """
 
     candidate: int
@@ -58,6 +59,12 @@ class Column:
     place: slice
     least: float
     negligible: float
+    beside: int = 0
+
+    @property
+    def own(self) -> slice:
+        """Where those stand that do not only come along."""
+        return slice(self.place.start, max(self.place.start, self.place.stop - self.beside))
 
     @property
     def width(self) -> int:
@@ -168,7 +175,8 @@ def _candidate_columns(problems: Sequence[Problem], kept: Sequence[Kept]) -> tup
                 series = [None] * len(series)
             width = next((column.shape[1] for column in series if column is not None), 0)
             stacks.append(_stack(kept, series, width))
-            layout.append(Column(index, number, slice(end, end + width), *_bounds(candidates[0], width)))
+            beside = candidates[0].variants[number].beside
+            layout.append(Column(index, number, slice(end, end + width), *_bounds(candidates[0], width), beside))
             end += width
     return np.hstack(stacks), tuple(layout)
 

@@ -38,7 +38,13 @@ def beside_sliding(candidate: Candidate, slid: Sequence[Array | None], rolling: 
         rolling: (N,) of every block, where no wheel slides; None where it does not matter.
     """
     variants = tuple(
-        Variant(tuple(_joined(*parts, _width(variant)) for parts in zip(variant.columns, rolling, slid, strict=True)))
+        replace(
+            variant,
+            columns=tuple(
+                _joined(*parts, _width(variant)) for parts in zip(variant.columns, rolling, slid, strict=True)
+            ),
+            beside=variant.beside + 1,
+        )
         for variant in candidate.variants
     )
     if candidate.contribution is None:

@@ -129,4 +129,4 @@ def _probed(cause: TransformCause, sources: Sequence[Source], context: Context) 
         sizes[place] = probe
         found = exact(sizes, context.parameters)
         changes.append([None if change is None else change / probe for change in found])
-        yield Variant(tuple(side_by_side(columns) for columns in zip(*changes, strict=True)))
+        yield Variant(tuple(side_by_side(columns) for columns in zip(*changes, strict=True)), beside=place)

@@ -57,7 +57,7 @@ def sights(problem: Problem) -> Mapping[str, Sight]:
     rows = make_rows(problem)
     scale = row_noise(rows)
     baseline = orthonormal(rows.baseline / scale[:, None], RANK)
-    found = [_left(rows.columns[:, column.place] / scale[:, None], baseline) for column in rows.layout]
+    found = [_left(rows.columns[:, column.own] / scale[:, None], baseline) for column in rows.layout]
     owners = [problem.candidates[column.candidate].key for column in rows.layout]
     return {
         candidate.key: Sight(

@@ -108,7 +108,7 @@ def _with_play(problem: Problem) -> Problem:
     play, soft, *others = problem.candidates
     both = zip(play.variants[0].columns, soft.variants[0].columns, strict=True)
     columns = tuple(np.hstack([one, other]) for one, other in both if one is not None and other is not None)
-    play = replace(play, variants=(*play.variants, Variant(columns)), least=0.0)
+    play = replace(play, variants=(*play.variants, Variant(columns, beside=1)), least=0.0)
     return replace(problem, candidates=(play, replace(soft, least=0.0), *others))
 
 
