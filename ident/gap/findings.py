@@ -51,6 +51,7 @@ class Findings:
         verdict: of the search and of what is left.
         causes: most probable first.
         doubtful: what came out best beside the causes and was not believed, with its probability, best first.
+        events: what one drive shows clearly and the other does not, best first: no cause.
         gap: held out.
         where: shares of the gap.
         invisible: names of effects that are nowhere visible.
@@ -64,6 +65,7 @@ class Findings:
     verdict: Verdict
     causes: tuple[Cause, ...]
     doubtful: Mapping[str, float]
+    events: tuple[str, ...]
     gap: Gap
     where: tuple[Share, ...]
     invisible: tuple[str, ...]

@@ -113,6 +113,7 @@ class _Judgement:
             verdict=verdict,
             causes=causes,
             doubtful=self._doubtful(),
+            events=tuple(self.problems[0].candidates[owner].key for owner in self.found.rest.events),
             gap=gap,
             where=shares(self.rows, self.floors, self._judged()),
             invisible=invisible_names(self.regression),

@@ -81,10 +81,12 @@ class Slot:
     Attributes:
         evidence: of every variant.
         variants: the best one of every candidate, best first.
+        events: candidates, best first, whose evidence is clear and all of one drive: no cause.
     """
 
     evidence: Evidence
     variants: tuple[int, ...]
+    events: tuple[int, ...] = ()
 
     @property
     def log_evidence(self) -> Array:
@@ -213,18 +215,17 @@ class Regression:
         return gather(self.white(whitener, given), self.rows.layout, self.signs, excluded)
 
     def slot(self, given: Sequence[int], whitener: Whitener) -> Slot:
-        """What may stand beside the variants given.
-
-        Clear evidence of the fitted rows alone, or of the confirming rows alone, is an event of one drive: no cause.
-        """
+        """What may stand beside the variants given."""
         evidence = self.evidence(whitener, given)
-        once = ~in_both(evidence, self.settings)
-        found = np.where(once & (evidence.log_evidence > self.settings.clear), -np.inf, evidence.log_evidence)
+        once = ~in_both(evidence, self.settings) & (evidence.log_evidence > self.settings.clear)
+        found = np.where(once, -np.inf, evidence.log_evidence)
+        strongest = sorted(np.flatnonzero(once).tolist(), key=lambda variant: -float(evidence.log_evidence[variant]))
+        events = tuple(dict.fromkeys(self.owners[variant] for variant in strongest))
         contenders: dict[int, list[int]] = {}
         for variant in np.flatnonzero(np.isfinite(found)).tolist():
             contenders.setdefault(self.owners[variant], []).append(variant)
         best = [self._simplest(variants, found) for variants in contenders.values()]
-        return Slot(evidence, tuple(sorted(best, key=lambda variant: -float(found[variant]))))
+        return Slot(evidence, tuple(sorted(best, key=lambda variant: -float(found[variant]))), events)
 
     def _simplest(self, variants: Sequence[int], log_evidence: Array) -> int:
         """The best variant of a candidate, or one of fewer columns that is nearly as good."""

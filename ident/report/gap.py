@@ -94,6 +94,7 @@ def render_gap_report(content: GapReport) -> str:
         rows=[_row(cause, content) for cause in findings.causes],
         believed=diagnosis.verdict is Verdict.EFFECT,
         doubtful=_doubtful(findings),
+        events=findings.events,
         residuals=[(key, title) for key, title, _ in residuals],
         parameters=_parameters(findings),
         remainder=findings.remainder,

@@ -9,6 +9,7 @@ from ident.gap.findings import Findings
 from ident.report.digits import percent, significant, unit_text, with_std
 
 MOST_CAUSES: Final = 4
+MOST_EVENTS: Final = 3
 
 _VERDICTS: Final = {
     Verdict.EFFECT: "The model lacks {names}.",
@@ -27,6 +28,8 @@ def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
     if diagnosis.verdict is Verdict.UNKNOWN and findings.causes:
         named = ", ".join(cause.candidate.key for cause in findings.causes)
         lines.append(f"Nearest, but not enough of it: {named}.")
+    if findings.events:
+        lines.append(f"Only one of the two drives shows, so no cause: {', '.join(findings.events[:MOST_EVENTS])}.")
     if diagnosis.invisible:
         lines.append(f"These records cannot show: {', '.join(diagnosis.invisible)}.")
     lines.append(f"Next: {next_text(diagnosis)}")

@@ -19,6 +19,7 @@ from ident.gap.judge import judge
 from ident.gap.probability import calibration
 from ident.gap.problem import Nominal, Problem, Variant
 from ident.gap.split import split_problem
+from ident.report.gap_summary import summary_lines
 
 
 def _judged(world: Any) -> Findings:
@@ -93,7 +94,10 @@ def _in_part(problem: Problem, shown: bool) -> Problem:
 def test_what_happened_in_one_drive_only_is_no_cause_and_hides_none(world: type[Any], part: int) -> None:
     """An event that its candidate explains to the last, in the drive fitted or in the one that confirms."""
     problems = [_in_part(world(seed=24, true={"c": 0.3}).problem(one), one == part) for one in (0, 1)]
-    assert _names(judge(*problems, seed=1)) == ["c"]
+    findings = judge(*problems, seed=1)
+    assert _names(findings) == ["c"]
+    assert findings.events == ("a@place",)
+    assert any("Only one of the two drives" in line for line in summary_lines(findings, findings.diagnosis()))
 
 
 def test_a_candidate_that_one_record_speaks_against_is_none_in_the_other(world: type[Any]) -> None:
