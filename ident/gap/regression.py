@@ -66,7 +66,7 @@ class Settings:
     fitted: float = 1.0
     confirmation: float = 0.5
     part: float = 0.01
-    clear: float = 20.0
+    clear: float = 8.0
     stretch: int = 30
     stretches: int = 24
     surrogates: int = 600
