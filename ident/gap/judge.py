@@ -35,7 +35,7 @@ class Limits:
         deviations: by which a smooth function must predict the confirming rows for there to be a remainder.
         size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
         repeating: the same, above which there is a remainder whether or not it can be predicted.
-        beside: the same beside effects that are named.
+        beside: the same beside effects that are named, where the held-out gap can be measured.
         creeping: the same of rows with a tolerance, whose noise is that.
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
         named: what one effect must close, over that and what all leave, where a remainder repeats.
@@ -230,7 +230,8 @@ class _Judgement:
     def _repeating(self) -> bool:
         """Whether what the model leaves repeats in every record, and is well above the noise."""
         creeping = {block.label for block, _ in self.rows.blocks if block.tolerance > 0}
-        usual = self.limits.beside if self.found.variants else self.limits.repeating
+        stricter = self.found.variants and self._measurable()
+        usual = self.limits.beside if stricter else self.limits.repeating
         sizes = lasting(self.rows, self.floors, self.after.blocks)
         return any(size > (self.limits.creeping if label in creeping else usual) for label, size in sizes.items())
 

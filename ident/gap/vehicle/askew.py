@@ -38,11 +38,8 @@ def beside_sliding(candidate: Candidate, slid: Sequence[Array | None], rolling: 
         rolling: (N,) of every block, where no wheel slides; None where it does not matter.
     """
     variants = tuple(
-        replace(
-            variant,
-            columns=tuple(
-                _joined(*parts, _width(variant)) for parts in zip(variant.columns, rolling, slid, strict=True)
-            ),
+        Variant(
+            tuple(_joined(*parts, _width(variant)) for parts in zip(variant.columns, rolling, slid, strict=True)),
             beside=variant.beside + 1,
         )
         for variant in candidate.variants

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ident.estimate.filters import Processing
 from ident.gap.problem import Block, Channel, Nominal, Problem
 from ident.gap.vehicle import rows
-from ident.gap.vehicle.candidates import candidate_of, causes_of, with_askew_ones
+from ident.gap.vehicle.candidates import candidate_of, causes_of, seen_together
 from ident.gap.vehicle.context import MODEL_COLUMNS, Context, make_context, table_of
 from ident.gap.vehicle.library import TermCause
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
@@ -60,7 +60,7 @@ def build_problem(
         names=PARAMETER_NAMES,
         units=tuple(PARAMETER_UNITS.values()),
         blocks=tuple(blocks),
-        candidates=tuple(with_askew_ones(candidates, sources, context)),
+        candidates=tuple(seen_together(candidates, sources, context)),
         nominal=Nominal(model.values, model.std) if model else None,
     )
 

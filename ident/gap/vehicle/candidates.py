@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Final
 
@@ -22,11 +23,13 @@ from ident.gap.vehicle.sliding import (
     SlidingCause,
     adhesion,
     slides_alone,
+    sliding_cause,
     sliding_causes,
+    sliding_times,
 )
 from ident.gap.vehicle.sources import Source
 from ident.gap.vehicle.transforms import TransformCause, transform_causes
-from ident.vehicle.effects import EffectName
+from ident.vehicle.effects import WHEEL_PLACES, EffectName
 
 Array = NDArray[np.float64]
 
@@ -67,22 +70,30 @@ def candidate_of(
     )
 
 
-def with_askew_ones(
-    candidates: Sequence[Candidate], sources: Sequence[Source], context: Context
-) -> Iterator[Candidate]:
-    """The candidates, sliding beside those that stand askew."""
+def seen_together(candidates: Sequence[Candidate], sources: Sequence[Source], context: Context) -> Iterator[Candidate]:
+    """The candidates, sliding beside those that stand askew, and slip only of wheels that slide alone."""
+    times = _sliding_times(sources, context)
     slid = _slid(ANY_WHEEL, sources, context)
     rolling = [mask for source in sources for mask in [_nothing_slides(source, context)] * len(source.coordinates)]
     for candidate in candidates:
-        yield beside_sliding(candidate, slid, rolling) if stands_askew(candidate) else candidate
+        if candidate.effect == EffectName.SLIP:
+            yield replace(candidate, excluded=not slides_alone(sliding_cause(candidate.where), times))
+        else:
+            yield beside_sliding(candidate, slid, rolling) if stands_askew(candidate) else candidate
+
+
+def _sliding_times(sources: Sequence[Source], context: Context) -> Array:
+    """Time (4,) that each wheel surely slides [s]; both channels have the same signals."""
+    rolling = [source for source in sources if source.travels and source.channel is Channel.KINEMATIC]
+    found = [sliding_times(context.inputs(source), context.setting(source)) for source in rolling]
+    return np.asarray(np.sum([np.zeros(len(WHEEL_PLACES)), *found], axis=0))
 
 
 def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Candidate:
     """What was slid, as it was found; the friction coefficient by the traction that it took."""
     travelling = [source for source in sources if source.travels]
-    drives = [(context.inputs(source), context.setting(source)) for source in travelling]
     slid = _slid(cause, sources, context)
-    held = [adhesion(inputs, cause.wheels, setting) for inputs, setting in drives]
+    held = [adhesion(context.inputs(source), cause.wheels, context.setting(source)) for source in travelling]
     friction = max(held, default=0.0) / ALONG
     return Candidate(
         effect=cause.name,
@@ -90,7 +101,6 @@ def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -
         parameters=placed_parameters(cause.name, cause.where),
         variants=(Variant(tuple(side_by_side([column]) for column in slid), lambda _: np.array([friction])),),
         least=0.0,
-        excluded=not slides_alone(cause, drives),
         spread=(friction * ALONG_STD / ALONG,),
     )
 

@@ -9,7 +9,6 @@ by more than creep. How far a friction coefficient can be told from that, see `A
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -139,23 +138,24 @@ def ahead_of_others(inputs: Array, setting: Setting, wheel: int | None = None) -
     return zero_phase(-left, LOAD_CUTOFF, setting.sample_time)
 
 
-def slides_alone(cause: SlidingCause, drives: Iterable[tuple[Array, Setting]]) -> bool:
-    """Whether hardly any wheel but those of a cause slides in the signals (N, INPUTS) of some drives."""
-    times = np.zeros(len(WHEEL_PLACES))
-    for inputs, setting in drives:
-        times += setting.sample_time * np.sum(surely_sliding(inputs, setting), axis=0)
+def slides_alone(cause: SlidingCause, times: Array) -> bool:
+    """Whether hardly any wheel but those of a cause slides, by the times (4,) that all of them do [s]."""
     return bool(times[list(cause.wheels)].sum() >= ALONE * times.sum())
 
 
-def surely_sliding(inputs: Array, setting: Setting) -> Mask:
-    """Where (N, 4) each wheel runs ahead of what the others roll, forward of its traction, by more than any creep."""
+def sliding_times(inputs: Array, setting: Setting) -> Array:
+    """How long (4,) each wheel runs ahead of what the others roll, forward of its traction, by more than any creep [s].
+
+    `inputs` (N, INPUTS) are the signals of a drive.
+    """
     speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]])
     wheels = range(len(WHEEL_PLACES))
     ahead = [
         np.sign(traction(inputs, wheel, setting)) * ahead_of_others(inputs, setting, wheel)[:, wheel]
         for wheel in wheels
     ]
-    return np.stack([_surely(one, speed[:, wheel]) for wheel, one in zip(wheels, ahead, strict=True)], axis=1)
+    slides = [_surely(one, speed[:, wheel]) for wheel, one in zip(wheels, ahead, strict=True)]
+    return np.asarray(setting.sample_time * np.sum(slides, axis=1))
 
 
 def _slides(forward: Array, speed: Array) -> Mask:
