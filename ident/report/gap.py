@@ -87,7 +87,7 @@ def render_gap_report(content: GapReport) -> str:
     )
     return environment.get_template("gap.html.j2").render(
         verdict=str(diagnosis.verdict),
-        headline=verdict_line(diagnosis),
+        headline=verdict_line(diagnosis, findings),
         gap=diagnosis.gap,
         gap_text=gap_line(diagnosis),
         next=next_text(diagnosis),

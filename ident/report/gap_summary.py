@@ -20,7 +20,7 @@ _VERDICTS: Final = {
 
 def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
     """At most ten lines: verdict, causes, gap, where, what cannot be seen, what to do."""
-    lines = [verdict_line(diagnosis), *(cause_line(effect) for effect in diagnosis.effects[:MOST_CAUSES])]
+    lines = [verdict_line(diagnosis, findings), *(cause_line(effect) for effect in diagnosis.effects[:MOST_CAUSES])]
     lines.append(gap_line(diagnosis))
     place = largest_share(diagnosis)
     if place is not None and diagnosis.verdict is not Verdict.NONE:
@@ -36,8 +36,10 @@ def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
     return lines
 
 
-def verdict_line(diagnosis: Diagnosis) -> str:
+def verdict_line(diagnosis: Diagnosis, findings: Findings) -> str:
     """The verdict in one sentence."""
+    if diagnosis.verdict is Verdict.NONE and findings.events:
+        return "Nothing is missing that both drives show."
     names = " and ".join(f"{plain(effect.name)} ({effect.where})" for effect in diagnosis.effects)
     return _VERDICTS[diagnosis.verdict].format(names=names)
 
