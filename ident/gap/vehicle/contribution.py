@@ -26,11 +26,15 @@ def contribution_of(
 
     def contribution(values: Array, parameters: Array) -> list[Array | None]:
         found: list[Array | None] = []
+        signals, changed = np.zeros(0), None
         for source, acts in zip(sources, acting, strict=True):
             if not acts:
                 found += [None] * len(source.coordinates)
                 continue
-            change = _change(cause, source, context, values, parameters)
+            # Both channels of a segment have the same signals: what takes the effect out of them is done once.
+            if not isinstance(cause, TermCause) and source.inputs is not signals:
+                signals, changed = source.inputs, _without(cause, source, context, values, parameters)
+            change = _change(cause, source, context, values, parameters, changed)
             if change is None:
                 found += [None] * len(source.coordinates)
                 continue
@@ -41,15 +45,27 @@ def contribution_of(
     return contribution
 
 
-def _change(cause: Cause, source: Source, context: Context, values: Array, parameters: Array) -> Array | None:
-    """The same for one source before the filter (M, rows); None where it is zero."""
+def _without(
+    cause: TransformCause | SlidingCause, source: Source, context: Context, values: Array, parameters: Array
+) -> Array:
+    """Signals of a source, the effect taken out of them."""
+    context = replace(context, parameters=parameters)
+    return cause.without(context.inputs(source), values, context.setting(source))
+
+
+def _change(
+    cause: Cause, source: Source, context: Context, values: Array, parameters: Array, changed: Array | None
+) -> Array | None:
+    """The same for one source before the filter (M, rows); None where it is zero.
+
+    `changed` are its signals with the effect taken out; None for effects that stand in the equations.
+    """
     context = replace(context, parameters=parameters)
     inputs, plain = context.inputs(source), context.formulas.exact(source.channel, source.spec)
-    if isinstance(cause, TermCause):
+    if changed is None:
         exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)
         after = exact(inputs, *context.constants, values)
     else:
-        changed = cause.without(inputs, values, context.setting(source))
         seen = [element for argument, element in plain.inputs if argument == 0]
         if np.array_equal(changed[:, seen], inputs[:, seen]):
             return None
