@@ -28,13 +28,11 @@ def contribution_of(
         found: list[Array | None] = []
         signals, changed = np.zeros(0), None
         for source, acts in zip(sources, acting, strict=True):
-            if not acts:
-                found += [None] * len(source.coordinates)
-                continue
             # Both channels of a segment have the same signals: what takes the effect out of them is done once.
-            if not isinstance(cause, TermCause) and source.inputs is not signals:
-                signals, changed = source.inputs, _without(cause, source, context, values, parameters)
-            change = _change(cause, source, context, values, parameters, changed)
+            if acts and not isinstance(cause, TermCause) and source.inputs is not signals:
+                signals = source.inputs
+                changed = cause.without(context.inputs(source), values, context.setting(source))
+            change = _change(cause, source, context, values, parameters, changed) if acts else None
             if change is None:
                 found += [None] * len(source.coordinates)
                 continue
@@ -43,14 +41,6 @@ def contribution_of(
         return found
 
     return contribution
-
-
-def _without(
-    cause: TransformCause | SlidingCause, source: Source, context: Context, values: Array, parameters: Array
-) -> Array:
-    """Signals of a source, the effect taken out of them."""
-    context = replace(context, parameters=parameters)
-    return cause.without(context.inputs(source), values, context.setting(source))
 
 
 def _change(
