@@ -184,16 +184,19 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
     amplitudes = found.basis.T @ found.residual
     sizes = found.sizes
     ratios = found.ratios(amplitudes)
+    own = 0.5 * np.array([_own(white, column, found, amplitudes, v) for v, column in enumerate(layout)])
     competing = (ratios > 0) & ~excluded
     best = int(np.argmax(np.where(competing, ratios, -1.0)))
     surrogates = signs @ _sums(found.basis * _without(found, amplitudes, best)[:, None], white.stretch)
-    scale = np.array([_scatter(found, amplitudes, variant, white.stretch) for variant in range(len(layout))])
+    scale = np.array([scatter(found.basis[:, place], found.residual, white.stretch) for place in found.places])
     scale = _shared(found, amplitudes, best, scale)
     spread = np.maximum(found.ratios(surrogates).mean(axis=0) / np.maximum(sizes, 1), 1.0)
+    beside = np.minimum([column.beside for column in layout], np.maximum(sizes - 1, 0))
     price = 0.5 * sizes * math.log(len(white.target))
-    price += BESIDE * np.minimum([column.beside for column in layout], np.maximum(sizes - 1, 0))
+    price += BESIDE * beside
     tested = np.where(competing, 0.5 * ratios / spread - price, -np.inf)
     by_chance = np.where((sizes > 0) & ~excluded, 0.5 * found.ratios(surrogates) / spread - price, -np.inf)
+    competing &= own / scale > 0.5 * (sizes - beside) * math.log(len(white.target))
     log_fitted, log_predictive = _in_turn(white, layout, found, amplitudes, scale)
     return Evidence(
         directions=found,
@@ -218,13 +221,15 @@ def _without(found: Directions, amplitudes: Array, variant: int) -> Array:
     return np.asarray(found.residual - found.basis[:, place] @ amplitudes[place])
 
 
-def _scatter(found: Directions, amplitudes: Array, variant: int, stretch: NDArray[np.int64]) -> float:
-    """Mean ratio of a variant over all signs of the stretches, over that of white noise, at least 1."""
-    place = found.places[variant]
-    if place.stop == place.start:
+def scatter(basis: Array, residual: Array, stretch: NDArray[np.int64]) -> float:
+    """Mean ratio along orthonormal directions (n, k) over all signs of the stretches, the directions taken off before.
+
+    It is in units of that of white noise, and at least 1.
+    """
+    if not basis.shape[1]:
         return 1.0
-    sums = _sums(found.basis[:, place] * _without(found, amplitudes, variant)[:, None], stretch)
-    return float(max(1.0, np.sum(sums**2) / (place.stop - place.start)))
+    sums = _sums(basis * (residual - basis @ (basis.T @ residual))[:, None], stretch)
+    return float(max(1.0, np.sum(sums**2) / basis.shape[1]))
 
 
 def significance(found: float, by_chance: Array) -> float:
@@ -283,6 +288,16 @@ def _confirming(white: White, column: Column, found: Directions, amplitudes: Arr
     coefficients = np.linalg.lstsq(found.basis[:, place].T @ whole, amplitudes[place], rcond=None)[0]
     power = (whole @ coefficients) ** 2
     return float(power[white.confirming].sum() / max(power.sum(), np.finfo(float).tiny))
+
+
+def _own(white: White, column: Column, found: Directions, amplitudes: Array, variant: int) -> float:
+    """What a variant has of its ratio beside what comes along with the effect."""
+    amplitude = amplitudes[found.places[variant]]
+    if column.beside and amplitude.size:
+        along = white.columns[:, column.own.stop : column.place.stop]
+        base = orthonormal(found.basis[:, found.places[variant]].T @ along)
+        amplitude = amplitude - base @ (base.T @ amplitude)
+    return float(amplitude @ amplitude)
 
 
 def cosines(evidence: Evidence, index: int) -> Array:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from ident.gap.diagnosis import Gap, Verdict
 from ident.gap.findings import Cause, Findings
 from ident.gap.generic import SmoothFunction
+from ident.gap.limits import Limits
 from ident.gap.linear import least_squares
 from ident.gap.probability import calibration, rank
 from ident.gap.problem import Problem
@@ -22,46 +24,10 @@ from ident.gap.remainder import held_out_gap, lasting, noise_floors, repeated, s
 from ident.gap.rows import make_rows
 from ident.gap.search import Found, concluded
 from ident.gap.shapes import search
+from ident.gap.steady import log_unsteady
 from ident.gap.whitening import Predictor, Whitener
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Limits:
-    """When a remainder makes a verdict.
-
-    Attributes:
-        deviations: by which a smooth function must predict the confirming rows for there to be a remainder.
-        size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
-        repeating: the same, above which there is a remainder whether or not it can be predicted.
-        beside: the same beside effects that are named, where the held-out gap can be measured.
-        creeping: the same of rows with a tolerance, whose noise is that.
-        explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
-        named: what one effect must close, over that and what all leave, where a remainder repeats.
-        improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
-        widening: share of the held-out gap by which an effect may seem to widen it.
-        measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.
-        sure: log Bayes factor of the confirming rows from which an effect stands although it seems to, by accident.
-        minor: log evidence over that of the strongest effect above which one counts that closes less.
-        share: of the gap that is left, which an effect must close to count all the same.
-        trifle: power, over the noise's, by which it must lower the held-out gap in any case.
-    """
-
-    deviations: float = 3.0
-    size: float = 0.25
-    repeating: float = 0.5
-    beside: float = 0.35
-    creeping: float = 1.5
-    explained: float = 0.5
-    named: float = 0.75
-    improvement: float = 0.01
-    widening: float = 0.1
-    measurable: float = 0.05
-    sure: float = 5.0
-    minor: float = 0.05
-    share: float = 0.1
-    trifle: float = 5e-3
 
 
 def judge(
@@ -211,10 +177,16 @@ class _Judgement:
     def _verdict(self) -> Verdict:
         if not self.found.variants:
             return Verdict.UNKNOWN if self._predictable() or self._repeating() else Verdict.NONE
-        unknown = (self._predictable() and self._explained() < self.limits.explained) or (
-            self._repeating() and self._named() < self.limits.named
-        )
-        return Verdict.UNKNOWN if unknown else Verdict.EFFECT
+        unexplained = self._predictable() and self._explained() < self.limits.explained
+        lasting = self._repeating() and self._named() < self.limits.named
+        unsteady = log_unsteady(self.regression, self.found) > self.limits.unsteady
+        return Verdict.UNKNOWN if unexplained or lasting or unsteady or self._tangled() else Verdict.EFFECT
+
+    def _tangled(self) -> bool:
+        """Whether many names share the friction of one joint: as many changes of one curve are another curve."""
+        owners = {self.regression.owners[variant] for variant in self.found.variants}
+        joints = Counter(joint for owner in owners for joint in self.problems[0].candidates[owner].curves)
+        return max(joints.values(), default=0) >= self.limits.curve
 
     def _named(self) -> float:
         """What the effect that closes most closes, alone or beside the others, in that and what all of them leave."""

@@ -109,6 +109,7 @@ class Candidate:
         excluded: the records speak against it, so that no others can bring it back.
         spread: standard deviations of the parameters that come with the way they are told, beyond the scatter of the
             rows; empty where there are none.
+        curves: joints whose friction over their speed it changes.
     """
 
     effect: str
@@ -121,6 +122,7 @@ class Candidate:
     negligible: float = 0.0
     excluded: bool = False
     spread: tuple[float, ...] = ()
+    curves: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
@@ -137,6 +139,20 @@ class Nominal:
 
 
 @dataclass(frozen=True)
+class Known:
+    """What is known beforehand of some parameters of the baseline.
+
+    Attributes:
+        places: (k,) which.
+        values, std: (k,) of them.
+    """
+
+    places: NDArray[np.int64]
+    values: Array
+    std: Array
+
+
+@dataclass(frozen=True)
 class Problem:
     """Everything that the search for causes sees of one or several records.
 
@@ -145,6 +161,7 @@ class Problem:
         blocks: rows.
         candidates: possible causes; the same ones, in the same order, in a problem to fit and one to confirm.
         nominal: model that is judged; None: the baseline is refitted freely.
+        spreads: standard deviations, about zero, of parameters by name that no model states, judged or not.
     """
 
     names: tuple[str, ...]
@@ -152,6 +169,15 @@ class Problem:
     blocks: tuple[Block, ...]
     candidates: tuple[Candidate, ...]
     nominal: Nominal | None = None
+    spreads: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def known(self) -> Known:
+        """Of all parameters where a model is judged, else of those with a spread of their own."""
+        if self.nominal is not None:
+            return Known(np.arange(len(self.names)), self.nominal.values, self.nominal.std)
+        places = np.array([self.names.index(name) for name in self.spreads], dtype=np.int64)
+        return Known(places, np.zeros(len(places)), np.array(list(self.spreads.values())))
 
     def candidate(self, key: str) -> Candidate:
         """The candidate of that key.

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 Mask = NDArray[np.bool_]
 
-LARGE: Final = 0.2
+LARGE: Final = 0.1
 """Part of the sum of squares, colour apart, from which a candidate is taken off too: whitening can hide it."""
 
 ROWS_PER_CONTENDER: Final = 40
@@ -105,8 +105,7 @@ class Regression:
         self.seed = seed
         length = max(1, min(settings.stretch, len(rows) // settings.stretches))
         self.stretch = _stretches(rows, length)
-        nominal = problem.nominal
-        self._prior = 0 if nominal is None else len(nominal.values)
+        self._prior = len(problem.known.places)
         count = int(np.unique(self.stretch).size) + self._prior
         self.signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(settings.surrogates, count))
 
@@ -236,16 +235,14 @@ class Regression:
         return max(narrow or [best], key=lambda variant: float(log_evidence[variant]))
 
     def prior_residual(self, baseline: Array) -> Array:
-        """What is known beforehand of the parameters, minus these, in standard deviations; empty without a model."""
-        nominal = self.problem.nominal
-        return np.zeros(0) if nominal is None else (nominal.values - baseline) / nominal.std
+        """What is known beforehand of parameters (p,), minus these, in standard deviations (k,)."""
+        known = self.problem.known
+        return (known.values - baseline[known.places]) / known.std
 
     def prior_jacobian(self, width: int) -> Array:
         """Derivative of what `prior_residual` is compared with, by `width` values, the parameters in front."""
-        nominal = self.problem.nominal
-        if nominal is None:
-            return np.zeros((0, width))
-        return np.eye(len(nominal.std), width) / nominal.std[:, None]
+        known = self.problem.known
+        return np.eye(width)[known.places] / known.std[:, None]
 
     def _prior_rows(self, width: int) -> Array:
         parameters = self.rows.baseline.shape[1]

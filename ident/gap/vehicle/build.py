@@ -12,9 +12,10 @@ from ident.gap.problem import Block, Channel, Nominal, Problem
 from ident.gap.vehicle import rows
 from ident.gap.vehicle.candidates import candidate_of, causes_of, seen_together
 from ident.gap.vehicle.context import MODEL_COLUMNS, Context, make_context, table_of
+from ident.gap.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
 from ident.gap.vehicle.library import TermCause
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
-from ident.gap.vehicle.sources import DIAGNOSED, Source, processing_of, sources_of, tolerated_creep
+from ident.gap.vehicle.sources import DIAGNOSED, Source, processing_of, sources_of
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import Effect, EffectName
@@ -57,16 +58,24 @@ def build_problem(
     columns = iter(range(MODEL_COLUMNS, MODEL_COLUMNS + len(units)))
     candidates = [candidate_of(cause, columns, sources, tables, context) for cause in causes]
     return Problem(
-        names=PARAMETER_NAMES,
-        units=tuple(PARAMETER_UNITS.values()),
+        names=(*PARAMETER_NAMES, *CREEP_NAMES),
+        units=(*PARAMETER_UNITS.values(), *["1"] * len(CREEP_NAMES)),
         blocks=tuple(blocks),
         candidates=tuple(seen_together(candidates, sources, context)),
-        nominal=Nominal(model.values, model.std) if model else None,
+        nominal=_nominal(model) if model else None,
+        spreads=dict.fromkeys(CREEP_NAMES, CREEP_STD),
     )
+
+
+def _nominal(model: Parameters) -> Nominal:
+    """Values of the model, whose wheels do not creep."""
+    creep = len(CREEP_NAMES)
+    return Nominal(np.append(model.values, np.zeros(creep)), np.append(model.std, np.full(creep, CREEP_STD)))
 
 
 def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
     """One block a coordinate; the target is what baseline and causes add up to."""
+    creep = _creep(source, context)
     for row, name in enumerate(source.coordinates):
         motion = coordinate_motion(source.inputs, source.spec, name, context.geometry)
         position, rate, acceleration = (values[:: source.factor] for values in motion)
@@ -81,13 +90,20 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
             sample_time=source.sample_time * source.factor,
             bandwidth=context.processing.cutoff,
             target=target,
-            baseline=table[:, row, 1:MODEL_COLUMNS],
+            baseline=np.hstack([table[:, row, 1:MODEL_COLUMNS], creep[:, row]]),
             moving=source.moving[row][:: source.factor],
             period=source.period[:: source.factor],
             regions=regions_of(position, rate, acceleration, load),
             features=features_of(position, rate, acceleration, load),
-            tolerance=tolerated_creep(source, context.geometry) if source.channel is Channel.KINEMATIC else 0.0,
+            tolerance=tolerated_creep(source, name, context.geometry) if source.channel is Channel.KINEMATIC else 0.0,
         )
+
+
+def _creep(source: Source, context: Context) -> Array:
+    """Columns of creep (N, rows, wheels); zeros in rows of torques."""
+    if source.channel is not Channel.KINEMATIC:
+        return np.zeros((len(source.inputs[:: source.factor]), len(source.coordinates), len(CREEP_NAMES)))
+    return context.filtered(creep_columns(context.inputs(source), source, context.setting(source)), source)
 
 
 def _unit(channel: Channel, coordinate: str) -> str:

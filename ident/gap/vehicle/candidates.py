@@ -15,7 +15,15 @@ from ident.gap.problem import Candidate, Channel, Variant
 from ident.gap.vehicle.askew import beside_sliding, stands_askew
 from ident.gap.vehicle.context import FORMULAS_KEPT, MODEL_COLUMNS, Context
 from ident.gap.vehicle.contribution import Cause, acting_in, contribution_of, side_by_side
-from ident.gap.vehicle.library import DRIFTS, ONE_SIDED, SHAPES, TermCause, placed_parameters, term_causes
+from ident.gap.vehicle.library import (
+    DRIFTS,
+    ONE_SIDED,
+    SHAPES,
+    TermCause,
+    friction_curves,
+    placed_parameters,
+    term_causes,
+)
 from ident.gap.vehicle.sliding import (
     ALONG,
     ALONG_STD,
@@ -67,6 +75,7 @@ def candidate_of(
         contribution=None if linear else contribution_of(cause, acting_in(variants, sources), sources, context),
         drift=cause.name in DRIFTS,
         least=0.0 if cause.name in ONE_SIDED else None,
+        curves=friction_curves(cause.name, cause.where),
     )
 
 

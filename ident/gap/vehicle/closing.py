@@ -16,13 +16,14 @@ from ident.gap.findings import Findings
 from ident.gap.problem import Channel, Problem
 from ident.gap.refit import Refit
 from ident.gap.vehicle.context import PRIOR_WEIGHT, make_context
+from ident.gap.vehicle.creep import contact_speeds, granted_creep
 from ident.gap.vehicle.outcome import outcomes
-from ident.gap.vehicle.sources import Source, sources_of, tolerated_creep
+from ident.gap.vehicle.sources import Source, sources_of
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EffectName, make_effect
 from ident.vehicle.extended import ExtendedModel
-from ident.vehicle.parameters import Parameters
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 Array = NDArray[np.float64]
 
@@ -70,20 +71,26 @@ def plain_model(findings: Findings, guesses: Parameters) -> ExtendedModel:
     """The model that is judged: as given, or refitted without any effect, with guesses as in `extended_model`."""
     nominal = findings.problem.nominal
     if nominal is not None:
-        return ExtendedModel(Parameters(nominal.values, nominal.std))
+        return ExtendedModel(_stated(nominal.values, nominal.std))
     return ExtendedModel(_guessed_where_unseen(findings.before, findings.problem, guesses))
 
 
 def _guessed_where_unseen(refit: Refit, problem: Problem, guesses: Parameters) -> Parameters:
     """The fit, moved towards the guesses along what the rows do not show."""
     if problem.nominal is not None:
-        return Parameters(refit.baseline, refit.baseline_std)
-    size = np.where(guesses.std > 0, guesses.std, np.abs(guesses.values))
-    rows = np.concatenate([block.baseline[block.moving] for block in problem.blocks]) * size
+        return _stated(refit.baseline, refit.baseline_std)
+    size, found = np.where(guesses.std > 0, guesses.std, np.abs(guesses.values)), refit.baseline[: len(PARAMETER_NAMES)]
+    rows = np.concatenate([block.baseline[block.moving, : len(size)] for block in problem.blocks]) * size
     scale = np.maximum(np.linalg.norm(rows, axis=0).max(), np.finfo(float).tiny)
     normal = (rows / scale).T @ (rows / scale) + PRIOR_WEIGHT**2 * np.eye(len(size))
-    pull = PRIOR_WEIGHT**2 * (guesses.values - refit.baseline) / size
-    return Parameters(refit.baseline + size * np.linalg.solve(normal, pull), refit.baseline_std)
+    pull = PRIOR_WEIGHT**2 * (guesses.values - found) / size
+    return _stated(found + size * np.linalg.solve(normal, pull), refit.baseline_std)
+
+
+def _stated(values: Array, std: Array) -> Parameters:
+    """The parameters of (18) among those of the rows."""
+    stated = slice(len(PARAMETER_NAMES))
+    return Parameters(values[stated], std[stated])
 
 
 def channel_gaps(
@@ -123,13 +130,18 @@ def _series(
     for source in sources:
         exact = context.formulas.exact(source.channel, source.spec)
         residual = context.filtered(exact(context.inputs(source), *context.constants, np.zeros(0))[..., 0], source)
-        least = tolerated_creep(source, vehicle.geometry) if source.channel is Channel.KINEMATIC else 0.0
+        least = _creep(source, vehicle) if source.channel is Channel.KINEMATIC else 0.0
         for row, name in enumerate(source.coordinates):
             rows = _folded(residual[:, row], source.moving[row][:: source.factor], source.period[:: source.factor])
             yield Series(source.channel, source.step, name, rows, least)
         for outcome in outcomes(source, model, vehicle.geometry):
             rows = _folded_runs(outcome.differences, outcome.repeat, outcome.place)
             yield Series(Channel.OUTCOME, outcome.step, outcome.coordinate, rows)
+
+
+def _creep(source: Source, vehicle: VehicleDescription) -> float:
+    """No model says how much the wheels creep, so that much is noise [m/s]."""
+    return granted_creep(source.spec.mode, contact_speeds(source, vehicle.geometry))
 
 
 def _folded(values: Array, moving: NDArray[np.bool_], period: NDArray[np.int64]) -> Array:

@@ -14,6 +14,7 @@ from ident.gap.vehicle.library import TermCause
 from ident.gap.vehicle.sliding import SlidingCause
 from ident.gap.vehicle.sources import Source
 from ident.gap.vehicle.transforms import TransformCause
+from ident.vehicle.parameters import PARAMETER_NAMES
 
 Array = NDArray[np.float64]
 Cause = TermCause | TransformCause | SlidingCause
@@ -22,7 +23,7 @@ Cause = TermCause | TransformCause | SlidingCause
 def contribution_of(
     cause: Cause, acting: Sequence[bool], sources: Sequence[Source], context: Context
 ) -> Callable[[Array, Array], Sequence[Array | None]]:
-    """What the cause adds to every block, exactly, for numbers of its own and of the model."""
+    """What the cause adds to every block, exactly, for numbers of its own and of the baseline, the model's in front."""
 
     def contribution(values: Array, parameters: Array) -> list[Array | None]:
         found: list[Array | None] = []
@@ -50,7 +51,7 @@ def _change(
 
     `changed` are its signals with the effect taken out; None for effects that stand in the equations.
     """
-    context = replace(context, parameters=parameters)
+    context = replace(context, parameters=parameters[: len(PARAMETER_NAMES)])
     inputs, plain = context.inputs(source), context.formulas.exact(source.channel, source.spec)
     if changed is None:
         exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)

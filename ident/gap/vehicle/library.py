@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ident.gap.vehicle.rows import UnitTerm
 from ident.vehicle.effect_terms import EffectTerm, neutral_values
-from ident.vehicle.effects import EFFECTS, EffectName, EffectParameter
+from ident.vehicle.effects import ALL_WHEELS, EFFECTS, STEERING, WHEEL_PLACES, EffectName, EffectParameter
 
 Array = NDArray[np.float64]
 
@@ -78,6 +78,27 @@ ONE_SIDED: Final = (
     EffectName.STEERING_UNIT_MASS,
 )
 """Effects whose size cannot be negative."""
+
+
+FRICTIONS: Final = (
+    EffectName.STRIBECK,
+    EffectName.ASYMMETRIC_COULOMB,
+    EffectName.ASYMMETRIC_VISCOUS,
+    EffectName.QUADRATIC_DRAG,
+)
+"""Effects that change the friction of the joints at their place."""
+
+_JOINTS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {where: (where,) for where in (*WHEEL_PLACES, *STEERING)}
+    | dict.fromkeys((*ALL_WHEELS, "d_vw", "d_cw"), WHEEL_PLACES)
+    | dict.fromkeys(("d_vl", "d_cl"), STEERING[:1])
+    | dict.fromkeys(("d_vr", "d_cr"), STEERING[1:])
+)
+
+
+def friction_curves(name: EffectName, where: str) -> tuple[str, ...]:
+    """Joints whose friction over their speed an effect changes: wheels and steering axes, none for most effects."""
+    return _JOINTS.get(where, ()) if name in (*FRICTIONS, EffectName.PARAMETER_CHANGE) else ()
 
 
 @dataclass(frozen=True)

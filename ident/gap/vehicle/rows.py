@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import casadi as ca
 import numpy as np
@@ -127,11 +127,16 @@ def dynamic_rows(mode: Mode | None, z: _Inputs, parameters: Expression, terms: S
 def kinematic_rows(spec: RowsOfStep, z: _Inputs, terms: Sequence[EffectTerm]) -> Expression:
     """Velocities that rolling wheels do not have, in `kinematic_coordinates` [m/s]."""
     residual = _slip(z, true_steering(terms, z.alpha), rolling_radii(terms, z.beta))
+    return ca.vertcat(*in_coordinates([residual[wheel] for wheel in range(len(WHEELS))], spec))
+
+
+def in_coordinates(wheels: Sequence[Any], spec: RowsOfStep) -> list[Any]:
+    """One quantity of the four wheels, symbols or series, as the `kinematic_coordinates` of a step."""
     if spec.mode is Mode.ALIGNMENT:
-        return ca.vertcat(*(residual[WHEELS.index(name[-2:])] for name in kinematic_coordinates(spec)))
+        return [wheels[WHEELS.index(name[-2:])] for name in kinematic_coordinates(spec)]
     assert spec.mode is not None
-    fl, rl, fr, rr = (sense * residual[wheel] for wheel, sense in enumerate(_SENSES[spec.mode]))
-    return ca.vertcat((fl - rl) / np.sqrt(2), (fr - rr) / np.sqrt(2), (fl + rl - fr - rr) / 2)
+    fl, rl, fr, rr = (sense * wheels[wheel] for wheel, sense in enumerate(_SENSES[spec.mode]))
+    return [(fl - rl) / np.sqrt(2), (fr - rr) / np.sqrt(2), (fl + rl - fr - rr) / 2]
 
 
 def _slip(z: _Inputs, alpha: Expression, radii: Expression) -> Expression:

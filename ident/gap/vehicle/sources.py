@@ -31,12 +31,6 @@ OVERSAMPLED: Final = 3.0
 ASKEW: Final = 0.4
 """Steering angle beyond which a wheel that steers at standstill pushes the chassis aside [rad]."""
 
-CREEP: Final = 3e-4
-"""Part of the rolling speed by which a wheel may creep, as any tyre does at some percent of its adhesion [-]."""
-
-TURNING_CREEP: Final = 1e-3
-"""The same for wheels that turn about their steering axes at standstill, where the chassis is held by creep alone."""
-
 RATTLING: Final = 1000.0
 """Bandwidth of the signals [rad/s]: motors on the compliance of their gears' teeth rattle more slowly than that."""
 
@@ -167,15 +161,3 @@ def _rolling(signals: Signals, spec: RowsOfStep, processing: Processing) -> NDAr
     if spec.mode is Mode.ALIGNMENT:
         near &= np.all(np.abs(signals.alpha) < ASKEW, axis=1)
     return np.asarray(near)
-
-
-def tolerated_creep(source: Source, geometry: Geometry) -> float:
-    """Speed of the contacts (rms) that creep may take from rolling [m/s]."""
-    speed = geometry.wheel_radius * source.inputs[:, rows.SLICES["beta_rate"]]
-    return granted_creep(source.spec.mode, speed[source.moving[0]])
-
-
-def granted_creep(mode: Mode | None, speed: Array) -> float:
-    """The same of contacts that roll at some speeds (..., 4) [m/s] in a mode."""
-    creep = TURNING_CREEP if mode is Mode.ALIGNMENT else CREEP
-    return creep * float(np.sqrt(np.mean(speed**2)))

@@ -131,6 +131,56 @@ def test_what_comes_along_with_an_effect_is_no_second_one(
     assert cause.part.values == pytest.approx([true[named[0]]], abs=4 * cause.part.std[0])
 
 
+def test_a_play_is_not_named_for_what_only_comes_along_with_it(world: type[Any]) -> None:
+    """Nothing but the flanks' compliance is there, and no candidate stands for it alone."""
+    problems = []
+    for part in (0, 1):
+        play, _, *others = _with_play(world(seed=21, true={"b": 0.4}).problem(part)).candidates
+        problems.append(replace(world(seed=21, true={"b": 0.4}).problem(part), candidates=(play, *others)))
+    assert "a" not in _names(judge(*problems, seed=1))
+
+
+def _in_two_steps(problem: Problem, more: float) -> Problem:
+    """Its second coordinate in a step of its own, in which `a` is larger by `more`."""
+    first, second = problem.blocks
+    column = problem.candidates[0].variants[0].columns[1]
+    assert column is not None
+    other = replace(second, step="other", target=second.target + more * column[:, 0])
+    return replace(problem, blocks=(first, other))
+
+
+@pytest.mark.parametrize(("more", "verdict"), [(0.0, Verdict.EFFECT), (0.4, Verdict.UNKNOWN)])
+def test_a_cause_has_the_same_size_in_every_step(world: type[Any], more: float, verdict: Verdict) -> None:
+    problems = [_in_two_steps(world(seed=27, true={"a": 0.3}).problem(part), more) for part in (0, 1)]
+    findings = judge(*problems, seed=1)
+    assert _names(findings) == ["a"]
+    assert findings.verdict is verdict
+
+
+@pytest.mark.parametrize(("joints", "verdict"), [("xyz", Verdict.EFFECT), ("xxx", Verdict.UNKNOWN)])
+def test_three_names_for_the_friction_of_one_joint_are_no_answer(
+    world: type[Any], joints: str, verdict: Verdict
+) -> None:
+    problems = []
+    for part in (0, 1):
+        problem = world(seed=28, true={"a": 0.3, "c": 0.3, "e": -0.3}).problem(part)
+        curves = dict(zip("ace", joints, strict=True))
+        bent = [replace(one, curves=tuple(curves.get(one.effect, ()))) for one in problem.candidates]
+        problems.append(replace(problem, candidates=tuple(bent)))
+    findings = judge(*problems, seed=1)
+    assert sorted(_names(findings)) == ["a", "c", "e"]
+    assert findings.verdict is verdict
+
+
+def test_what_is_known_of_a_parameter_holds_without_a_model_too(world: type[Any]) -> None:
+    """The third parameter is 0.5, and was expected to be 0 within 0.01."""
+    problems = [world(seed=29).problem(part) for part in (0, 1)]
+    free = judge(*problems, seed=1).after
+    held = judge(*(replace(problem, spreads={"r": 1e-2}) for problem in problems), seed=1).after
+    assert free.baseline == pytest.approx([1.0, -2.0, 0.5], abs=0.1)
+    assert abs(held.baseline[2]) < 0.5 * free.baseline[2]
+
+
 def test_what_the_parameters_absorb_is_invisible(world: type[Any]) -> None:
     problems = []
     for part in (0, 1):

@@ -1,0 +1,46 @@
+"""When what causes leave of a gap makes an answer `none`, `unknown` or a name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When a remainder makes a verdict.
+
+    Attributes:
+        deviations: by which a smooth function must predict the confirming rows for there to be a remainder.
+        size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
+        repeating: the same, above which there is a remainder whether or not it can be predicted.
+        beside: the same beside effects that are named, where the held-out gap can be measured.
+        creeping: the same of rows with a tolerance, whose noise is that.
+        explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
+        named: what one effect must close, over that and what all leave, where a remainder repeats.
+        improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
+        widening: share of the held-out gap by which an effect may seem to widen it.
+        measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.
+        sure: log Bayes factor of the confirming rows from which an effect stands although it seems to, by accident.
+        minor: log evidence over that of the strongest effect above which one counts that closes less.
+        share: of the gap that is left, which an effect must close to count all the same.
+        trifle: power, over the noise's, by which it must lower the held-out gap in any case.
+        unsteady: log evidence, for other sizes of the effects in some steps, from which they are not what they seem.
+        curve: names for the friction of one joint from which its law is one that the library does not have.
+    """
+
+    deviations: float = 3.0
+    size: float = 0.25
+    repeating: float = 0.5
+    beside: float = 0.35
+    creeping: float = 1.5
+    explained: float = 0.5
+    named: float = 0.75
+    improvement: float = 0.01
+    widening: float = 0.1
+    measurable: float = 0.05
+    sure: float = 2.5
+    minor: float = 0.05
+    share: float = 0.1
+    trifle: float = 5e-3
+    unsteady: float = 5.0
+    curve: int = 3

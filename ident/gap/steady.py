@@ -1,0 +1,50 @@
+"""Whether causes have one size everywhere: the same coefficients in every step, or others in each.
+
+A cause that stands in for another one fits every step, but each with numbers of its own. What a residual as a whole
+does not show, a few coefficients may: the evidence for letting them differ from step to step (Chow 1960), with the
+price that every number has.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.gap.evidence import VISIBLE, scatter
+from ident.gap.linear import orthonormal
+from ident.gap.regression import Regression
+from ident.gap.search import Found
+
+Array = NDArray[np.float64]
+
+
+def log_unsteady(regression: Regression, found: Found) -> float:
+    """Log evidence that the causes found have other coefficients in some steps than in the others."""
+    white = regression.white(found.whitener, found.variants)
+    base = orthonormal(white.baseline)
+    residual = white.target - base @ (base.T @ white.target)
+    columns = _by_step(regression, white.baseline[:, regression.rows.baseline.shape[1] :])
+    left = columns - base @ (base.T @ columns)
+    vectors, singular, _ = np.linalg.svd(left / np.linalg.norm(columns, axis=0), full_matrices=False)
+    basis = vectors[:, singular > VISIBLE]
+    ratio, count = float(np.sum((basis.T @ residual) ** 2)), basis.shape[1]
+    if count == 0:
+        return 0.0
+    scaled = ratio / scatter(basis, residual, white.stretch)
+    return float(0.5 * (scaled - count * math.log(len(white.target))))
+
+
+def _by_step(regression: Regression, taken: Array) -> Array:
+    """Columns (n, k) of the causes, each once for every step and channel that it acts in."""
+    rows = regression.rows
+    labels = [(block.step, block.channel) for block, _ in rows.blocks]
+    parts = [np.zeros((len(taken), 0))]
+    for label in dict.fromkeys(labels):
+        kept = np.zeros(len(taken), dtype=bool)
+        for place in [place for place, one in zip(rows.block_slices, labels, strict=True) if one == label]:
+            kept[place] = True
+        part = taken * kept[:, None]
+        parts.append(part[:, np.any(part != 0, axis=0)])
+    return np.hstack(parts)

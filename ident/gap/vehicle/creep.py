@@ -1,0 +1,86 @@
+"""Creep: how far a rolling contact gives way under its traction, which no model of rigid rolling has.
+
+A tyre that pulls slips in proportion to its traction over its load, by a number of its own. That is a column for each
+wheel in the rolling rows, fitted with everything else; what is tolerated beyond it is what proportion does not cover.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.estimate.filters import zero_phase
+from ident.gap.vehicle.rows import SLICES, in_coordinates
+from ident.gap.vehicle.sources import Source
+from ident.gap.vehicle.transforms import LOAD_CUTOFF, Setting, contact_force
+from ident.vehicle import kinematics
+from ident.vehicle.effect_terms import GRAVITY
+from ident.vehicle.geometry import WHEELS, Geometry
+from ident.vehicle.modes import Mode
+
+Array = NDArray[np.float64]
+
+CREEP_NAMES: Final = tuple(f"creep_{wheel}" for wheel in WHEELS)
+"""Slip of a wheel, over its rolling speed, for a traction as large as its load [-]."""
+
+CREEP_STD: Final = 0.03
+"""Standard deviation of those numbers beforehand: tyres take ten (air) to a hundred times their load for full slip."""
+
+GRANTED: Final = 3e-4
+"""Part of the rolling speed by which a wheel may creep, as any tyre does at some percent of its adhesion [-]."""
+
+TURNING: Final = 1e-3
+"""The same for wheels that turn about their steering axes at standstill, where the chassis is held by creep alone."""
+
+LEFT_OVER: Final[Mapping[str, float]] = MappingProxyType(
+    {"front_rear_left": 1e-4, "front_rear_right": 1e-4, "left_right": 4e-5}
+)
+"""Part of the rolling speed that a contact may give way beside its creep in proportion, by coordinate [-].
+
+Front and rear wheels are held parallel by a coupling that gives way itself, which leaves more between them.
+"""
+
+
+def granted_creep(mode: Mode | None, speed: Array) -> float:
+    """What creep takes (rms) from contacts that roll at some speeds (..., 4) [m/s] in a mode [m/s]."""
+    return _part(speed, TURNING if mode is Mode.ALIGNMENT else GRANTED)
+
+
+def tolerated_creep(source: Source, coordinate: str, geometry: Geometry) -> float:
+    """What a kinematic coordinate may lack beside creep in proportion to traction, rms [m/s]."""
+    return _part(contact_speeds(source, geometry), LEFT_OVER.get(coordinate, TURNING))
+
+
+def contact_speeds(source: Source, geometry: Geometry) -> Array:
+    """At which the wheels roll in the moving rows of a kinematic source (N, 4) [m/s]."""
+    return np.asarray(geometry.wheel_radius * source.inputs[source.moving[0], SLICES["beta_rate"]])
+
+
+def _part(speed: Array, part: float) -> float:
+    return part * float(np.sqrt(np.mean(speed**2)))
+
+
+def creep_columns(inputs: Array, source: Source, setting: Setting) -> Array:
+    """What the rolling rows of a source have of unit creep of every wheel, (N, rows, 4) [m/s].
+
+    Args:
+        inputs: signals (N, INPUTS).
+        source: kinematic.
+        setting: of the vehicle; its forces are those of the contacts along the wheels' planes.
+    """
+    chassis = kinematics.constraint_matrix(inputs[:, SLICES["alpha"]], setting.geometry)[:, :, :3]
+    normal = np.einsum("nki,nkj->nij", chassis, chassis)
+    load = setting["m_ch"] * GRAVITY / 4
+    columns = []
+    for wheel in range(len(WHEELS)):
+        force = zero_phase(contact_force(inputs, wheel, setting), LOAD_CUTOFF, setting.sample_time)
+        slip = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, wheel]) * force / load
+        twist = np.linalg.solve(normal, (chassis[:, 4 + wheel] * slip[:, None])[..., None])
+        left = -(chassis[:, 4:] @ twist)[..., 0]
+        left[:, wheel] += slip
+        columns.append(np.stack(in_coordinates(list(left.T), source.spec), axis=1))
+    return np.stack(columns, axis=2)
