@@ -179,14 +179,22 @@ class _Judgement:
             return Verdict.UNKNOWN if self._predictable() or self._repeating() else Verdict.NONE
         unexplained = self._predictable() and self._explained() < self.limits.explained
         lasting = self._repeating() and self._named() < self.limits.named
-        unsteady = log_unsteady(self.regression, self.found) > self.limits.unsteady
-        return Verdict.UNKNOWN if unexplained or lasting or unsteady or self._tangled() else Verdict.EFFECT
+        strange = unexplained or lasting or self._unsteady() or self._tangled()
+        return Verdict.UNKNOWN if strange else Verdict.EFFECT
+
+    def _unsteady(self) -> bool:
+        """Whether the effects would rather have other sizes in some steps."""
+        columns = [self.rows.layout[variant] for variant in self.found.variants]
+        candidates = [self.problems[0].candidates[column.candidate] for column in columns]
+        exact = all(one.contribution is None for one in candidates) and not any(column.beside for column in columns)
+        limit = self.limits.unsteady if exact else self.limits.simulated
+        return log_unsteady(self.regression, self.found) > limit
 
     def _tangled(self) -> bool:
-        """Whether many names share the friction of one joint: as many changes of one curve are another curve."""
+        """Whether many names share the friction of one kind of joint: so many changes of a curve are another curve."""
         owners = {self.regression.owners[variant] for variant in self.found.variants}
-        joints = Counter(joint for owner in owners for joint in self.problems[0].candidates[owner].curves)
-        return max(joints.values(), default=0) >= self.limits.curve
+        curves = Counter(self.problems[0].candidates[owner].curve for owner in owners)
+        return any(count >= self.limits.curve for curve, count in curves.items() if curve)
 
     def _named(self) -> float:
         """What the effect that closes most closes, alone or beside the others, in that and what all of them leave."""

@@ -109,7 +109,8 @@ class Candidate:
         excluded: the records speak against it, so that no others can bring it back.
         spread: standard deviations of the parameters that come with the way they are told, beyond the scatter of the
             rows; empty where there are none.
-        curves: joints whose friction over their speed it changes.
+        curve: whose friction over the speed it changes, if it is a friction.
+        along: effect at the same place that comes along with it in its widest variant; both at once are that variant.
     """
 
     effect: str
@@ -122,7 +123,8 @@ class Candidate:
     negligible: float = 0.0
     excluded: bool = False
     spread: tuple[float, ...] = ()
-    curves: tuple[str, ...] = ()
+    curve: str = ""
+    along: str = ""
 
     @property
     def key(self) -> str:

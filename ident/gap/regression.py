@@ -94,6 +94,10 @@ class Slot:
         return self.evidence.log_evidence[list(self.variants)]
 
 
+Whole = tuple[int, frozenset[int]]
+"""A variant that is several candidates at once, and the numbers of those."""
+
+
 class Regression:
     """Rows of the problems, whitened as the effects taken so far let them be, and the evidence for every candidate."""
 
@@ -115,17 +119,33 @@ class Regression:
         return [column.candidate for column in self.rows.layout]
 
     @cached_property
-    def wholes(self) -> dict[int, tuple[int, ...]]:
-        """Variants of several columns each of which is a variant by itself, with those."""
+    def broad(self) -> list[Whole]:
+        """Effects with what comes along with them, where that is a candidate of its own."""
+        candidates = self.problem.candidates
+        numbers = {candidate.key: number for number, candidate in enumerate(candidates)}
+        found = []
+        for number, candidate in enumerate(candidates):
+            along = numbers.get(f"{candidate.along}@{candidate.where}")
+            if along is not None:
+                mine = [variant for variant, owner in enumerate(self.owners) if owner == number]
+                widest = max(mine, key=lambda variant: self.rows.layout[variant].width)
+                found.append((widest, frozenset({number, along})))
+        return found
+
+    @cached_property
+    def wholes(self) -> list[Whole]:
+        """Variants of several columns each of which is another candidate by itself."""
         norms = np.linalg.norm(self.rows.columns, axis=0)
         unit = self.rows.columns / np.where(norms > 0, norms, 1.0)
         layout = self.rows.layout
         alone = {column.place.start: variant for variant, column in enumerate(layout) if column.width == 1}
-        found = {}
+        found = []
         for variant, column in enumerate(layout):
             cosines = np.abs(unit[:, column.place].T @ unit[:, list(alone)])
             if column.width > 1 and np.all(cosines.max(axis=1, initial=0.0) > SAME):
-                found[variant] = tuple(list(alone.values())[best] for best in cosines.argmax(axis=1).tolist())
+                parts = [list(alone.values())[best] for best in cosines.argmax(axis=1).tolist()]
+                several = frozenset(self.owners[part] for part in parts)
+                found += [(variant, several)] if self.owners[variant] not in several else []
         return found
 
     def key(self, variant: int) -> str:

@@ -7,10 +7,11 @@ given.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ident.gap.pairs import best_pair
-from ident.gap.regression import Regression, Settings, Slot, in_both
+from ident.gap.regression import Regression, Settings, Slot, Whole, in_both
 from ident.gap.whitening import Whitener
 
 
@@ -75,7 +76,7 @@ def _believed(slot: Slot, variant: int, settings: Settings) -> bool:
 def _settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     """Replace what another candidate explains better, drop what the others make superfluous, until nothing changes."""
     for _ in range(2 * len(taken)):
-        changed = _revised(regression, _joined(regression, taken))
+        changed = _revised(regression, joined(regression, taken, regression.wholes))
         if changed == taken:
             break
         taken = changed
@@ -95,13 +96,14 @@ def _revised(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     return taken
 
 
-def _joined(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
-    """One cause for several where it alone has the columns of all of them."""
-    for whole, parts in regression.wholes.items():
-        if set(parts) <= set(taken):
-            first = min(taken.index(part) for part in parts)
+def joined(regression: Regression, taken: tuple[int, ...], wholes: Sequence[Whole]) -> tuple[int, ...]:
+    """One cause for several where it alone is all of them, in whatever shape they are."""
+    owners = [regression.owners[variant] for variant in taken]
+    for whole, several in wholes:
+        if several <= set(owners):
+            first = min(owners.index(owner) for owner in several)
             kept = [whole if place == first else variant for place, variant in enumerate(taken)]
-            return tuple(variant for variant in kept if variant not in parts)
+            return tuple(one for place, one in enumerate(kept) if place == first or owners[place] not in several)
     return taken
 
 

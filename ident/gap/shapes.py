@@ -19,7 +19,7 @@ from ident.gap.problem import Problem, Variant
 from ident.gap.refit import Part, refit
 from ident.gap.regression import Regression
 from ident.gap.rows import Column
-from ident.gap.search import extended
+from ident.gap.search import extended, joined
 from ident.gap.whitening import Whitener
 
 Array = NDArray[np.float64]
@@ -48,7 +48,9 @@ def search(problems: Sequence[Problem], regression: Regression) -> Shaped:
     found = Shaped(tuple(problems), regression, ())
     while (grown := extended(found.regression, found.taken)) != found.taken:
         found = shaped(found.problems, found.regression, grown)
-    return found
+    # Not before: as columns, such a whole is less than its parts, which have their shapes already.
+    whole = joined(found.regression, found.taken, found.regression.broad)
+    return found if whole == found.taken else shaped(found.problems, found.regression, whole)
 
 
 def shaped(problems: Sequence[Problem], regression: Regression, taken: tuple[int, ...]) -> Shaped:

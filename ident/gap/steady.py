@@ -25,7 +25,7 @@ def log_unsteady(regression: Regression, found: Found) -> float:
     white = regression.white(found.whitener, found.variants)
     base = orthonormal(white.baseline)
     residual = white.target - base @ (base.T @ white.target)
-    columns = _by_step(regression, white.baseline[:, regression.rows.baseline.shape[1] :])
+    columns = _by_step(regression, white.baseline[:, _own(regression, found)])
     left = columns - base @ (base.T @ columns)
     vectors, singular, _ = np.linalg.svd(left / np.linalg.norm(columns, axis=0), full_matrices=False)
     basis = vectors[:, singular > VISIBLE]
@@ -34,6 +34,16 @@ def log_unsteady(regression: Regression, found: Found) -> float:
         return 0.0
     scaled = ratio / scatter(basis, residual, white.stretch)
     return float(0.5 * (scaled - count * math.log(len(white.target))))
+
+
+def _own(regression: Regression, found: Found) -> list[int]:
+    """Columns of the causes among those of the whitened model; what comes along with one may differ."""
+    own: list[int] = []
+    end = regression.rows.baseline.shape[1]
+    for column in (regression.rows.layout[variant] for variant in found.variants):
+        own += range(end, end + column.width - column.beside)
+        end += column.width
+    return own
 
 
 def _by_step(regression: Regression, taken: Array) -> Array:

@@ -20,7 +20,7 @@ from ident.gap.vehicle.library import (
     ONE_SIDED,
     SHAPES,
     TermCause,
-    friction_curves,
+    friction_curve,
     placed_parameters,
     term_causes,
 )
@@ -75,7 +75,8 @@ def candidate_of(
         contribution=None if linear else contribution_of(cause, acting_in(variants, sources), sources, context),
         drift=cause.name in DRIFTS,
         least=0.0 if cause.name in ONE_SIDED else None,
-        curves=friction_curves(cause.name, cause.where),
+        curve=friction_curve(cause.name, cause.where),
+        along=EffectName.ELASTICITY if cause.name is EffectName.BACKLASH else "",
     )
 
 

@@ -88,17 +88,16 @@ FRICTIONS: Final = (
 )
 """Effects that change the friction of the joints at their place."""
 
-_JOINTS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
-    {where: (where,) for where in (*WHEEL_PLACES, *STEERING)}
-    | dict.fromkeys((*ALL_WHEELS, "d_vw", "d_cw"), WHEEL_PLACES)
-    | dict.fromkeys(("d_vl", "d_cl"), STEERING[:1])
-    | dict.fromkeys(("d_vr", "d_cr"), STEERING[1:])
+_CURVES: Final[Mapping[str, str]] = MappingProxyType(
+    dict.fromkeys((*WHEEL_PLACES, *ALL_WHEELS, "d_vw", "d_cw"), ALL_WHEELS[0])
+    | dict.fromkeys((STEERING[0], "d_vl", "d_cl"), STEERING[0])
+    | dict.fromkeys((STEERING[1], "d_vr", "d_cr"), STEERING[1])
 )
 
 
-def friction_curves(name: EffectName, where: str) -> tuple[str, ...]:
-    """Joints whose friction over their speed an effect changes: wheels and steering axes, none for most effects."""
-    return _JOINTS.get(where, ()) if name in (*FRICTIONS, EffectName.PARAMETER_CHANGE) else ()
+def friction_curve(name: EffectName, where: str) -> str:
+    """Whose friction over the speed an effect changes: that of the wheels or of a steering axis; mostly none."""
+    return _CURVES.get(where, "") if name in (*FRICTIONS, EffectName.PARAMETER_CHANGE) else ""
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,7 @@ def test_three_names_for_the_friction_of_one_joint_are_no_answer(
     for part in (0, 1):
         problem = world(seed=28, true={"a": 0.3, "c": 0.3, "e": -0.3}).problem(part)
         curves = dict(zip("ace", joints, strict=True))
-        bent = [replace(one, curves=tuple(curves.get(one.effect, ()))) for one in problem.candidates]
+        bent = [replace(one, curve=curves.get(one.effect, "")) for one in problem.candidates]
         problems.append(replace(problem, candidates=tuple(bent)))
     findings = judge(*problems, seed=1)
     assert sorted(_names(findings)) == ["a", "c", "e"]
