@@ -293,7 +293,7 @@ def _confirming(white: White, column: Column, found: Directions, amplitudes: Arr
 def _own(white: White, column: Column, found: Directions, amplitudes: Array, variant: int) -> float:
     """What a variant has of its ratio beside what comes along with the effect."""
     amplitude = amplitudes[found.places[variant]]
-    if column.beside and amplitude.size:
+    if column.beside and column.itself and amplitude.size:
         along = white.columns[:, column.own.stop : column.place.stop]
         base = orthonormal(found.basis[:, found.places[variant]].T @ along)
         amplitude = amplitude - base @ (base.T @ amplitude)

@@ -84,12 +84,14 @@ class Variant:
             those of what may come along behind the parameters.
         bent: the candidate's contribution says more than these columns; without it, a refit takes the columns alone.
         beside: how many of the columns, the last ones, only come along with the effect.
+        itself: the other columns must show by themselves; not so where what comes along is what the effect does.
     """
 
     columns: tuple[Array | None, ...]
     start: Callable[[Array], Array] | None = None
     bent: bool = True
     beside: int = 0
+    itself: bool = True
 
 
 @dataclass(frozen=True)

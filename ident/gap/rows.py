@@ -52,6 +52,7 @@ class Column:
         least: value that all of its coefficients must reach, -inf where there is none such.
         negligible: size that its one coefficient must exceed.
         beside: columns, the last ones, that only come along.
+        itself: whether the other ones must show by themselves.
     """
 
     candidate: int
@@ -60,6 +61,7 @@ class Column:
     least: float
     negligible: float
     beside: int = 0
+    itself: bool = True
 
     @property
     def own(self) -> slice:
@@ -175,8 +177,9 @@ def _candidate_columns(problems: Sequence[Problem], kept: Sequence[Kept]) -> tup
                 series = [None] * len(series)
             width = next((column.shape[1] for column in series if column is not None), 0)
             stacks.append(_stack(kept, series, width))
-            beside = candidates[0].variants[number].beside
-            layout.append(Column(index, number, slice(end, end + width), *_bounds(candidates[0], width), beside))
+            variant, place = candidates[0].variants[number], slice(end, end + width)
+            bounds = _bounds(candidates[0], width)
+            layout.append(Column(index, number, place, *bounds, beside=variant.beside, itself=variant.itself))
             end += width
     return np.hstack(stacks), tuple(layout)
 

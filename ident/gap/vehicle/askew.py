@@ -41,6 +41,7 @@ def beside_sliding(candidate: Candidate, slid: Sequence[Array | None], rolling: 
         Variant(
             tuple(_joined(*parts, _width(variant)) for parts in zip(variant.columns, rolling, slid, strict=True)),
             beside=variant.beside + 1,
+            itself=False,
         )
         for variant in candidate.variants
     )

@@ -73,14 +73,16 @@ def creep_columns(inputs: Array, source: Source, setting: Setting) -> Array:
         setting: of the vehicle; its forces are those of the contacts along the wheels' planes.
     """
     chassis = kinematics.constraint_matrix(inputs[:, SLICES["alpha"]], setting.geometry)[:, :, :3]
-    normal = np.einsum("nki,nkj->nij", chassis, chassis)
-    load = setting["m_ch"] * GRAVITY / 4
-    columns = []
-    for wheel in range(len(WHEELS)):
-        force = zero_phase(contact_force(inputs, wheel, setting), LOAD_CUTOFF, setting.sample_time)
-        slip = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, wheel]) * force / load
-        twist = np.linalg.solve(normal, (chassis[:, 4 + wheel] * slip[:, None])[..., None])
-        left = -(chassis[:, 4:] @ twist)[..., 0]
-        left[:, wheel] += slip
-        columns.append(np.stack(in_coordinates(list(left.T), source.spec), axis=1))
-    return np.stack(columns, axis=2)
+    slips = np.stack([_slip(inputs, wheel, setting) for wheel in range(len(WHEELS))], axis=1)
+    along = chassis[:, 4:]
+    twists = np.linalg.solve(np.einsum("nki,nkj->nij", chassis, chassis), np.swapaxes(along, 1, 2) * slips[:, None])
+    # (N, row of the wheel, creeping wheel): what no twist of the chassis takes away.
+    left = np.eye(len(WHEELS)) * slips[:, None] - along @ twists
+    return np.stack(in_coordinates(list(np.swapaxes(left, 0, 1)), source.spec), axis=1)
+
+
+def _slip(inputs: Array, wheel: int, setting: Setting) -> Array:
+    """Slip of a wheel (N,) under its traction for unit creep [m/s]."""
+    force = zero_phase(contact_force(inputs, wheel, setting), LOAD_CUTOFF, setting.sample_time)
+    speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, wheel])
+    return np.asarray(speed * force / (setting["m_ch"] * GRAVITY / 4))
