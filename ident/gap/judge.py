@@ -187,7 +187,7 @@ class _Judgement:
         columns = [self.rows.layout[variant] for variant in self.found.variants]
         candidates = [self.problems[0].candidates[column.candidate] for column in columns]
         exact = all(one.contribution is None for one in candidates) and not any(column.beside for column in columns)
-        limit = self.limits.unsteady if exact else self.limits.simulated
+        limit = self.limits.unsteady if exact else self.limits.bent
         return log_unsteady(self.regression, self.found) > limit
 
     def _tangled(self) -> bool:
