@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 NEGLIGIBLE: Final = 1.0
 """Sum of squares, in units of the noise, that the columns of an effect may miss of it."""
 
+ROUNDS: Final = 20
+"""Of growth and shaping at most; a handful of them end every search but one that goes in circles."""
+
 
 @dataclass(frozen=True)
 class Shaped:
@@ -44,13 +47,28 @@ class Shaped:
 
 
 def search(problems: Sequence[Problem], regression: Regression) -> Shaped:
-    """Forward in singles and pairs; every effect by its shape before the next one is looked for."""
-    found = Shaped(tuple(problems), regression, ())
-    while (grown := extended(found.regression, found.taken)) != found.taken:
+    """Forward in singles and pairs; every effect by its shape before the next one is looked for.
+
+    Two effects can each take the other's place once they have their shapes: the one found first stands then.
+    """
+    found, seen = Shaped(tuple(problems), regression, ()), dict[frozenset[int], Shaped]()
+    for _ in range(ROUNDS):
+        grown = extended(found.regression, found.taken)
+        if grown == found.taken:
+            break
+        now, next_ones = _owners(found.regression, found.taken), _owners(found.regression, grown)
+        seen.setdefault(now, found)
+        if next_ones != now and next_ones in seen:
+            found = seen[next_ones]
+            break
         found = shaped(found.problems, found.regression, grown)
     # Not before: as columns, such a whole is less than its parts, which have their shapes already.
     whole = joined(found.regression, found.taken, found.regression.broad)
     return found if whole == found.taken else shaped(found.problems, found.regression, whole)
+
+
+def _owners(regression: Regression, taken: tuple[int, ...]) -> frozenset[int]:
+    return frozenset(regression.owners[variant] for variant in taken)
 
 
 def shaped(problems: Sequence[Problem], regression: Regression, taken: tuple[int, ...]) -> Shaped:
