@@ -183,12 +183,11 @@ class _Judgement:
         return Verdict.UNKNOWN if strange else Verdict.EFFECT
 
     def _unsteady(self) -> bool:
-        """Whether the effects would rather have other sizes in some steps."""
+        """Whether the effects would rather have other sizes in some steps; only where their columns are all there is."""
         columns = [self.rows.layout[variant] for variant in self.found.variants]
         candidates = [self.problems[0].candidates[column.candidate] for column in columns]
         exact = all(one.contribution is None for one in candidates) and not any(column.beside for column in columns)
-        limit = self.limits.unsteady if exact else self.limits.bent
-        return log_unsteady(self.regression, self.found) > limit
+        return exact and log_unsteady(self.regression, self.found) > self.limits.unsteady
 
     def _tangled(self) -> bool:
         """Whether many names share the friction of one kind of joint: so many changes of a curve are another curve."""

@@ -25,7 +25,6 @@ class Limits:
         share: of the gap that is left, which an effect must close to count all the same.
         trifle: power, over the noise's, by which it must lower the held-out gap in any case.
         unsteady: log evidence, for other sizes of the effects in some steps, from which they are not what they seem.
-        bent: the same where one of them is not linear in its numbers, or comes with sliding: no column is quite right.
         curve: names for the friction of one kind of joint from which its law is one that the library does not have.
     """
 
@@ -44,5 +43,4 @@ class Limits:
     share: float = 0.1
     trifle: float = 5e-3
     unsteady: float = 5.0
-    bent: float = 30.0
     curve: int = 3
