@@ -183,7 +183,7 @@ class _Judgement:
         return Verdict.UNKNOWN if strange else Verdict.EFFECT
 
     def _unsteady(self) -> bool:
-        """Whether the effects would rather have other sizes in some steps; only where their columns are all there is."""
+        """Whether the effects would rather have other sizes in some steps, where their columns are all there is."""
         columns = [self.rows.layout[variant] for variant in self.found.variants]
         candidates = [self.problems[0].candidates[column.candidate] for column in columns]
         exact = all(one.contribution is None for one in candidates) and not any(column.beside for column in columns)
