@@ -138,14 +138,13 @@ class Regression:
         norms = np.linalg.norm(self.rows.columns, axis=0)
         unit = self.rows.columns / np.where(norms > 0, norms, 1.0)
         layout = self.rows.layout
-        alone = {column.place.start: variant for variant, column in enumerate(layout) if column.width == 1}
+        alone = {column.place.start: column.candidate for column in layout if column.width == 1}
         found = []
         for variant, column in enumerate(layout):
             cosines = np.abs(unit[:, column.place].T @ unit[:, list(alone)])
             if column.width > 1 and np.all(cosines.max(axis=1, initial=0.0) > SAME):
-                parts = [list(alone.values())[best] for best in cosines.argmax(axis=1).tolist()]
-                several = frozenset(self.owners[part] for part in parts)
-                found += [(variant, several)] if self.owners[variant] not in several else []
+                several = frozenset(list(alone.values())[best] for best in cosines.argmax(axis=1).tolist())
+                found += [(variant, several)] if column.candidate not in several else []
         return found
 
     def key(self, variant: int) -> str:

@@ -102,8 +102,8 @@ def joined(regression: Regression, taken: tuple[int, ...], wholes: Sequence[Whol
     for whole, several in wholes:
         if several <= set(owners):
             first = min(owners.index(owner) for owner in several)
-            kept = [whole if place == first else variant for place, variant in enumerate(taken)]
-            return tuple(one for place, one in enumerate(kept) if place == first or owners[place] not in several)
+            others = [(place, variant) for place, variant in enumerate(taken) if owners[place] not in several]
+            return tuple(variant for _, variant in sorted([*others, (first, whole)]))
     return taken
 
 

@@ -8,13 +8,14 @@ price that every number has.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.gap.evidence import VISIBLE, scatter
-from ident.gap.linear import orthonormal
+from ident.gap.evidence import directions, scatter
 from ident.gap.regression import Regression
+from ident.gap.rows import Column
 from ident.gap.search import Found
 
 Array = NDArray[np.float64]
@@ -23,27 +24,15 @@ Array = NDArray[np.float64]
 def log_unsteady(regression: Regression, found: Found) -> float:
     """Log evidence that the causes found have other coefficients in some steps than in the others."""
     white = regression.white(found.whitener, found.variants)
-    base = orthonormal(white.baseline)
-    residual = white.target - base @ (base.T @ white.target)
-    columns = _by_step(regression, white.baseline[:, _own(regression, found)])
-    left = columns - base @ (base.T @ columns)
-    vectors, singular, _ = np.linalg.svd(left / np.linalg.norm(columns, axis=0), full_matrices=False)
-    basis = vectors[:, singular > VISIBLE]
-    ratio, count = float(np.sum((basis.T @ residual) ** 2)), basis.shape[1]
+    columns = _by_step(regression, white.baseline[:, regression.rows.baseline.shape[1] :])
+    everywhere = Column(0, 0, slice(0, columns.shape[1]), -math.inf, 0.0)
+    added = directions(replace(white, columns=columns), [everywhere])
+    count = added.basis.shape[1]
     if count == 0:
         return 0.0
-    scaled = ratio / scatter(basis, residual, white.stretch)
+    ratio = float(np.sum((added.basis.T @ added.residual) ** 2))
+    scaled = ratio / scatter(added.basis, added.residual, white.stretch)
     return float(0.5 * (scaled - count * math.log(len(white.target))))
-
-
-def _own(regression: Regression, found: Found) -> list[int]:
-    """Columns of the causes among those of the whitened model; what comes along with one may differ."""
-    own: list[int] = []
-    end = regression.rows.baseline.shape[1]
-    for column in (regression.rows.layout[variant] for variant in found.variants):
-        own += range(end, end + column.width - column.beside)
-        end += column.width
-    return own
 
 
 def _by_step(regression: Regression, taken: Array) -> Array:

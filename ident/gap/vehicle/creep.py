@@ -13,12 +13,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.estimate.filters import zero_phase
 from ident.gap.vehicle.rows import SLICES, in_coordinates
+from ident.gap.vehicle.sliding import traction, wheel_load
 from ident.gap.vehicle.sources import Source
-from ident.gap.vehicle.transforms import LOAD_CUTOFF, Setting, contact_force
+from ident.gap.vehicle.transforms import Setting
 from ident.vehicle import kinematics
-from ident.vehicle.effect_terms import GRAVITY
 from ident.vehicle.geometry import WHEELS, Geometry
 from ident.vehicle.modes import Mode
 
@@ -83,6 +82,5 @@ def creep_columns(inputs: Array, source: Source, setting: Setting) -> Array:
 
 def _slip(inputs: Array, wheel: int, setting: Setting) -> Array:
     """Slip of a wheel (N,) under its traction for unit creep [m/s]."""
-    force = zero_phase(contact_force(inputs, wheel, setting), LOAD_CUTOFF, setting.sample_time)
     speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, wheel])
-    return np.asarray(speed * force / (setting["m_ch"] * GRAVITY / 4))
+    return np.asarray(speed * traction(inputs, wheel, setting) / wheel_load(setting))

@@ -116,7 +116,12 @@ def sliding_cause(where: str) -> SlidingCause:
 def adhesion(inputs: Array, wheels: tuple[int, ...], setting: Setting) -> float:
     """Largest traction of some wheels over a quarter of the weight [-]."""
     pulls = [np.abs(traction(inputs, wheel, setting)).max(initial=0.0) for wheel in wheels]
-    return float(max(pulls)) / (setting["m_ch"] * GRAVITY / 4)
+    return float(max(pulls)) / wheel_load(setting)
+
+
+def wheel_load(setting: Setting) -> float:
+    """Weight that rests on a wheel: a quarter of all [N]."""
+    return setting["m_ch"] * GRAVITY / 4
 
 
 def traction(inputs: Array, wheel: int, setting: Setting) -> Array:
