@@ -96,7 +96,8 @@ def _functions(rows: Rows, seed: int) -> Array:
         if width == 0:
             continue
         inside = rows.stack([None if one is None else np.ones(len(one)) for one in states]) > 0
-        stacks.append(_cosines(rows.stack(states, width), inside, seed))
+        if inside.any():
+            stacks.append(_cosines(rows.stack(states, width), inside, seed))
     return np.hstack([np.zeros((len(rows), 0)), *stacks])
 
 

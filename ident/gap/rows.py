@@ -7,7 +7,7 @@ left of the residual is what repeats. Thinning takes every n-th row: the filter 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -143,7 +143,7 @@ def make_rows(fit: Problem, confirm: Problem | None = None) -> Rows:
         baseline=_stack(kept, [block.baseline for _, block, _ in blocks], len(fit.names)),
         columns=columns,
         layout=layout,
-        group=np.repeat(_groups([(n, b.channel, b.step, b.coordinate) for n, b, _ in blocks]), counts),
+        group=_groups([(n, b.channel, b.step, b.coordinate) for n, b, _ in blocks], counts),
         run=_through([rows.runs for rows in kept]),
         confirming=np.repeat(np.array([number == 1 for number, _, _ in blocks], dtype=bool), counts),
         blocks=tuple((block, rows) for _, block, rows in blocks),
@@ -189,9 +189,11 @@ def _bounds(candidate: Candidate, width: int) -> tuple[float, float]:
     return least, candidate.negligible if width == 1 else 0.0
 
 
-def _groups(labels: Sequence[tuple[int, str, str, str]]) -> Indices:
-    numbers: Mapping[tuple[int, str, str, str], int] = {label: n for n, label in enumerate(dict.fromkeys(labels))}
-    return np.array([numbers[label] for label in labels], dtype=np.int64)
+def _groups(labels: Sequence[tuple[int, str, str, str]], counts: Sequence[int]) -> Indices:
+    """Group (n,) of every row, numbered through those that have rows."""
+    repeated = [label for label, count in zip(labels, counts, strict=True) for _ in range(count)]
+    numbers = {label: number for number, label in enumerate(dict.fromkeys(repeated))}
+    return np.array([numbers[label] for label in repeated], dtype=np.int64)
 
 
 def _through(runs: Sequence[Indices]) -> Indices:

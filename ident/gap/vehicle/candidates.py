@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from ident.gap.problem import Candidate, Channel, Variant
+from ident.gap.problem import Candidate, Variant
 from ident.gap.vehicle.askew import beside_sliding, stands_askew
 from ident.gap.vehicle.context import FORMULAS_KEPT, MODEL_COLUMNS, Context
 from ident.gap.vehicle.contribution import Cause, acting_in, contribution_of, side_by_side
@@ -94,7 +94,7 @@ def seen_together(candidates: Sequence[Candidate], sources: Sequence[Source], co
 
 def _sliding_times(sources: Sequence[Source], context: Context) -> Array:
     """Time (4,) that each wheel surely slides [s]; both channels have the same signals."""
-    rolling = [source for source in sources if source.travels and source.channel is Channel.KINEMATIC]
+    rolling = [source for source in sources if source.rolls and not source.rattles.any()]
     found = [sliding_times(context.inputs(source), context.setting(source)) for source in rolling]
     return np.asarray(np.sum([np.zeros(len(WHEEL_PLACES)), *found], axis=0))
 
@@ -116,14 +116,14 @@ def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -
 
 
 def _slid(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Sequence[Array | None]:
-    """What sliding adds to every block, (N,)."""
-    acting = [source.travels for source in sources]
+    """What sliding adds to every block, (N,); what a motor that rattles shakes loose has that cause already."""
+    acting = [source.travels and not source.rattles.any() for source in sources]
     return contribution_of(cause, acting, sources, context)(np.ones(1), context.parameters)
 
 
 def _nothing_slides(source: Source, context: Context) -> NDArray[np.bool_] | None:
-    """Rows of a kinematic source that no sliding reaches through the filter; None for other sources."""
-    if source.channel is not Channel.KINEMATIC or not source.travels:
+    """Rows of a source that rolls that no sliding reaches through the filter; None for other sources."""
+    if not source.rolls:
         return None
     slides = ANY_WHEEL.sliding(context.inputs(source), context.setting(source)).any(axis=1)
     width = 2 * round(context.processing.guard / source.sample_time) + 1

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ident.estimate.filters import Processing, zero_phase
 from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
+from ident.gap.vehicle.rattling import rattle_rows
 from ident.gap.vehicle.sliding import SlidingCause, sliding_cause
 from ident.gap.vehicle.sources import Source
 from ident.gap.vehicle.transforms import Setting, TransformCause, transform_cause
@@ -81,10 +82,15 @@ class Context:
         asked, kept = self.parameters.tobytes(), self.kept.get(id(source))
         if kept is not None and kept[0] == asked:
             return kept[1]
-        exact = self.formulas.exact(source.channel, source.spec)
-        rows_now = exact(self.inputs(source), *self.constants, np.zeros(0))
+        rows_now = self.rows_of(self.inputs(source), source)
         self.kept[id(source)] = (asked, rows_now)
         return rows_now
+
+    def rows_of(self, inputs: Array, source: Source) -> Array:
+        """The rows of a source (M, rows, 1) with other signals (M, INPUTS)."""
+        if source.rattling:
+            return rattle_rows(inputs, source.rattling, self.geometry.wheel_radius)[..., None]
+        return np.asarray(self.formulas.exact(source.channel, source.spec)(inputs, *self.constants, np.zeros(0)))
 
     def filtered(self, values: Array, source: Source) -> Array:
         """Columns (M, ...) through the filter, thinned to the rows of the source's blocks."""
@@ -130,6 +136,9 @@ def fitted_parameters(sources: Sequence[Source], vehicle: VehicleDescription, co
 
 def table_of(source: Source, context: Context, units: Sequence[rows.UnitTerm]) -> Array:
     """Filtered residual at p = 0, regressor and columns of a source: (N, rows, 12 + units)."""
+    if source.rattling:
+        plain = context.filtered(context.plain(source), source)
+        return np.concatenate([plain, np.zeros((*plain.shape[:2], MODEL_COLUMNS - 1 + len(units)))], axis=2)
     function = context.formulas.linearised(source.channel, source.spec, units)
     entries = function.entries(context.inputs(source), *context.constants)
     return function.matrices(context.filtered(entries.T, source).T)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ident.gap.problem import Variant
 from ident.gap.vehicle.context import Context
 from ident.gap.vehicle.library import TermCause
+from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.sliding import SlidingCause
 from ident.gap.vehicle.sources import Source
 from ident.gap.vehicle.transforms import TransformCause
@@ -52,16 +53,25 @@ def _change(
     `changed` are its signals with the effect taken out; None for effects that stand in the equations.
     """
     context = replace(context, parameters=parameters[: len(PARAMETER_NAMES)])
-    inputs, plain = context.inputs(source), context.formulas.exact(source.channel, source.spec)
-    if changed is None:
+    inputs = context.inputs(source)
+    if changed is not None:
+        if np.array_equal(changed[:, (seen := _seen(source, context))], inputs[:, seen]):
+            return None
+        after = context.rows_of(changed, source)
+    elif source.rattling:
+        return None
+    else:
         exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)
         after = exact(inputs, *context.constants, values)
-    else:
-        seen = [element for argument, element in plain.inputs if argument == 0]
-        if np.array_equal(changed[:, seen], inputs[:, seen]):
-            return None
-        after = plain(changed, *context.constants, np.zeros(0))
     return np.asarray((after - context.plain(source))[..., 0])
+
+
+def _seen(source: Source, context: Context) -> list[int]:
+    """Columns of the signals that the rows of a source are made of."""
+    if source.rattling:
+        return [SLICES["rattle"].start + wheel for wheel in source.rattling]
+    plain = context.formulas.exact(source.channel, source.spec)
+    return [element for argument, element in plain.inputs if argument == 0]
 
 
 def acting_in(variants: Sequence[Variant], sources: Sequence[Source]) -> list[bool]:

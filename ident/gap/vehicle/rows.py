@@ -53,10 +53,15 @@ _SIZES: Final = {
     "torques": 4,
     "twist": 2,
     "twist_rate": 2,
+    "hammer": 4,
+    "rattle": 4,
 }
 _ENDS: Final = np.cumsum(list(_SIZES.values())).tolist()
 SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS, strict=True)}
-"""What was measured, as columns of one array; `twist` is that of the two steering couplings."""
+"""What was measured, as columns of one array; `twist` is that of the two steering couplings.
+
+`hammer` and `rattle` are zero but where a motor rattles in its gear (`ident.gap.vehicle.rattling`).
+"""
 
 INPUTS: Final = _ENDS[-1]
 """Number of those columns."""
@@ -87,6 +92,8 @@ class _Inputs:
     torques: Expression
     twist: Expression
     twist_rate: Expression
+    hammer: Expression
+    rattle: Expression
 
 
 def _inputs() -> _Inputs:

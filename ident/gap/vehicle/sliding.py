@@ -9,6 +9,7 @@ by more than creep. How far a friction coefficient can be told from that, see `A
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -21,6 +22,7 @@ from ident.gap.vehicle.transforms import LOAD_CUTOFF, Setting, contact_force
 from ident.vehicle import kinematics
 from ident.vehicle.effect_terms import GRAVITY
 from ident.vehicle.effects import CHASSIS, WHEEL_PLACES, EffectName
+from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -82,9 +84,9 @@ class SlidingCause:
         speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, self.wheels])
         sense = np.sign(np.stack([traction(inputs, wheel, setting) for wheel in self.wheels], axis=1))
         if len(self.wheels) == 1:
-            forward = sense * ahead_of_others(inputs, setting, self.wheels[0])[:, self.wheels]
+            forward = sense * _ahead(inputs, setting, self.wheels)[:, self.wheels]
         else:
-            forward = sense * ahead_of_others(inputs, setting)
+            forward = sense * _ahead(inputs, setting)
             forward = forward - forward.min(axis=1, keepdims=True)
         slides = np.stack([_slides(*columns) for columns in zip(forward.T, speed.T, strict=True)], axis=1)
         sliding = np.flatnonzero(slides.any(axis=0))
@@ -129,18 +131,21 @@ def traction(inputs: Array, wheel: int, setting: Setting) -> Array:
     return zero_phase(contact_force(inputs, wheel, setting), LOAD_CUTOFF, setting.sample_time)
 
 
-def ahead_of_others(inputs: Array, setting: Setting, wheel: int | None = None) -> Array:
-    """Speed (N, 4) [m/s] that the wheels run ahead of the floor, its twist by odometry; without one wheel, if given."""
-    matrix = kinematics.constraint_matrix(inputs[:, SLICES["alpha"]], setting.geometry)
+def ahead_of_others(inputs: Array, geometry: Geometry, sample_time: float, without: Sequence[int] = ()) -> Array:
+    """Speed (N, 4) [m/s] that the wheels run ahead of the floor, its twist by odometry without some of them."""
+    matrix = kinematics.constraint_matrix(inputs[:, SLICES["alpha"]], geometry)
     rates = np.hstack([inputs[:, SLICES["alpha_rate"]], inputs[:, SLICES["beta_rate"]]])
     weights = np.repeat([HELD**2, 1.0], 4)
-    if wheel is not None:
-        weights[4 + wheel] = 0.0
+    weights[[4 + wheel for wheel in without]] = 0.0
     chassis, measured = matrix[:, :, :3], np.einsum("nij,nj->ni", matrix[:, :, 3:], rates)
     normal = np.einsum("nki,k,nkj->nij", chassis, weights, chassis)
     twist = -np.linalg.solve(normal, np.einsum("nki,k,nk->ni", chassis, weights, measured)[..., None])
     left = (chassis @ twist)[:, 4:, 0] + measured[:, 4:]
-    return zero_phase(-left, LOAD_CUTOFF, setting.sample_time)
+    return zero_phase(-left, LOAD_CUTOFF, sample_time)
+
+
+def _ahead(inputs: Array, setting: Setting, without: Sequence[int] = ()) -> Array:
+    return ahead_of_others(inputs, setting.geometry, setting.sample_time, without)
 
 
 def slides_alone(cause: SlidingCause, times: Array) -> bool:
@@ -156,8 +161,7 @@ def sliding_times(inputs: Array, setting: Setting) -> Array:
     speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]])
     wheels = range(len(WHEEL_PLACES))
     ahead = [
-        np.sign(traction(inputs, wheel, setting)) * ahead_of_others(inputs, setting, wheel)[:, wheel]
-        for wheel in wheels
+        np.sign(traction(inputs, wheel, setting)) * _ahead(inputs, setting, (wheel,))[:, wheel] for wheel in wheels
     ]
     slides = [_surely(one, speed[:, wheel]) for wheel, one in zip(wheels, ahead, strict=True)]
     return np.asarray(setting.sample_time * np.sum(slides, axis=1))
@@ -171,6 +175,15 @@ def _slides(forward: Array, speed: Array) -> Mask:
 
 def _surely(forward: Array, speed: Array) -> Mask:
     return np.asarray((speed > MOVING) & (forward > SLIDING * speed) & (forward > LEAST), dtype=np.bool_)
+
+
+def rolled_with_others(inputs: Array, wheels: Sequence[int], geometry: Geometry, sample_time: float) -> Array:
+    """Signals (N, INPUTS) as if some wheels rolled as the others say, below `LOAD_CUTOFF`."""
+    changed = inputs.copy()
+    ahead = ahead_of_others(inputs, geometry, sample_time, wheels)[:, wheels] / geometry.wheel_radius
+    for name, change in (("beta_rate", ahead), ("beta_acceleration", differentiate(ahead, sample_time))):
+        changed[:, [SLICES[name].start + wheel for wheel in wheels]] -= change
+    return changed
 
 
 def _roll(inputs: Array, wheel: int, ahead: Array, setting: Setting) -> None:

@@ -15,9 +15,11 @@ from ident.estimate.equations import ROWS, RowsOfStep
 from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
+from ident.gap.vehicle.rattling import above_band, hammer, rattling
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
+from ident.gap.vehicle.sliding import rolled_with_others
 from ident.records.record import Record, Step, base_step
-from ident.vehicle.geometry import Geometry
+from ident.vehicle.geometry import WHEELS, Geometry
 from ident.vehicle.modes import Mode
 
 Array = NDArray[np.float64]
@@ -52,6 +54,8 @@ class Source:
         moving: (M,) rows to be used.
         period: (M,).
         record: for messages.
+        rattles: (M, 4) where the motor of each wheel rattles in its gear.
+        rattling: wheels, if the rows are those of motors that rattle instead of what rolls.
     """
 
     channel: Channel
@@ -63,16 +67,25 @@ class Source:
     moving: tuple[NDArray[np.bool_], ...]
     period: NDArray[np.int64]
     record: str
+    rattles: NDArray[np.bool_]
+    rattling: tuple[int, ...] = ()
 
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of its rows, a block each."""
+        if self.rattling:
+            return tuple(f"rattle_{WHEELS[wheel]}" for wheel in self.rattling)
         return rows.coordinates(self.channel, self.spec)
 
     @property
     def travels(self) -> bool:
         """Whether the vehicle drives in it, wheels steered or not."""
         return self.spec.mode not in (None, Mode.ALIGNMENT)
+
+    @property
+    def rolls(self) -> bool:
+        """Whether its rows are those of rolling wheels that travel."""
+        return self.channel is Channel.KINEMATIC and self.travels and not self.rattling
 
 
 def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], processing: Processing) -> list[Source]:
@@ -85,20 +98,30 @@ def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], proces
         source
         for signals in signals_of(record, geometry, processing)
         if (spec := _spec(signals.segment.step, steps)) is not None
-        for source in _sources(signals, spec, processing)
+        for source in _sources(signals, spec, geometry, processing)
     ]
     if not found:
         raise RecordError(
             f"{record.source} holds none of the steps of a diagnosis.",
             f"It needs some of {', '.join(steps)} by these names in the channel step.",
         )
-    moving = [source for source in found if any(mask.any() for mask in source.moving)]
-    if not moving:
+    if not any(mask.any() for source in found for mask in source.moving):
         raise RecordError(
             f"{record.source} does not move in any step of a diagnosis.",
             "Record a drive: angles of wheels and steering must change.",
         )
-    return moving
+    return [source for source in found if source.rattles.any() or any(mask.any() for mask in source.moving)]
+
+
+def rattling_sources(sources: Sequence[Source]) -> list[Source]:
+    """Rows of the motors that rattle while the vehicle drives."""
+    found = []
+    for source in sources:
+        wheels = tuple(np.flatnonzero(source.rattles.any(axis=0)).tolist())
+        if source.rolls and wheels:
+            moving = tuple(source.rattles[:, wheel] for wheel in wheels)
+            found.append(replace(source, rattling=wheels, moving=moving))
+    return found
 
 
 def processing_of(records: Sequence[Record]) -> Processing:
@@ -113,12 +136,19 @@ def _spec(step: str, steps: Sequence[Step]) -> RowsOfStep | None:
     return ROWS[base] if base is not None and base in steps else None
 
 
-def _sources(signals: Signals, spec: RowsOfStep, processing: Processing) -> Iterable[Source]:
+def _sources(signals: Signals, spec: RowsOfStep, geometry: Geometry, processing: Processing) -> Iterable[Source]:
     segment = signals.segment
     factor = decimation(segment, processing.cutoff)
     most = max(1, int(np.pi / (OVERSAMPLED * processing.signal_cutoff * segment.sample_time)))
     stride = next(stride for stride in range(min(most, factor), 0, -1) if factor % stride == 0)
+    rms, rattles = rattling(signals.beta, processing, segment.sample_time)
     inputs = signals.as_inputs()
+    if rattles.any():
+        moved = above_band(signals.beta, segment.sample_time)
+        inputs[:, rows.SLICES["hammer"]] = weights = np.where(rattles, hammer(moved, rms), 0.0)
+        inputs[:, rows.SLICES["rattle"]] = weights * moved
+        wheels = np.flatnonzero(rattles.any(axis=0)).tolist()
+        inputs = rolled_with_others(inputs, wheels, geometry, segment.sample_time)
     inputs[:, rows.SLICES["torques"]] = zero_phase(
         inputs[:, rows.SLICES["torques"]], processing.signal_cutoff, segment.sample_time
     )
@@ -130,13 +160,14 @@ def _sources(signals: Signals, spec: RowsOfStep, processing: Processing) -> Iter
         "factor": factor // stride,
         "period": segment.period[::stride],
         "record": signals.record,
+        "rattles": rattles[::stride],
     }
     dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
     if names:
-        rolling = _rolling(signals, spec, processing)[::stride]
-        yield Source(channel=Channel.KINEMATIC, moving=(rolling,) * len(names), **common)  # type: ignore[arg-type]
+        rolling = _rolling(signals, spec, processing) & ~rattles.any()
+        yield Source(channel=Channel.KINEMATIC, moving=(rolling[::stride],) * len(names), **common)  # type: ignore[arg-type]
 
 
 def _moving(signals: Signals, spec: RowsOfStep, coordinate: str, processing: Processing) -> NDArray[np.bool_]:

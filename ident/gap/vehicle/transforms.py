@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.estimate.filters import differentiate, zero_phase
+from ident.gap.vehicle.rattling import above_band
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.signals import shifted
 from ident.vehicle.effects import DRIVES, EFFECTS, ENCODERS, STEERING, EffectName
@@ -149,7 +150,12 @@ def contact_force(inputs: Array, wheel: int, setting: Setting) -> Array:
 
 def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> Array:
     """The wheel instead of the motor; what the motor's own inertia takes more than at the wheel's pace is lost."""
-    changed, rate = inputs.copy(), differentiate(twist, setting.sample_time)
+    changed, hammer = inputs.copy(), inputs[:, SLICES["hammer"].start + wheel]
+    if hammer.any():
+        # The wheel of a motor that rattles has been made to roll as the others say: what is slow is gone already.
+        twist = above_band(twist, setting.sample_time)
+        changed[:, SLICES["rattle"].start + wheel] -= hammer * twist
+    rate = differentiate(twist, setting.sample_time)
     acceleration = differentiate(rate, setting.sample_time)
     for name, change in (("beta", twist), ("beta_rate", rate), ("beta_acceleration", acceleration)):
         changed[:, SLICES[name].start + wheel] -= change

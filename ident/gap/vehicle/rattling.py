@@ -1,0 +1,75 @@
+"""Motors that rattle in the play of their gears: when, what it does to the floor, and what it shows.
+
+Between the flanks a motor is free, so that a speed controller throws it from one to the other, many times a second.
+Its wheel hammers the floor and slides there, one way or the other, a hundred times as far as any that rolls, and shakes
+the steering loose. So the rolling rows of such a drive say nothing, and that wheel is taken to roll as the others do.
+What they lose stands above their bandwidth: there the wheel hardly moves, and what the motor moves is what its gear
+gives way by, under a load that is known. That is a row of its own, made slow by weighing it with the motion itself:
+
+    R <(β - twist) β_f / |β_f|> = 0,    β_f = β above `BAND`, |β_f| its rms, <.> what passes the filter of all rows.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.estimate.filters import Processing, zero_phase
+from ident.gap.vehicle.rows import SLICES
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+BAND: Final = 150.0
+"""Above which a motor rattles [rad/s]; no excitation goes there."""
+
+LEAST: Final = 1e-4
+"""Rms by which a motor must move above the band to rattle, at the wheel [rad]: ten times what dry friction makes."""
+
+ABOVE_OTHERS: Final = 5.0
+"""The same over that of the quietest motor, whose encoder has the same noise."""
+
+OFTEN: Final = 0.05
+"""Part of a drive that a motor must rattle for; what it has shaken loose then slides on in all of it [-]."""
+
+UNTOLD: Final = 0.05
+"""Part of its motion that is not told: the load of the gear is a second derivative there, close to Nyquist."""
+
+SHAKEN: Final = 0.01
+"""Part of the generalized forces of such a drive that is not told: wheels that slide push each other [-]."""
+
+
+def above_band(values: Array, sample_time: float) -> Array:
+    """What of values (N, ...) is faster than what the vehicle drives."""
+    return np.asarray(values - zero_phase(values, BAND, sample_time))
+
+
+def rattling(beta: Array, processing: Processing, sample_time: float) -> tuple[Array, Mask]:
+    """Rms motion of the motors above the band (N, 4) [rad], and where each that often rattles does so (N, 4).
+
+    Args:
+        beta: angles of the motors in a drive, at the wheels (N, 4) [rad].
+        processing: its filter is what the rows pass.
+        sample_time: [s].
+    """
+    power = zero_phase(above_band(beta, sample_time) ** 2, processing.cutoff, sample_time)
+    rms = np.sqrt(np.maximum(power, 0.0))
+    rattles = rms > np.maximum(LEAST, ABOVE_OTHERS * rms.min(axis=1, keepdims=True))
+    return rms, np.asarray(rattles & (rattles.mean(axis=0) > OFTEN))
+
+
+def hammer(moved: Array, rms: Array) -> Array:
+    """Weights (N, 4) that make a motion above the band slow: that of each motor over its rms."""
+    return np.asarray(moved / np.maximum(rms, LEAST))
+
+
+def rattle_rows(inputs: Array, wheels: tuple[int, ...], radius: float) -> Array:
+    """How far the motors of some wheels move with the hammer, beyond what their gears give way by (N, wheels) [m]."""
+    return np.asarray(radius * inputs[:, SLICES["rattle"]][:, wheels])
+
+
+def untold(rows: Array, part: float) -> float:
+    """Rms up to which what is left of rows (n,) means nothing, in their unit."""
+    return part * float(np.sqrt(np.mean(rows**2))) if rows.size else 0.0
