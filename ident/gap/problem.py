@@ -51,6 +51,7 @@ class Block:
         regions: masks (N,) by name (`low_speed`, `forward`, ...) in which the gap is counted; they may overlap.
         features: (N, f) states that an unknown cause might depend on (speeds, angles, accelerations); any scale.
         tolerance: rms up to which a gap means nothing, however well it repeats, in the unit of the target.
+        irregular: (N,) what differs between repeats and is no noise, in the target; None: nothing.
     """
 
     record: str
@@ -67,6 +68,12 @@ class Block:
     regions: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     features: Array | None = None
     tolerance: float = 0.0
+    irregular: Array | None = None
+
+    @property
+    def regular(self) -> Array:
+        """The target (N,) without what is irregular."""
+        return self.target if self.irregular is None else self.target - self.irregular
 
     @property
     def label(self) -> str:

@@ -173,10 +173,10 @@ class Regression:
         """Colour of what the baseline and these variants leave, fitted by turns with them."""
         design = np.hstack([self.rows.baseline, self.columns_of(variants)])
         residual = self.rows.target - design @ self._level(design)
-        whitener = fit_whitener(self.rows, residual, design.shape[1], order, self._repeats)
+        whitener = fit_whitener(self.rows, residual, design.shape[1], order, self.repeats)
         white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
         residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
-        return fit_whitener(self.rows, residual, design.shape[1], order, self._repeats)
+        return fit_whitener(self.rows, residual, design.shape[1], order, self.repeats)
 
     def _level(self, design: Array) -> Array:
         """Coefficients of some columns (n, k), every group in units of what the baseline leaves of it."""
@@ -184,10 +184,10 @@ class Regression:
         return least_squares(weighted[:, :-1], weighted[:, -1])
 
     @cached_property
-    def _repeats(self) -> Sequence[Colour]:
+    def repeats(self) -> Sequence[Colour]:
         """Colour of what differs between repeats: of measurement and motion, the model taken off."""
         parameters = self._level(self.rows.baseline)
-        residuals = [block.target - block.baseline @ parameters for block, _ in self.rows.blocks]
+        residuals = [block.regular - block.baseline @ parameters for block, _ in self.rows.blocks]
         return colours_of_repeats(self.rows, residuals)
 
     @cached_property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from ident.estimate.filters import Processing
 from ident.gap.problem import Block, Channel, Nominal, Problem
 from ident.gap.vehicle import rows
-from ident.gap.vehicle.candidates import candidate_of, causes_of, seen_together
+from ident.gap.vehicle.candidates import candidate_of, causes_of, seen_together, slid_by_any
 from ident.gap.vehicle.context import MODEL_COLUMNS, Context, make_context, table_of
 from ident.gap.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
 from ident.gap.vehicle.library import TermCause
@@ -60,11 +61,12 @@ def build_problem(
     blocks = [block for source, table in zip(sources, tables, strict=True) for block in _blocks(source, table, context)]
     columns = iter(range(MODEL_COLUMNS, MODEL_COLUMNS + len(units)))
     candidates = [candidate_of(cause, columns, sources, tables, context) for cause in causes]
+    slid = slid_by_any(sources, context)
     return Problem(
         names=(*PARAMETER_NAMES, *CREEP_NAMES),
         units=(*PARAMETER_UNITS.values(), *["1"] * len(CREEP_NAMES)),
-        blocks=tuple(blocks),
-        candidates=tuple(seen_together(candidates, sources, context)),
+        blocks=tuple(replace(block, irregular=series) for block, series in zip(blocks, slid, strict=True)),
+        candidates=tuple(seen_together(candidates, slid, sources, context)),
         nominal=_nominal(model) if model else None,
         spreads=dict.fromkeys(CREEP_NAMES, CREEP_STD),
     )

@@ -80,10 +80,19 @@ def candidate_of(
     )
 
 
-def seen_together(candidates: Sequence[Candidate], sources: Sequence[Source], context: Context) -> Iterator[Candidate]:
-    """The candidates, sliding beside those that stand askew, and slip only of wheels that slide alone."""
+def slid_by_any(sources: Sequence[Source], context: Context) -> Sequence[Array | None]:
+    """What all sliding that was found adds to every block, (N,)."""
+    return _slid(ANY_WHEEL, sources, context)
+
+
+def seen_together(
+    candidates: Sequence[Candidate], slid: Sequence[Array | None], sources: Sequence[Source], context: Context
+) -> Iterator[Candidate]:
+    """The candidates, sliding beside those that stand askew, and slip only of wheels that slide alone.
+
+    `slid` is that of `slid_by_any`.
+    """
     times = _sliding_times(sources, context)
-    slid = _slid(ANY_WHEEL, sources, context)
     rolling = [mask for source in sources for mask in [_nothing_slides(source, context)] * len(source.coordinates)]
     for candidate in candidates:
         if candidate.effect == EffectName.SLIP:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ident.gap.judge import judge
 from ident.gap.problem import Block, Candidate, Problem, Variant
+from ident.gap.regression import Regression, Settings
 from ident.gap.remainder import lasting, repeated
 from ident.gap.rows import make_rows
 from ident.gap.whitening import colours_of_repeats, fit_whitener
@@ -56,6 +57,33 @@ def test_where_model_errors_prevail_the_colour_is_theirs(world: type[Any]) -> No
     stacked = rows.stack(left)
     white = fit_whitener(rows, stacked, repeats=colours_of_repeats(rows, left)).apply(rows, stacked)
     assert float(np.mean(white**2)) == pytest.approx(1.0, abs=0.1)
+
+
+def test_what_is_known_not_to_repeat_is_no_noise(world: type[Any]) -> None:
+    """Sliding comes and goes from repeat to repeat; found in each of them, it is taken off before noise is measured."""
+    calm = [world(seed=11).problem(part) for part in (0, 1)]
+    generator = np.random.default_rng(12)
+    slid = [[5.0 * generator.normal(size=len(block.target)) for block in problem.blocks] for problem in calm]
+
+    def noise(known: bool) -> Array:
+        problems = [
+            replace(
+                problem,
+                blocks=tuple(
+                    replace(block, target=block.target + extra, irregular=extra if known else None)
+                    for block, extra in zip(problem.blocks, series, strict=True)
+                ),
+            )
+            for problem, series in zip(calm, slid, strict=True)
+        ]
+        return power(problems)
+
+    def power(problems: Sequence[Problem]) -> Array:
+        regression = Regression(problems[0], make_rows(*problems), Settings(), 1)
+        return np.array([colour.covariance[0] for colour in regression.repeats])
+
+    assert noise(known=True) == pytest.approx(power(calm), rel=0.02)
+    assert np.all(noise(known=False) > 4 * power(calm))
 
 
 @pytest.mark.parametrize("parts", [(0,), (1,), (0, 1)])

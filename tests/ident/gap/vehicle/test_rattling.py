@@ -1,0 +1,150 @@
+"""A motor thrown to and fro in its play, integrated from first principles, tells the play and its flanks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ident.estimate.filters import Processing, differentiate, second_derivative, zero_phase
+from ident.gap.problem import Channel
+from ident.gap.vehicle.build import build_problem
+from ident.gap.vehicle.ideal import Drive, ideal_record
+from ident.gap.vehicle.rattling import above_band, hammer, rattle_rows, rattling
+from ident.gap.vehicle.rows import INPUTS, SLICES
+from ident.gap.vehicle.sliding import ahead_of_others, rolled_with_others
+from ident.gap.vehicle.sources import processing_of, rattling_sources, sources_of
+from ident.gap.vehicle.transforms import Setting, transform_cause
+from ident.records.record import Record, Step
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effects import EffectName
+
+Array = NDArray[np.float64]
+
+DT = 0.002
+RATTLING = Processing(signal_cutoff=1000.0)
+GAP, COMPLIANCE = 6e-4, 5e-5
+SHAKE = 2 * math.pi * 70.0
+
+
+def thrown(seconds: float, inertia: float) -> tuple[Array, Array]:
+    """Angle against a wheel that stands (N,) [rad] and torque (N,) [Nm] of a motor shaken within its play."""
+    inner = DT / 40
+    time = np.arange(round(seconds / inner)) * inner
+    torques = 12 * np.sin(SHAKE * time) * (1 + 0.4 * np.sin(2 * time)) + 3 * np.sin(1.5 * time)
+    damping = 0.5 * math.sqrt(inertia / COMPLIANCE)
+    angle, rate, angles = 0.0, 0.0, np.zeros(len(time))
+    for number, torque in enumerate(torques.tolist()):
+        beyond = angle - math.copysign(min(abs(angle), GAP / 2), angle)
+        load = beyond / COMPLIANCE + (damping * rate if beyond else 0.0)
+        rate += inner * (torque - (load if load * beyond > 0 else 0.0)) / inertia
+        angle += inner * rate
+        angles[number] = angle
+    return angles[::40], torques[::40]
+
+
+def shaken(prototype: VehicleDescription) -> tuple[Array, NDArray[np.bool_], Setting]:
+    """Signals of four wheels that stand, the first motor thrown about; where it rattles; and what else is needed."""
+    setting = Setting(prototype.geometry, prototype.prior.values, DT)
+    angle, torque = thrown(12.0, setting["B_w"] / 2)
+    fast = zero_phase(angle, RATTLING.signal_cutoff, DT)
+    inputs = np.zeros((len(fast), INPUTS))
+    columns = [
+        ("beta", fast),
+        ("beta_rate", differentiate(fast, DT)),
+        ("beta_acceleration", second_derivative(fast, DT)),
+    ]
+    for name, values in columns:
+        inputs[:, SLICES[name].start] = values
+    smooth = zero_phase(torque, RATTLING.signal_cutoff, DT)
+    inputs[:, SLICES["torques"].start] = smooth / prototype.geometry.gear_ratio
+    beta = inputs[:, SLICES["beta"]]
+    rms, rattles = rattling(beta, RATTLING, DT)
+    moved = above_band(beta, DT)
+    inputs[:, SLICES["hammer"]] = np.where(rattles, hammer(moved, rms), 0.0)
+    inputs[:, SLICES["rattle"]] = inputs[:, SLICES["hammer"]] * moved
+    return inputs, rattles, setting
+
+
+def test_play_and_flanks_are_told_from_the_motion_above_the_band(prototype: VehicleDescription) -> None:
+    inputs, rattles, setting = shaken(prototype)
+    cause = transform_cause(EffectName.BACKLASH, "drive_fl")
+
+    def slow(sizes: tuple[float, float]) -> Array:
+        found = rattle_rows(cause.without(inputs, np.array(sizes), setting), (0,), setting.geometry.wheel_radius)
+        return zero_phase(found[:, 0], 40.0, DT)[200:-200]
+
+    bare = slow((0.0, 0.0))
+    columns = np.stack([(bare - slow((1e-4, 0.0))) / 1e-4, (bare - slow((0.0, 1e-5))) / 1e-5], axis=1)
+    gap, compliance = np.linalg.lstsq(columns, bare, rcond=None)[0]
+    assert rattles[:, 0].mean() > 0.9
+    assert not rattles[:, 1:].any()
+    assert gap == pytest.approx(GAP, rel=0.12)
+    assert compliance == pytest.approx(COMPLIANCE, rel=0.12)
+    assert np.std(bare - columns @ (gap, compliance)) < 0.05 * np.sqrt(np.mean(bare**2))
+
+
+def test_noise_that_all_encoders_share_is_no_rattling() -> None:
+    noise = 1e-3 * np.random.default_rng(4).normal(size=(3000, 4))
+    assert not rattling(noise, RATTLING, DT)[1].any()
+
+
+def test_a_motor_that_rattles_once_in_a_drive_does_not_rattle_in_it() -> None:
+    beta = np.zeros((6000, 4))
+    beta[1000:1200, 2] = 1e-3 * np.sin(SHAKE * DT * np.arange(200))
+    assert not rattling(beta, RATTLING, DT)[1].any()
+    beta[1000:2200, 2] = 1e-3 * np.sin(SHAKE * DT * np.arange(1200))
+    assert rattling(beta, RATTLING, DT)[1].any(axis=0).tolist() == [False, False, True, False]
+
+
+def test_a_wheel_made_to_roll_with_the_others_no_longer_runs_ahead(prototype: VehicleDescription) -> None:
+    record = ideal_record([Drive(Step.STRAIGHT)], prototype)
+    source = sources_of(record, prototype.geometry, [Step.STRAIGHT], Processing())[0]
+    inputs, dt = source.inputs.copy(), source.sample_time
+    ahead = 0.02 * np.sin(2 * np.arange(len(inputs)) * dt)
+    inputs[:, SLICES["beta_rate"].start + 1] += ahead / prototype.geometry.wheel_radius
+    found = rolled_with_others(inputs, [1], prototype.geometry, dt)
+    left = ahead_of_others(found, prototype.geometry, dt, [1])[:, 1]
+    assert np.abs(left).max() < 0.01 * np.abs(ahead).max()
+    assert np.array_equal(found[:, SLICES["beta_rate"]][:, [0, 2, 3]], inputs[:, SLICES["beta_rate"]][:, [0, 2, 3]])
+
+
+@pytest.fixture(scope="module")
+def hammered(prototype: VehicleDescription) -> Record:
+    """A straight drive and a turn, the motor of the third wheel shaken in the straight one."""
+    record = ideal_record([Drive(Step.STRAIGHT), Drive(Step.ROTATION)], prototype)
+    straight, turn = record.segments
+    shake = np.zeros_like(straight.wheel_angles)
+    shake[:, 2] = 5e-4 * np.sin(2 * math.pi * 40 * straight.sample_time * np.arange(len(shake)))
+    return replace(record, segments=[replace(straight, wheel_angles=straight.wheel_angles + shake), turn])
+
+
+def test_rolling_says_nothing_in_a_drive_that_rattles(hammered: Record, prototype: VehicleDescription) -> None:
+    sources = sources_of(hammered, prototype.geometry, [Step.STRAIGHT, Step.ROTATION], processing_of([hammered]))
+    used = {source.step: source.moving[0].any() for source in sources if source.channel is Channel.KINEMATIC}
+    assert used == {Step.STRAIGHT: False, Step.ROTATION: True}
+    (rows,) = rattling_sources(sources)
+    assert (rows.step, rows.coordinates) == (Step.STRAIGHT, ("rattle_fr",))
+
+
+def test_what_a_motor_moves_above_the_band_is_a_row_that_only_its_gear_explains(
+    hammered: Record, prototype: VehicleDescription
+) -> None:
+    problem = build_problem([hammered], prototype)
+    place = [block.coordinate for block in problem.blocks].index("rattle_fr")
+    block = problem.blocks[place]
+    explained = {
+        candidate.key
+        for candidate in problem.candidates
+        if any(variant.columns[place] is not None for variant in candidate.variants)
+    }
+    assert (block.unit, block.channel) == ("m", Channel.KINEMATIC)
+    assert explained == {"backlash@drive_fr", "elasticity@drive_fr"}
+    assert not block.baseline.any()
+    passed_by_both_filters = 0.9
+    rms = passed_by_both_filters * 5e-4 * prototype.geometry.wheel_radius / math.sqrt(2)
+    assert np.abs(block.target[block.moving]).mean() == pytest.approx(rms, rel=0.03)
+    assert block.tolerance == pytest.approx(0.05 * rms, rel=0.03)
