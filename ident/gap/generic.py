@@ -118,19 +118,18 @@ def _absorbed(model: Array, extra: Array) -> Array:
     return np.asarray(np.linalg.lstsq(model / scale, extra, rcond=1e-7)[0] / scale[:, None])
 
 
-@dataclass(frozen=True)
-class _Normal:
-    """Normal equations of some rows: matrix (F, F) and right-hand side (F,)."""
+class _Ridge:
+    """Least squares of columns (n, F) with any ridge, at the price of one decomposition of the smaller side."""
 
-    matrix: Array
-    vector: Array
+    def __init__(self, columns: Array, target: Array) -> None:
+        self._columns, self._wide = columns, columns.shape[0] < columns.shape[1]
+        self._powers, self._turn = np.linalg.eigh(columns @ columns.T if self._wide else columns.T @ columns)
+        self._amplitudes = self._turn.T @ (target if self._wide else columns.T @ target)
 
-    def __add__(self, other: _Normal) -> _Normal:
-        return _Normal(self.matrix + other.matrix, self.vector + other.vector)
-
-    def solved(self, ridge: float) -> Array:
-        """Weights (F,)."""
-        return np.asarray(np.linalg.solve(self.matrix + ridge * np.eye(len(self.vector)), self.vector))
+    def weights(self, ridge: float) -> Array:
+        """(F,)."""
+        found = self._turn @ (self._amplitudes / (np.maximum(self._powers, 0.0) + ridge))
+        return np.asarray(self._columns.T @ found if self._wide else found)
 
 
 def _ridge(extra: Array, left: Array, stretch: NDArray[np.int64]) -> Array:
@@ -139,9 +138,10 @@ def _ridge(extra: Array, left: Array, stretch: NDArray[np.int64]) -> Array:
         return np.zeros(extra.shape[1])
     fold = np.unique(stretch, return_inverse=True)[1] // 2 % 2
     halves = [(extra[fold == part], left[fold == part]) for part in (0, 1)]
-    first, second = (_Normal(columns.T @ columns, columns.T @ target) for columns, target in halves)
-    losses = [_loss(*halves[0], second.solved(ridge)) + _loss(*halves[1], first.solved(ridge)) for ridge in RIDGES]
-    return (first + second).solved(RIDGES[int(np.argmin(losses))])
+    first, second = (_Ridge(*half) for half in halves)
+    losses = [_loss(*halves[0], second.weights(ridge)) + _loss(*halves[1], first.weights(ridge)) for ridge in RIDGES]
+    normal = extra.T @ extra + RIDGES[int(np.argmin(losses))] * np.eye(extra.shape[1])
+    return np.asarray(np.linalg.solve(normal, extra.T @ left))
 
 
 def _loss(extra: Array, left: Array, weights: Array) -> float:

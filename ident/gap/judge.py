@@ -176,11 +176,16 @@ class _Judgement:
 
     def _verdict(self) -> Verdict:
         if not self.found.variants:
-            return Verdict.UNKNOWN if self._predictable() or self._repeating() else Verdict.NONE
+            return Verdict.UNKNOWN if self._predictable() or self._repeating() > 1 else Verdict.NONE
         unexplained = self._predictable() and self._explained() < self.limits.explained
-        lasting = self._repeating() and self._named() < self.limits.named
-        strange = unexplained or lasting or self._unsteady() or self._tangled()
+        strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
         return Verdict.UNKNOWN if strange else Verdict.EFFECT
+
+    def _foreign(self) -> bool:
+        """Whether something lasts in rows that the model itself says nothing of: what shows there is all of a cause."""
+        foreign = {block.label for block, _ in self.rows.blocks if not block.baseline.any()}
+        sizes = lasting(self.rows, self.floors, self.after.blocks)
+        return any(size > self.limits.foreign for label, size in sizes.items() if label in foreign)
 
     def _unsteady(self) -> bool:
         """Whether the effects would rather have other sizes in some steps, where their columns are all there is."""
@@ -206,13 +211,20 @@ class _Judgement:
         large = not sizes or max(sizes.values()) > self.limits.size
         return large and self.rest.deviations > self.limits.deviations and self.rest.gain > 0
 
-    def _repeating(self) -> bool:
-        """Whether what the model leaves repeats in every record, and is well above the noise."""
+    def _lasting(self) -> bool:
+        """Whether what repeats is above its limit, and the effects close too little to have that pardoned."""
+        excess = self._repeating()
+        needed = self.limits.named if excess <= self.limits.far else self.limits.nearly
+        return excess > 1 and self._named() < needed
+
+    def _repeating(self) -> float:
+        """What the model leaves and repeats in every record, over the noise, in units of what may."""
         creeping = {block.label for block, _ in self.rows.blocks if block.tolerance > 0}
         stricter = self.found.variants and self._measurable()
         usual = self.limits.beside if stricter else self.limits.repeating
         sizes = lasting(self.rows, self.floors, self.after.blocks)
-        return any(size > (self.limits.creeping if label in creeping else usual) for label, size in sizes.items())
+        limits = {label: self.limits.creeping if label in creeping else usual for label in sizes}
+        return max((size / limits[label] for label, size in sizes.items()), default=0.0)
 
     def _sizes(self, models: Sequence[Array]) -> Mapping[str, float]:
         return repeated(self.rows, self.floors, models)

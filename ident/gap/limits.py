@@ -15,8 +15,11 @@ class Limits:
         repeating: the same, above which there is a remainder whether or not it can be predicted.
         beside: the same beside effects that are named, where the held-out gap can be measured.
         creeping: the same of rows with a tolerance, whose noise is that.
+        foreign: the same of rows of which the model says nothing, whatever is named.
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
         named: what one effect must close, over that and what all leave, where a remainder repeats.
+        nearly: the same where it does so by more than `far`.
+        far: what repeats, in units of those limits, that only effects that close nearly all may leave.
         improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
         widening: share of the held-out gap by which an effect may seem to widen it.
         measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.
@@ -33,8 +36,11 @@ class Limits:
     repeating: float = 0.5
     beside: float = 0.35
     creeping: float = 1.5
+    foreign: float = 1.0
     explained: float = 0.5
     named: float = 0.75
+    nearly: float = 0.95
+    far: float = 1.5
     improvement: float = 0.01
     widening: float = 0.1
     measurable: float = 0.05

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -24,6 +26,8 @@ TOLERATED_MEMORY: Final = 0.5
 """Correlation time of what is tolerated [s]: it is model error, and as slow as the motion."""
 PREVAILING: Final = 2.0
 """Power of what is left, over that of the noise in the mean of the repeats, from which model errors prevail."""
+STRIDE: Final = 128
+"""Rows that are whitened at once."""
 TAPER: Final = 1e-4
 """White share added to the variance, so that a band without any power is not blown up."""
 
@@ -40,6 +44,27 @@ class Predictor:
     weights: tuple[Array, ...]
     deviations: Array
 
+    @cached_property
+    def matrix(self) -> Array:
+        """What turns the first rows of a run into white ones: lower triangular, a band from `ORDER` rows on."""
+        order = len(self.weights) - 1
+        found = np.zeros((order + STRIDE, order + STRIDE))
+        for row, weights in enumerate(self.weights):
+            found[row, : row + 1] = np.append(-weights[::-1], 1.0) / self.deviations[row]
+        below = np.arange(STRIDE)[:, None]
+        found[order + below, below + np.arange(order + 1)] = found[order, : order + 1]
+        return found
+
+    def apply(self, run: Array) -> Array:
+        """White rows of an uninterrupted run (m, k)."""
+        order, matrix = len(self.weights) - 1, self.matrix
+        first = matrix[: len(run), : len(run)] @ run[: len(matrix)]
+        rest = [
+            matrix[order : order + len(run) - start, : order + len(run) - start] @ run[start - order : start + STRIDE]
+            for start in range(len(matrix), len(run), STRIDE)
+        ]
+        return np.concatenate([first, *rest])
+
 
 @dataclass(frozen=True)
 class Whitener:
@@ -49,16 +74,11 @@ class Whitener:
 
     def apply(self, rows: Rows, values: Array) -> Array:
         """Whitened copy of (n,) or (n, k)."""
-        white = np.array(values, dtype=float)
-        age = row_ages(rows)
-        for group, predictor in enumerate(self.predictors):
-            for depth, weights in enumerate(predictor.weights):
-                last = depth == len(predictor.weights) - 1
-                place = np.flatnonzero((rows.group == group) & ((age >= depth) if last else (age == depth)))
-                for back, weight in enumerate(weights, 1):
-                    white[place] -= weight * values[place - back]
-                white[place] /= predictor.deviations[depth]
-        return white
+        whole = np.asarray(values, dtype=float).reshape(len(rows), -1)
+        white, ends = np.empty_like(whole), np.flatnonzero(np.diff(rows.run, append=-1) != 0) + 1
+        for start, end in pairwise([0, *ends.tolist()]):
+            white[start:end] = self.predictors[rows.group[start]].apply(whole[start:end])
+        return white.reshape(np.shape(values))
 
 
 def row_ages(rows: Rows) -> NDArray[np.int64]:

@@ -6,7 +6,6 @@ motors, rear units that do not follow the front ones. Everything is driven by re
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -106,20 +105,21 @@ def _unit_friction(side: int, setting: Setting) -> float:
 
 def _play(load: Array, friction: float) -> Array:
     """Load (N,) that a spring holds when dry friction holds what it moves: it follows, `friction` behind."""
-    return _followed(load, lambda held, now: min(max(held, now - friction), now + friction))
+    held, found = 0.0, []
+    for now in load.tolist():
+        if now - held > friction:
+            held = now - friction
+        elif held - now > friction:
+            held = now + friction
+        found.append(held)
+    return np.array(found)
 
 
 def _relay(load: Array, friction: float) -> Array:
     """Flank (N,), +1 or -1, at which a body lies that dry friction holds; 0 before it is first pushed over."""
-    return _followed(load, lambda held, now: math.copysign(1.0, now) if abs(now) > friction else held)
-
-
-def _followed(load: Array, law: Callable[[float, float], float]) -> Array:
-    held, found = 0.0, np.empty_like(load)
-    for index, now in enumerate(load.tolist()):
-        held = law(held, now)
-        found[index] = held
-    return found
+    pushed = np.where(np.abs(load) > friction, np.arange(len(load)), -1)
+    last = np.maximum.accumulate(pushed)
+    return np.where(last < 0, 0.0, np.sign(load[last]))
 
 
 def _gear_load(inputs: Array, wheel: int, setting: Setting) -> Array:
