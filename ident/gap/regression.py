@@ -52,6 +52,7 @@ class Settings:
         fitted: smallest log likelihood ratio of the fitted rows alone: what they do not show, nothing can confirm.
         confirmation: smallest log Bayes factor of the confirming rows.
         part: of what a cause does, that the fitted rows must show, and the confirming ones.
+        plain: likelihood ratio of such a part from which it counts however small it is beside the other one.
         clear: log evidence from which what only one of the two shows is taken for an event, not for a cause in doubt.
         stretch: rows of the stretches whose sign a surrogate flips, well beyond the memory of whitened rows.
         stretches: that there shall be at least; short records have shorter ones.
@@ -66,6 +67,7 @@ class Settings:
     fitted: float = 1.0
     confirmation: float = 0.5
     part: float = 0.01
+    plain: float = 100.0
     clear: float = 8.0
     stretch: int = 30
     stretches: int = 24
@@ -271,9 +273,16 @@ class Regression:
 
 def in_both(evidence: Evidence, settings: Settings) -> Mask:
     """Variants (V,) that the fitted rows show and the confirming ones confirm."""
-    shown = (evidence.log_fitted >= settings.fitted) & (evidence.confirming < 1 - settings.part)
-    confirmed = (evidence.log_predictive >= settings.confirmation) & (evidence.confirming > settings.part)
+    whole = evidence.directions.ratios(evidence.amplitudes) / evidence.scale
+    fitted, confirming = 1 - evidence.confirming, evidence.confirming
+    shown = (evidence.log_fitted >= settings.fitted) & _enough(fitted, whole, settings)
+    confirmed = (evidence.log_predictive >= settings.confirmation) & _enough(confirming, whole, settings)
     return np.asarray(shown & confirmed)
+
+
+def _enough(share: Array, whole: Array, settings: Settings) -> Mask:
+    """Whether some rows have their share of what a variant does, or more of it than could be missed."""
+    return np.asarray((share > settings.part) | (share * whole > settings.plain))
 
 
 def _one_each(variants: Sequence[int], owners: Sequence[int]) -> tuple[int, ...]:

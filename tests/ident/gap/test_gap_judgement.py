@@ -100,6 +100,26 @@ def test_what_happened_in_one_drive_only_is_no_cause_and_hides_none(world: type[
     assert any("Only one of the two drives" in line for line in summary_lines(findings, findings.diagnosis()))
 
 
+@pytest.mark.parametrize(("weaker", "named"), [(30.0, ["a"]), (400.0, [])])
+def test_a_cause_that_one_drive_shows_far_better_counts_if_the_other_shows_it_too(
+    world: type[Any], weaker: float, named: list[str]
+) -> None:
+    """As where a wheel slides thirty times as far in one drive: a thousandth of the power is left, and is plain."""
+    drawn = world(seed=26, true={"a": 10.0})
+    fit, confirm = drawn.problem(0), drawn.problem(1)
+    first, *others = confirm.candidates
+    (variant,) = first.variants
+    faint = [None if column is None else column / weaker for column in variant.columns]
+    blocks = tuple(
+        replace(block, target=block.target - 10.0 * (1 - 1 / weaker) * column[:, 0])
+        for block, column in zip(confirm.blocks, variant.columns, strict=True)
+        if column is not None
+    )
+    weak = replace(first, variants=(replace(variant, columns=tuple(faint)),))
+    findings = judge(fit, replace(confirm, blocks=blocks, candidates=(weak, *others)), seed=1)
+    assert _names(findings) == named
+
+
 def test_a_candidate_that_one_record_speaks_against_is_none_in_the_other(world: type[Any]) -> None:
     problems = [world(seed=25, true={"a": 0.5}, alike={"d": "a"}).problem(part) for part in (0, 1)]
     first, *others = problems[1].candidates
