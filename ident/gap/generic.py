@@ -127,7 +127,7 @@ class _Ridge:
         self._amplitudes = self._turn.T @ (target if self._wide else columns.T @ target)
 
     def weights(self, ridge: float) -> Array:
-        """(F,)."""
+        """Weights (F,) for a positive ridge."""
         found = self._turn @ (self._amplitudes / (np.maximum(self._powers, 0.0) + ridge))
         return np.asarray(self._columns.T @ found if self._wide else found)
 

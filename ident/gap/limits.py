@@ -18,8 +18,8 @@ class Limits:
         foreign: the same of rows of which the model says nothing, whatever is named.
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
         named: what one effect must close, over that and what all leave, where a remainder repeats.
-        nearly: the same where it does so by more than `far`.
-        far: what repeats, in units of those limits, that only effects that close nearly all may leave.
+        nearly: the same where what repeats exceeds its limit by more than `far`.
+        far: what repeats, in units of its limit, above which `nearly` is asked instead of `named`.
         improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
         widening: share of the held-out gap by which an effect may seem to widen it.
         measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.

@@ -51,7 +51,7 @@ class Block:
         regions: masks (N,) by name (`low_speed`, `forward`, ...) in which the gap is counted; they may overlap.
         features: (N, f) states that an unknown cause might depend on (speeds, angles, accelerations); any scale.
         tolerance: rms up to which a gap means nothing, however well it repeats, in the unit of the target.
-        irregular: (N,) what differs between repeats and is no noise, in the target; None: nothing.
+        irregular: (N,) part of the target that may differ between repeats and is no noise; None: nothing.
     """
 
     record: str

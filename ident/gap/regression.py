@@ -187,7 +187,7 @@ class Regression:
 
     @cached_property
     def repeats(self) -> Sequence[Colour]:
-        """Colour of what differs between repeats: of measurement and motion, the model taken off."""
+        """Colour of what differs between repeats, of measurement and motion: without model, and what is irregular."""
         parameters = self._level(self.rows.baseline)
         residuals = [block.regular - block.baseline @ parameters for block, _ in self.rows.blocks]
         return colours_of_repeats(self.rows, residuals)
@@ -281,7 +281,7 @@ def in_both(evidence: Evidence, settings: Settings) -> Mask:
 
 
 def _enough(share: Array, whole: Array, settings: Settings) -> Mask:
-    """Whether some rows have their share of what a variant does, or more of it than could be missed."""
+    """Whether some rows have their share of what a variant does, or a likelihood ratio of it that speaks for itself."""
     return np.asarray((share > settings.part) | (share * whole > settings.plain))
 
 

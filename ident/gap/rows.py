@@ -191,9 +191,11 @@ def _bounds(candidate: Candidate, width: int) -> tuple[float, float]:
 
 def _groups(labels: Sequence[tuple[int, str, str, str]], counts: Sequence[int]) -> Indices:
     """Group (n,) of every row, numbered through those that have rows."""
-    repeated = [label for label, count in zip(labels, counts, strict=True) for _ in range(count)]
-    numbers = {label: number for number, label in enumerate(dict.fromkeys(repeated))}
-    return np.array([numbers[label] for label in repeated], dtype=np.int64)
+    numbers: dict[tuple[int, str, str, str], int] = {}
+    for label, count in zip(labels, counts, strict=True):
+        if count:
+            numbers.setdefault(label, len(numbers))
+    return np.repeat([numbers.get(label, 0) for label in labels], counts).astype(np.int64)
 
 
 def _through(runs: Sequence[Indices]) -> Indices:

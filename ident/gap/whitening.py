@@ -46,7 +46,7 @@ class Predictor:
 
     @cached_property
     def matrix(self) -> Array:
-        """What turns the first rows of a run into white ones: lower triangular, a band from `ORDER` rows on."""
+        """What turns the first rows of a run into white ones: (m, m) lower triangular, a band from its order on."""
         order = len(self.weights) - 1
         found = np.zeros((order + STRIDE, order + STRIDE))
         for row, weights in enumerate(self.weights):
@@ -74,7 +74,7 @@ class Whitener:
 
     def apply(self, rows: Rows, values: Array) -> Array:
         """Whitened copy of (n,) or (n, k)."""
-        whole = np.asarray(values, dtype=float).reshape(len(rows), -1)
+        whole = np.asarray(values, dtype=float)[:, None] if np.ndim(values) == 1 else np.asarray(values, dtype=float)
         white, ends = np.empty_like(whole), np.flatnonzero(np.diff(rows.run, append=-1) != 0) + 1
         for start, end in pairwise([0, *ends.tolist()]):
             white[start:end] = self.predictors[rows.group[start]].apply(whole[start:end])
@@ -154,7 +154,8 @@ def _tolerated(rows: Rows) -> Array:
     for (block, kept), place in zip(rows.blocks, rows.block_slices, strict=True):
         if place.stop > place.start:
             memory = np.arange(ORDER + 1) / (kept.rate * TOLERATED_MEMORY)
-            found[rows.group[place.start]] = block.tolerance**2 * np.exp(-memory)
+            group = rows.group[place.start]
+            found[group] = np.maximum(found[group], block.tolerance**2 * np.exp(-memory))
     return found
 
 

@@ -102,7 +102,7 @@ def seen_together(
 
 
 def _sliding_times(sources: Sequence[Source], context: Context) -> Array:
-    """Time (4,) that each wheel surely slides [s]; both channels have the same signals."""
+    """Time (4,) that each wheel surely slides [s], drives that rattle aside; both channels have the same signals."""
     rolling = [source for source in sources if source.rolls and not source.rattles.any()]
     found = [sliding_times(context.inputs(source), context.setting(source)) for source in rolling]
     return np.asarray(np.sum([np.zeros(len(WHEEL_PLACES)), *found], axis=0))
@@ -110,7 +110,7 @@ def _sliding_times(sources: Sequence[Source], context: Context) -> Array:
 
 def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Candidate:
     """What was slid, as it was found; the friction coefficient by the traction that it took."""
-    travelling = [source for source in sources if source.travels]
+    travelling = [source for source in sources if source.travels and not source.rattles.any()]
     slid = _slid(cause, sources, context)
     held = [adhesion(context.inputs(source), cause.wheels, context.setting(source)) for source in travelling]
     friction = max(held, default=0.0) / ALONG
@@ -125,7 +125,7 @@ def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -
 
 
 def _slid(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Sequence[Array | None]:
-    """What sliding adds to every block, (N,); what a motor that rattles shakes loose has that cause already."""
+    """What sliding adds to every block, (N,); drives that rattle aside, for there the play is why wheels slide."""
     acting = [source.travels and not source.rattles.any() for source in sources]
     return contribution_of(cause, acting, sources, context)(np.ones(1), context.parameters)
 

@@ -55,7 +55,8 @@ def _change(
     context = replace(context, parameters=parameters[: len(PARAMETER_NAMES)])
     inputs = context.inputs(source)
     if changed is not None:
-        if np.array_equal(changed[:, (seen := _seen(source, context))], inputs[:, seen]):
+        seen = _seen(source, context)
+        if np.array_equal(changed[:, seen], inputs[:, seen]):
             return None
         after = context.rows_of(changed, source)
     elif source.rattling:

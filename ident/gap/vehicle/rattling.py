@@ -6,7 +6,7 @@ the steering loose. So the rolling rows of such a drive say nothing, and that wh
 What they lose stands above their bandwidth: there the wheel hardly moves, and what the motor moves is what its gear
 gives way by, under a load that is known. That is a row of its own, made slow by weighing it with the motion itself:
 
-    R <(β - twist) β_f / |β_f|> = 0,    β_f = β above `BAND`, |β_f| its rms, <.> what passes the filter of all rows.
+    R <(β_f - twist_f) β_f / |β_f|> = 0,    x_f = x above `BAND`, |β_f| its rms, <.> what passes the filter of all rows.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 BAND: Final = 150.0
-"""Above which a motor rattles [rad/s]; no excitation goes there."""
+"""Above which a motor rattles [rad/s]; no excitation goes there. Below, its wheel is made to roll as the others do."""
 
 LEAST: Final = 1e-4
 """Rms by which a motor must move above the band to rattle, at the wheel [rad]: ten times what dry friction makes."""
@@ -35,10 +35,10 @@ OFTEN: Final = 0.05
 """Part of a drive that a motor must rattle for; what it has shaken loose then slides on in all of it [-]."""
 
 UNTOLD: Final = 0.05
-"""Part of its motion that is not told: the load of the gear is a second derivative there, close to Nyquist."""
+"""Part of its motion that may stay unexplained: the load of the gear is a second derivative there, close to Nyquist."""
 
 SHAKEN: Final = 0.01
-"""Part of the generalized forces of such a drive that is not told: wheels that slide push each other [-]."""
+"""Part of the generalized forces of such a drive that may stay unexplained: wheels that slide push each other [-]."""
 
 
 def above_band(values: Array, sample_time: float) -> Array:
@@ -49,6 +49,8 @@ def above_band(values: Array, sample_time: float) -> Array:
 def rattling(beta: Array, processing: Processing, sample_time: float) -> tuple[Array, Mask]:
     """Rms motion of the motors above the band (N, 4) [rad], and where each that often rattles does so (N, 4).
 
+    Where all four do, none is said to: no wheel is left that rolls.
+
     Args:
         beta: angles of the motors in a drive, at the wheels (N, 4) [rad].
         processing: its filter is what the rows pass.
@@ -57,7 +59,8 @@ def rattling(beta: Array, processing: Processing, sample_time: float) -> tuple[A
     power = zero_phase(above_band(beta, sample_time) ** 2, processing.cutoff, sample_time)
     rms = np.sqrt(np.maximum(power, 0.0))
     rattles = rms > np.maximum(LEAST, ABOVE_OTHERS * rms.min(axis=1, keepdims=True))
-    return rms, np.asarray(rattles & (rattles.mean(axis=0) > OFTEN))
+    rattles &= rattles.mean(axis=0) > OFTEN
+    return rms, np.asarray(rattles & ~rattles.any(axis=0).all())
 
 
 def hammer(moved: Array, rms: Array) -> Array:

@@ -60,7 +60,7 @@ _ENDS: Final = np.cumsum(list(_SIZES.values())).tolist()
 SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS, strict=True)}
 """What was measured, as columns of one array; `twist` is that of the two steering couplings.
 
-`hammer` and `rattle` are zero but where a motor rattles in its gear (`ident.gap.vehicle.rattling`).
+`hammer` [-] and `rattle` [rad] are zero but where a motor rattles in its gear (`ident.gap.vehicle.rattling`).
 """
 
 INPUTS: Final = _ENDS[-1]

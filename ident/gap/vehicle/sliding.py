@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.estimate.filters import differentiate, zero_phase
+from ident.gap.vehicle.rattling import BAND
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.transforms import LOAD_CUTOFF, Setting, contact_force
 from ident.vehicle import kinematics
@@ -132,7 +133,7 @@ def traction(inputs: Array, wheel: int, setting: Setting) -> Array:
 
 
 def ahead_of_others(inputs: Array, geometry: Geometry, sample_time: float, without: Sequence[int] = ()) -> Array:
-    """Speed (N, 4) [m/s] that the wheels run ahead of the floor, its twist by odometry without some of them."""
+    """Speed (N, 4) [m/s] that the wheels run ahead of the floor, its twist by odometry without those of `without`."""
     return zero_phase(_odometry(inputs, geometry, without)[0], LOAD_CUTOFF, sample_time)
 
 
@@ -143,7 +144,7 @@ def ahead_of_the_rest(inputs: Array, geometry: Geometry, sample_time: float) -> 
 
 
 def _odometry(inputs: Array, geometry: Geometry, without: Sequence[int]) -> tuple[Array, Array]:
-    """What least squares over some wheels leaves of the rolling of all (N, 4), and the leverage of each."""
+    """What least squares without some wheels leaves of the rolling of all (N, 4) [m/s], and leverages (N, 4)."""
     matrix = kinematics.constraint_matrix(inputs[:, SLICES["alpha"]], geometry)
     rates = np.hstack([inputs[:, SLICES["alpha_rate"]], inputs[:, SLICES["beta_rate"]]])
     weights = np.repeat([HELD**2, 1.0], 4)
@@ -191,9 +192,13 @@ def _surely(forward: Array, speed: Array) -> Mask:
 
 
 def rolled_with_others(inputs: Array, wheels: Sequence[int], geometry: Geometry, sample_time: float) -> Array:
-    """Signals (N, INPUTS) as if some wheels rolled as the others say, below `LOAD_CUTOFF`."""
+    """Signals (N, INPUTS) as if some wheels rolled as the others say, as far as that is slow; their angles are kept.
+
+    So are the torques: what a wheel that hammers loses in sliding is not known.
+    """
     changed = inputs.copy()
-    ahead = ahead_of_others(inputs, geometry, sample_time, wheels)[:, wheels] / geometry.wheel_radius
+    left = _odometry(inputs, geometry, wheels)[0][:, wheels]
+    ahead = zero_phase(left, BAND, sample_time) / geometry.wheel_radius
     for name, change in (("beta_rate", ahead), ("beta_acceleration", differentiate(ahead, sample_time))):
         changed[:, [SLICES[name].start + wheel for wheel in wheels]] -= change
     return changed

@@ -48,7 +48,8 @@ class Source:
         channel: kinematic or dynamic.
         step: the segment's own name.
         spec: rows that the step has.
-        inputs: (M, INPUTS) at a rate that the smoothed signals allow.
+        inputs: (M, INPUTS) at a rate that the smoothed signals allow; wheels whose motors rattle roll as the others do.
+        recorded: the same as it was measured.
         sample_time: of them [s].
         factor: every how manieth becomes a row of a block.
         moving: (M,) rows to be used.
@@ -62,6 +63,7 @@ class Source:
     step: str
     spec: RowsOfStep
     inputs: Array
+    recorded: Array
     sample_time: float
     factor: int
     moving: tuple[NDArray[np.bool_], ...]
@@ -89,7 +91,7 @@ class Source:
 
 
 def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], processing: Processing) -> list[Source]:
-    """Rows of a record that belong to the steps; of those in which nothing moves there are none.
+    """Rows of a record that belong to the steps; of those in which nothing moves or rattles there are none.
 
     Raises:
         RecordError: it has none of the steps, or moves in none of them.
@@ -141,21 +143,20 @@ def _sources(signals: Signals, spec: RowsOfStep, geometry: Geometry, processing:
     factor = decimation(segment, processing.cutoff)
     most = max(1, int(np.pi / (OVERSAMPLED * processing.signal_cutoff * segment.sample_time)))
     stride = next(stride for stride in range(min(most, factor), 0, -1) if factor % stride == 0)
-    rms, rattles = rattling(signals.beta, processing, segment.sample_time)
-    inputs = signals.as_inputs()
-    if rattles.any():
-        moved = above_band(signals.beta, segment.sample_time)
-        inputs[:, rows.SLICES["hammer"]] = weights = np.where(rattles, hammer(moved, rms), 0.0)
-        inputs[:, rows.SLICES["rattle"]] = weights * moved
-        wheels = np.flatnonzero(rattles.any(axis=0)).tolist()
-        inputs = rolled_with_others(inputs, wheels, geometry, segment.sample_time)
-    inputs[:, rows.SLICES["torques"]] = zero_phase(
-        inputs[:, rows.SLICES["torques"]], processing.signal_cutoff, segment.sample_time
+    recorded = signals.as_inputs()
+    recorded[:, rows.SLICES["torques"]] = zero_phase(
+        recorded[:, rows.SLICES["torques"]], processing.signal_cutoff, segment.sample_time
     )
+    rms, rattles = rattling(signals.beta, processing, segment.sample_time)
+    if spec.mode is None:
+        # No floor is hammered, and nothing rolls.
+        rattles[:] = False
+    inputs = _hammered(recorded, rms, rattles, geometry, segment.sample_time) if rattles.any() else recorded
     common = {
         "step": segment.step,
         "spec": spec,
         "inputs": inputs[::stride],
+        "recorded": recorded[::stride],
         "sample_time": segment.sample_time * stride,
         "factor": factor // stride,
         "period": segment.period[::stride],
@@ -168,6 +169,16 @@ def _sources(signals: Signals, spec: RowsOfStep, geometry: Geometry, processing:
     if names:
         rolling = _rolling(signals, spec, processing) & ~rattles.any()
         yield Source(channel=Channel.KINEMATIC, moving=(rolling[::stride],) * len(names), **common)  # type: ignore[arg-type]
+
+
+def _hammered(recorded: Array, rms: Array, rattles: NDArray[np.bool_], geometry: Geometry, sample_time: float) -> Array:
+    """Signals (N, INPUTS) with what motors do that rattle, and with wheels that roll in spite of it."""
+    wheels = np.flatnonzero(rattles.any(axis=0)).tolist()
+    inputs = rolled_with_others(recorded, wheels, geometry, sample_time)
+    moved = above_band(recorded[:, rows.SLICES["beta"]], sample_time)
+    weights = np.where(rattles, hammer(moved, rms), 0.0)
+    inputs[:, rows.SLICES["hammer"]], inputs[:, rows.SLICES["rattle"]] = weights, weights * moved
+    return inputs
 
 
 def _moving(signals: Signals, spec: RowsOfStep, coordinate: str, processing: Processing) -> NDArray[np.bool_]:

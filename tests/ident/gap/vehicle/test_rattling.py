@@ -100,6 +100,15 @@ def test_a_motor_that_rattles_once_in_a_drive_does_not_rattle_in_it() -> None:
     assert rattling(beta, RATTLING, DT)[1].any(axis=0).tolist() == [False, False, True, False]
 
 
+def test_where_all_motors_rattle_none_is_said_to() -> None:
+    """Each in a quarter of the drive of its own: there is always a quiet one, but none that rolls throughout."""
+    beta = np.zeros((8000, 4))
+    for wheel in range(4):
+        part = slice(2000 * wheel, 2000 * (wheel + 1))
+        beta[part, wheel] = 1e-3 * np.sin(SHAKE * DT * np.arange(2000))
+    assert not rattling(beta, RATTLING, DT)[1].any()
+
+
 def test_a_wheel_made_to_roll_with_the_others_no_longer_runs_ahead(prototype: VehicleDescription) -> None:
     record = ideal_record([Drive(Step.STRAIGHT)], prototype)
     source = sources_of(record, prototype.geometry, [Step.STRAIGHT], Processing())[0]
