@@ -128,8 +128,7 @@ def _series(
 ) -> Iterable[Series]:
     context = make_context(sources, vehicle, model.parameters, model.effects, processing)
     for source in sources:
-        exact = context.formulas.exact(source.channel, source.spec)
-        residual = context.filtered(exact(context.inputs(source), *context.constants, np.zeros(0))[..., 0], source)
+        residual = context.filtered(context.plain(source)[..., 0], source)
         least = _creep(source, vehicle) if source.channel is Channel.KINEMATIC else 0.0
         for row, name in enumerate(source.coordinates):
             rows = _folded(residual[:, row], source.moving[row][:: source.factor], source.period[:: source.factor])

@@ -55,8 +55,8 @@ def tolerated_creep(source: Source, coordinate: str, geometry: Geometry) -> floa
 
 
 def contact_speeds(source: Source, geometry: Geometry) -> Array:
-    """At which the wheels roll in the rows used of a kinematic source (N, 4) [m/s]."""
-    return np.asarray(geometry.wheel_radius * source.inputs[np.any(source.moving, axis=0), SLICES["beta_rate"]])
+    """At which the wheels roll in the moving rows of a kinematic source (N, 4) [m/s]."""
+    return np.asarray(geometry.wheel_radius * source.inputs[source.moving[0], SLICES["beta_rate"]])
 
 
 def _part(speed: Array, part: float) -> float:
