@@ -55,6 +55,7 @@ class Source:
         moving: (M,) rows to be used.
         period: (M,).
         record: for messages.
+        rolling: (M,) rows that roll, were no motor to rattle.
         rattles: (M, 4) where the motor of each wheel rattles in its gear.
         rattling: wheels, if the rows are those of motors that rattle instead of what rolls.
     """
@@ -69,6 +70,7 @@ class Source:
     moving: tuple[NDArray[np.bool_], ...]
     period: NDArray[np.int64]
     record: str
+    rolling: NDArray[np.bool_]
     rattles: NDArray[np.bool_]
     rattling: tuple[int, ...] = ()
 
@@ -88,6 +90,11 @@ class Source:
     def rolls(self) -> bool:
         """Whether its rows are those of rolling wheels that travel."""
         return self.channel is Channel.KINEMATIC and self.travels and not self.rattling
+
+    def as_recorded(self) -> Source:
+        """The same as if no motor rattled."""
+        moving = (self.rolling,) * len(self.coordinates) if self.channel is Channel.KINEMATIC else self.moving
+        return replace(self, inputs=self.recorded, rattles=np.zeros_like(self.rattles), moving=moving)
 
 
 def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], processing: Processing) -> list[Source]:
@@ -115,13 +122,16 @@ def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], proces
     return [source for source in found if source.rattles.any() or any(mask.any() for mask in source.moving)]
 
 
-def rattling_sources(sources: Sequence[Source]) -> list[Source]:
-    """Rows of the motors that rattle while the vehicle drives."""
+def rattling_sources(sources: Sequence[Source], processing: Processing) -> list[Source]:
+    """Rows of the motors that rattle while the vehicle drives, away from the ends of the filter."""
     found = []
     for source in sources:
+        ends = round(processing.guard / source.sample_time)
+        inside = np.arange(len(source.rattles)) >= ends
+        inside &= inside[::-1]
         wheels = tuple(np.flatnonzero(source.rattles.any(axis=0)).tolist())
         if source.rolls and wheels:
-            moving = tuple(source.rattles[:, wheel] for wheel in wheels)
+            moving = tuple(source.rattles[:, wheel] & inside for wheel in wheels)
             found.append(replace(source, rattling=wheels, moving=moving))
     return found
 
@@ -152,6 +162,7 @@ def _sources(signals: Signals, spec: RowsOfStep, geometry: Geometry, processing:
         # No floor is hammered, and nothing rolls.
         rattles[:] = False
     inputs = _hammered(recorded, rms, rattles, geometry, segment.sample_time) if rattles.any() else recorded
+    rolling = _rolling(signals, spec, processing)[::stride]
     common = {
         "step": segment.step,
         "spec": spec,
@@ -161,14 +172,15 @@ def _sources(signals: Signals, spec: RowsOfStep, geometry: Geometry, processing:
         "factor": factor // stride,
         "period": segment.period[::stride],
         "record": signals.record,
+        "rolling": rolling,
         "rattles": rattles[::stride],
     }
     dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
     if names:
-        rolling = _rolling(signals, spec, processing) & ~rattles.any()
-        yield Source(channel=Channel.KINEMATIC, moving=(rolling[::stride],) * len(names), **common)  # type: ignore[arg-type]
+        quiet = rolling & ~rattles.any()
+        yield Source(channel=Channel.KINEMATIC, moving=(quiet,) * len(names), **common)  # type: ignore[arg-type]
 
 
 def _hammered(recorded: Array, rms: Array, rattles: NDArray[np.bool_], geometry: Geometry, sample_time: float) -> Array:
