@@ -82,7 +82,8 @@ def residual_figures(findings: Findings) -> list[tuple[str, str, Figure]]:
     rows = make_rows(replace(findings.problem, candidates=()))
     floors = noise_floors(rows, after, rows.target - rows.stack(list(after)))
     sizes = [_size(*one) for one in zip(blocks, before, floors.tolist(), strict=True)]
-    for index in np.argsort(sizes)[::-1][:MOST_RESIDUALS].tolist():
+    shown = [index for index in np.argsort(sizes)[::-1].tolist() if kept_rows(blocks[index]).samples.size]
+    for index in shown[:MOST_RESIDUALS]:
         block = blocks[index]
         models = {"before": before[index]}
         if findings.causes:

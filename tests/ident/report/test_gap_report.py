@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -96,6 +97,19 @@ def test_residuals_are_those_before_and_with_the_causes(findings: Findings) -> N
     before, after = (values(line["y"]) for line in figure["data"])
     assert np.sqrt(np.nanmean(before**2)) == pytest.approx(3.0, rel=0.15)
     assert np.sqrt(np.nanmean(after**2)) == pytest.approx(1 / np.sqrt(REPEATS), rel=0.2)
+
+
+def test_a_coordinate_without_rows_is_not_drawn() -> None:
+    """As the rolling rows of a drive in which a motor rattles."""
+    problems = []
+    for part in (0, 1):
+        problem = _problem(part, 3.0)
+        *blocks, last = problem.blocks
+        silent = replace(last, moving=np.zeros_like(last.moving))
+        problems.append(replace(problem, blocks=(*blocks, silent)))
+    titles = [title for _, title, _ in residual_figures(judge(*problems, seed=1))]
+    assert len(titles) == 2
+    assert not any("roll" in title for title in titles)
 
 
 def test_the_map_leaves_out_what_does_not_matter_and_puts_opposites_beside_each_other() -> None:
