@@ -192,7 +192,9 @@ class _Judgement:
         columns = [self.rows.layout[variant] for variant in self.found.variants]
         candidates = [self.problems[0].candidates[column.candidate] for column in columns]
         exact = all(one.contribution is None for one in candidates) and not any(column.beside for column in columns)
-        return exact and log_unsteady(self.regression, self.found) > self.limits.unsteady
+        evidence = max(self._log_evidence(index) for index in range(len(self.found.variants)))
+        limit = max(self.limits.unsteady, self.limits.bent * evidence)
+        return exact and log_unsteady(self.regression, self.found) > limit
 
     def _tangled(self) -> bool:
         """Whether many names share the friction of one kind of joint: so many changes of a curve are another curve."""

@@ -115,7 +115,8 @@ def channel_gaps(
     processing = Processing()
 
     def left_by(model: ExtendedModel, some: Sequence[Record]) -> list[Series]:
-        sources = [s for record in some for s in sources_of(record, vehicle.geometry, tuple(ROWS), processing)]
+        found = [s for record in some for s in sources_of(record, vehicle.geometry, tuple(ROWS), processing)]
+        sources = [source.as_recorded() for source in found]
         return list(_series(sources, vehicle, model, processing))
 
     first, second = left_by(before, records), left_by(after, records)
