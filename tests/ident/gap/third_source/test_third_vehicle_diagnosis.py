@@ -56,10 +56,9 @@ def test_two_masses_and_a_spring_come_out_as_elasticity_of_that_drive_and_close_
 ) -> None:
     fit, confirm = drives(compliance=5e-4)
     found = diagnose_vehicle([fit], [confirm], prototype)
-    effect, *others = found.diagnosis.effects
+    (effect,) = found.diagnosis.effects
     assert (effect.name, effect.where) == ("elasticity", "drive_fl")
-    assert effect.parameters["compliance"].value == pytest.approx(5e-4, rel=0.05)
-    assert all(other.gap_closed_held_out < 0.01 for other in others)
+    assert effect.parameters["compliance"].value == pytest.approx(5e-4, rel=0.01)
     models: list[Any] = [make(found.findings, prototype.prior) for make in (plain_model, extended_model)]
     gaps = channel_gaps([confirm], prototype, *models)
     assert gaps[Channel.KINEMATIC].closed > 0.98
