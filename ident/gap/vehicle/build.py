@@ -17,7 +17,6 @@ from ident.gap.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, toler
 from ident.gap.vehicle.library import TermCause
 from ident.gap.vehicle.rattling import SHAKEN, UNTOLD, untold
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
-from ident.gap.vehicle.ringing import with_rattling
 from ident.gap.vehicle.sources import DIAGNOSED, Source, processing_of, rattling_sources, sources_of
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
@@ -54,10 +53,8 @@ def build_problem(
     """
     processing = processing or processing_of(records)
     sources = [source for record in records for source in sources_of(record, vehicle.geometry, steps, processing)]
+    sources += rattling_sources(sources, processing)
     context = make_context(sources, vehicle, model, given, processing)
-    if rattling_sources(sources, processing):
-        sources = with_rattling(sources, context)
-        context = make_context(sources, vehicle, model, given, processing)
     causes = causes_of(tuple(effects), model is not None)
     units = [unit for cause in causes if isinstance(cause, TermCause) for v in cause.variants for unit in v.units]
     tables = [table_of(source, context, units) for source in sources]

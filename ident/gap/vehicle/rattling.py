@@ -1,10 +1,10 @@
-"""Motors that rattle in the play of their gears: when, what it does to the floor, and what it shows.
+"""Motors that rattle in the play of their gears or ring on their compliance: when, what it does, what it shows.
 
 Between the flanks a motor is free, so that a speed controller throws it from one to the other, many times a second.
 Its wheel hammers the floor and slides there, one way or the other, a hundred times as far as any that rolls, and shakes
 the steering loose. So the rolling rows of such a drive say nothing, and that wheel is taken to roll as the others do.
-What they lose stands above their bandwidth: there the wheel hardly moves, and what the motor moves is what its gear
-gives way by, under a load that is known. That is a row of its own, made slow by weighing it with the motion itself:
+What they lose stands above their bandwidth: β, what the motor moves beyond what the others say of its wheel, is there
+what its gear gives way by, under a load that is known. That is a row of its own, made slow by weighing it with itself:
 
     R <(β_f - twist_f) β_f / |β_f|> = 0,    x_f = x above `BAND`, |β_f| its rms, <.> what passes the filter of all rows.
 """
@@ -35,7 +35,7 @@ OFTEN: Final = 0.05
 """Part of a drive that a motor must rattle for; what it has shaken loose then slides on in all of it [-]."""
 
 UNTOLD: Final = 0.05
-"""Part of its motion that may stay unexplained: the load of the gear is a second derivative there, close to Nyquist."""
+"""Part of its motion that may stay unexplained: in flight no load tells where the motor is."""
 
 SHAKEN: Final = 0.01
 """Part of the generalized forces of such a drive that may stay unexplained: wheels that slide push each other [-]."""

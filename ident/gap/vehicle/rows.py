@@ -50,6 +50,7 @@ _SIZES: Final = {
     "beta_rate": 4,
     "alpha_acceleration": 2,
     "beta_acceleration": 4,
+    "motor_acceleration": 4,
     "torques": 4,
     "twist": 2,
     "twist_rate": 2,
@@ -59,6 +60,9 @@ _SIZES: Final = {
 _ENDS: Final = np.cumsum(list(_SIZES.values())).tolist()
 SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS, strict=True)}
 """What was measured, as columns of one array; `twist` is that of the two steering couplings.
+
+`beta` is the angle of a wheel. Motors turn as their wheels do until a cause or the others say how those roll, but for
+`motor_acceleration`, which stays as it was measured.
 
 `hammer` [-] and `rattle` [rad] are zero but where a motor rattles in its gear (`ident.gap.vehicle.rattling`).
 """
@@ -89,6 +93,7 @@ class _Inputs:
     beta_rate: Expression
     alpha_acceleration: Expression
     beta_acceleration: Expression
+    motor_acceleration: Expression
     torques: Expression
     twist: Expression
     twist_rate: Expression

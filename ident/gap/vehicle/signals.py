@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.errors import RecordError
-from ident.estimate.filters import FILTER_ORDER, Processing, differentiate, second_derivative, zero_phase
+from ident.estimate.filters import FILTER_ORDER, Processing, zero_phase
+from ident.gap.vehicle.derivatives import accelerations, rates
 from ident.gap.vehicle.rows import INPUTS, SLICES
 from ident.records.record import Record, Segment
 from ident.vehicle import kinematics
@@ -57,6 +58,7 @@ class Signals:
         inputs[:, SLICES["heading"]] = self.heading[:, None]
         for name in ("alpha", "beta", "alpha_rate", "beta_rate", "alpha_acceleration", "beta_acceleration", "torques"):
             inputs[:, SLICES[name]] = getattr(self, name)
+        inputs[:, SLICES["motor_acceleration"]] = self.beta_acceleration
         return inputs
 
     @property
@@ -105,11 +107,11 @@ def _signals(segment: Segment, source: str, processing: Processing) -> Signals:
         record=source,
         heading=np.zeros(len(segment)),
         alpha=alpha,
-        alpha_rate=differentiate(alpha, dt),
-        alpha_acceleration=second_derivative(alpha, dt),
+        alpha_rate=rates(alpha, dt),
+        alpha_acceleration=accelerations(alpha, dt),
         beta=beta,
-        beta_rate=differentiate(beta, dt),
-        beta_acceleration=second_derivative(beta, dt),
+        beta_rate=rates(beta, dt),
+        beta_acceleration=accelerations(beta, dt),
         torques=segment.motor_torques,
     )
 

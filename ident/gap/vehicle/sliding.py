@@ -16,7 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.estimate.filters import differentiate, zero_phase
+from ident.estimate.filters import zero_phase
+from ident.gap.vehicle.derivatives import rates
 from ident.gap.vehicle.rattling import BAND
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.transforms import LOAD_CUTOFF, Setting, contact_force
@@ -197,16 +198,22 @@ def rolled_with_others(inputs: Array, wheels: Sequence[int], geometry: Geometry,
     So are the torques: what a wheel that hammers loses in sliding is not known.
     """
     changed = inputs.copy()
-    left = _odometry(inputs, geometry, wheels)[0][:, wheels]
-    ahead = zero_phase(left, BAND, sample_time) / geometry.wheel_radius
-    for name, change in (("beta_rate", ahead), ("beta_acceleration", differentiate(ahead, sample_time))):
+    own = inputs[:, SLICES["beta_rate"]][:, wheels]
+    ahead = zero_phase(own - rolling_rates(inputs, wheels, geometry), BAND, sample_time)
+    for name, change in (("beta_rate", ahead), ("beta_acceleration", rates(ahead, sample_time))):
         changed[:, [SLICES[name].start + wheel for wheel in wheels]] -= change
     return changed
 
 
+def rolling_rates(inputs: Array, wheels: Sequence[int], geometry: Geometry) -> Array:
+    """Rates (N, wheels) at which some wheels roll by what the others say [rad/s]."""
+    ahead = _odometry(inputs, geometry, wheels)[0][:, wheels] / geometry.wheel_radius
+    return np.asarray(inputs[:, SLICES["beta_rate"]][:, wheels] - ahead)
+
+
 def _roll(inputs: Array, wheel: int, ahead: Array, setting: Setting) -> None:
     """Take `ahead` (N,) [rad/s] off a wheel, and off its drive what it took."""
-    more = differentiate(ahead, setting.sample_time)
+    more = rates(ahead, setting.sample_time)
     inputs[:, SLICES["beta_rate"].start + wheel] -= ahead
     inputs[:, SLICES["beta_acceleration"].start + wheel] -= more
     torque = setting["d_vw"] * ahead + setting["B_w"] * more

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.integrate import cumulative_trapezoid
 
 from ident.errors import RecordError
 from ident.estimate.equations import ROWS, RowsOfStep
@@ -17,7 +18,7 @@ from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
 from ident.gap.vehicle.rattling import above_band, hammer, rattling
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
-from ident.gap.vehicle.sliding import rolled_with_others
+from ident.gap.vehicle.sliding import rolled_with_others, rolling_rates
 from ident.records.record import Record, Step, base_step
 from ident.vehicle.geometry import WHEELS, Geometry
 from ident.vehicle.modes import Mode
@@ -187,7 +188,10 @@ def _hammered(recorded: Array, rms: Array, rattles: NDArray[np.bool_], geometry:
     """Signals (N, INPUTS) with what motors do that rattle, and with wheels that roll in spite of it."""
     wheels = np.flatnonzero(rattles.any(axis=0)).tolist()
     inputs = rolled_with_others(recorded, wheels, geometry, sample_time)
-    moved = above_band(recorded[:, rows.SLICES["beta"]], sample_time)
+    rolled = rolling_rates(recorded, wheels, geometry)
+    against = recorded[:, rows.SLICES["beta"]].copy()
+    against[:, wheels] -= cumulative_trapezoid(rolled, dx=sample_time, axis=0, initial=0)
+    moved = above_band(against, sample_time)
     weights = np.where(rattles, hammer(moved, rms), 0.0)
     inputs[:, rows.SLICES["hammer"]], inputs[:, rows.SLICES["rattle"]] = weights, weights * moved
     return inputs

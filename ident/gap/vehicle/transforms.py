@@ -14,7 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.estimate.filters import differentiate, zero_phase
+from ident.estimate.filters import zero_phase
+from ident.gap.vehicle.derivatives import accelerations, rates
 from ident.gap.vehicle.rattling import above_band
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.signals import shifted
@@ -128,7 +129,7 @@ def _gear_load(inputs: Array, wheel: int, setting: Setting) -> Array:
     A motor that rattles in its play touches both flanks many times a second, and a smoothed load shows neither.
     """
     drive = setting.geometry.gear_ratio * inputs[:, SLICES["torques"].start + wheel]
-    inertia = MOTOR_SHARE * setting["B_w"] * inputs[:, SLICES["beta_acceleration"].start + wheel]
+    inertia = MOTOR_SHARE * setting["B_w"] * inputs[:, SLICES["motor_acceleration"].start + wheel]
     return np.asarray(drive - inertia)
 
 
@@ -155,8 +156,7 @@ def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> 
         # The wheel of a motor that rattles has been made to roll as the others say: what is slow is gone already.
         twist = above_band(twist, setting.sample_time)
         changed[:, SLICES["rattle"].start + wheel] -= hammer * twist
-    rate = differentiate(twist, setting.sample_time)
-    acceleration = differentiate(rate, setting.sample_time)
+    rate, acceleration = (each(twist, setting.sample_time) for each in (rates, accelerations))
     for name, change in (("beta", twist), ("beta_rate", rate), ("beta_acceleration", acceleration)):
         changed[:, SLICES[name].start + wheel] -= change
     own = MOTOR_SHARE * setting["B_w"] / setting.geometry.gear_ratio
@@ -167,7 +167,7 @@ def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> 
 def _rear_behind_front(inputs: Array, side: int, twist: Array, setting: Setting) -> Array:
     changed, twist = inputs.copy(), zero_phase(twist, LOAD_CUTOFF, setting.sample_time)
     changed[:, SLICES["twist"].start + side] += twist
-    changed[:, SLICES["twist_rate"].start + side] += differentiate(twist, setting.sample_time)
+    changed[:, SLICES["twist_rate"].start + side] += rates(twist, setting.sample_time)
     return changed
 
 

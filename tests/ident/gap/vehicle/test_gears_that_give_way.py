@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
+from ident.gap.vehicle.derivatives import accelerations, rates
 from ident.gap.vehicle.rows import INPUTS, SLICES
 from ident.gap.vehicle.transforms import Setting, transform_cause
 from ident.vehicle.effects import EffectName
@@ -70,9 +71,10 @@ def slope(values: Array) -> Array:
 def inputs_of(ride: Ride) -> Array:
     inputs = np.zeros((len(ride.torque), INPUTS))
     inputs[:, SLICES["torques"].start] = ride.torque / GEOMETRY.gear_ratio
+    rate, acceleration = rates(ride.motor, DT), accelerations(ride.motor, DT)
     for name, values in zip(
-        ("beta", "beta_rate", "beta_acceleration"),
-        (ride.motor, slope(ride.motor), slope(slope(ride.motor))),
+        ("beta", "beta_rate", "beta_acceleration", "motor_acceleration"),
+        (ride.motor, rate, acceleration, acceleration),
         strict=True,
     ):
         inputs[:, SLICES[name].start] = values
