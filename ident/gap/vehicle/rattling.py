@@ -34,7 +34,7 @@ ABOVE_OTHERS: Final = 5.0
 OFTEN: Final = 0.05
 """Part of a drive that a motor must rattle for; what it has shaken loose then slides on in all of it [-]."""
 
-UNTOLD: Final = 0.05
+UNTOLD: Final = 0.03
 """Part of its motion that may stay unexplained: in flight no load tells where the motor is."""
 
 SHAKEN: Final = 0.01
