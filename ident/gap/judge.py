@@ -184,8 +184,7 @@ class _Judgement:
     def _foreign(self) -> bool:
         """Whether something lasts in rows that the model itself says nothing of: what shows there is all of a cause."""
         foreign = {block.label for block, _ in self.rows.blocks if not block.baseline.any()}
-        sizes = lasting(self.rows, self.floors, self.after.blocks)
-        return any(size > self.limits.foreign for label, size in sizes.items() if label in foreign)
+        return any(size > self.limits.foreign for label, size in self._lasts.items() if label in foreign)
 
     def _unsteady(self) -> bool:
         """Whether the effects would rather have other sizes in some steps, where their columns are all there is."""
@@ -224,9 +223,13 @@ class _Judgement:
         creeping = {block.label for block, _ in self.rows.blocks if block.tolerance > 0}
         stricter = self.found.variants and self._measurable()
         usual = self.limits.beside if stricter else self.limits.repeating
-        sizes = lasting(self.rows, self.floors, self.after.blocks)
-        limits = {label: self.limits.creeping if label in creeping else usual for label in sizes}
-        return max((size / limits[label] for label, size in sizes.items()), default=0.0)
+        limits = {label: self.limits.creeping if label in creeping else usual for label in self._lasts}
+        return max((size / limits[label] for label, size in self._lasts.items()), default=0.0)
+
+    @cached_property
+    def _lasts(self) -> Mapping[str, float]:
+        """What the model leaves and repeats in every record, over the noise, by coordinate."""
+        return lasting(self.rows, self.floors, self.after.blocks)
 
     def _sizes(self, models: Sequence[Array]) -> Mapping[str, float]:
         return repeated(self.rows, self.floors, models)

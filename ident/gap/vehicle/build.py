@@ -13,11 +13,11 @@ from ident.gap.problem import Block, Channel, Nominal, Problem
 from ident.gap.vehicle import rows
 from ident.gap.vehicle.candidates import candidate_of, causes_of, seen_together, slid_by_any
 from ident.gap.vehicle.context import MODEL_COLUMNS, Context, make_context, table_of
-from ident.gap.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
+from ident.gap.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, part_of, tolerated_creep
 from ident.gap.vehicle.library import TermCause
-from ident.gap.vehicle.rattling import SHAKEN, UNTOLD, untold
+from ident.gap.vehicle.rattling import SHAKEN, UNTOLD
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
-from ident.gap.vehicle.sources import DIAGNOSED, Source, processing_of, rattling_sources, sources_of
+from ident.gap.vehicle.sources import DIAGNOSED, Source, processing_of, sources_of
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import Effect, EffectName
@@ -53,7 +53,6 @@ def build_problem(
     """
     processing = processing or processing_of(records)
     sources = [source for record in records for source in sources_of(record, vehicle.geometry, steps, processing)]
-    sources += rattling_sources(sources, processing)
     context = make_context(sources, vehicle, model, given, processing)
     causes = causes_of(tuple(effects), model is not None)
     units = [unit for cause in causes if isinstance(cause, TermCause) for v in cause.variants for unit in v.units]
@@ -107,21 +106,21 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
 def _tolerance(source: Source, row: int, target: Array, geometry: Geometry) -> float:
     """What a row may lack for reasons that no cause has, rms in its unit."""
     used = target[source.moving[row][:: source.factor]]
-    if source.rattling:
-        return untold(used, UNTOLD)
+    if source.motors:
+        return part_of(used, UNTOLD)
     if source.channel is Channel.DYNAMIC:
-        return untold(used, SHAKEN) if source.travels and source.rattles.any() else 0.0
+        return part_of(used, SHAKEN) if source.travels and source.rattles.any() else 0.0
     return tolerated_creep(source, source.coordinates[row], geometry)
 
 
 def _creep(source: Source, context: Context) -> Array:
     """Columns of creep (N, rows, wheels); zeros in rows that nothing rolls in."""
-    if source.channel is not Channel.KINEMATIC or source.rattling:
+    if source.channel is not Channel.KINEMATIC or source.motors:
         return np.zeros((len(source.inputs[:: source.factor]), len(source.coordinates), len(CREEP_NAMES)))
     return context.filtered(creep_columns(context.inputs(source), source, context.setting(source)), source)
 
 
 def _unit(source: Source, coordinate: str) -> str:
     if source.channel is Channel.KINEMATIC:
-        return "m" if source.rattling else "m/s"
+        return "m" if source.motors else "m/s"
     return "N" if coordinate in ("x", "y") else "Nm"

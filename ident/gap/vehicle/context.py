@@ -88,8 +88,8 @@ class Context:
 
     def rows_of(self, inputs: Array, source: Source) -> Array:
         """The rows of a source (M, rows, 1) with other signals (M, INPUTS)."""
-        if source.rattling:
-            return rattle_rows(inputs, source.rattling, self.geometry.wheel_radius)[..., None]
+        if source.motors:
+            return rattle_rows(inputs, source.motors, self.geometry.wheel_radius)[..., None]
         return np.asarray(self.formulas.exact(source.channel, source.spec)(inputs, *self.constants, np.zeros(0)))
 
     def filtered(self, values: Array, source: Source) -> Array:
@@ -143,7 +143,7 @@ def fitted_parameters(sources: Sequence[Source], vehicle: VehicleDescription, co
 
 def table_of(source: Source, context: Context, units: Sequence[rows.UnitTerm]) -> Array:
     """Filtered residual at p = 0, regressor and columns of a source: (N, rows, 12 + units)."""
-    if source.rattling:
+    if source.motors:
         plain = context.filtered(context.plain(source), source)
         return np.concatenate([plain, np.zeros((*plain.shape[:2], MODEL_COLUMNS - 1 + len(units)))], axis=2)
     function = context.formulas.linearised(source.channel, source.spec, units)

@@ -59,7 +59,7 @@ def _change(
         if np.array_equal(changed[:, seen], inputs[:, seen]):
             return None
         after = context.rows_of(changed, source)
-    elif source.rattling:
+    elif source.motors:
         return None
     else:
         exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)
@@ -69,8 +69,8 @@ def _change(
 
 def _seen(source: Source, context: Context) -> list[int]:
     """Columns of the signals that the rows of a source are made of."""
-    if source.rattling:
-        return [SLICES["rattle"].start + wheel for wheel in source.rattling]
+    if source.motors:
+        return [SLICES["rattle"].start + wheel for wheel in source.motors]
     plain = context.formulas.exact(source.channel, source.spec)
     return [element for argument, element in plain.inputs if argument == 0]
 

@@ -46,12 +46,12 @@ Front and rear wheels are held parallel by a coupling that gives way itself, whi
 
 def granted_creep(mode: Mode | None, speed: Array) -> float:
     """What creep takes (rms) from contacts that roll at some speeds (..., 4) [m/s] in a mode [m/s]."""
-    return _part(speed, TURNING if mode is Mode.ALIGNMENT else GRANTED)
+    return part_of(speed, TURNING if mode is Mode.ALIGNMENT else GRANTED)
 
 
 def tolerated_creep(source: Source, coordinate: str, geometry: Geometry) -> float:
     """What a kinematic coordinate may lack beside creep in proportion to traction, rms [m/s]."""
-    return _part(contact_speeds(source, geometry), LEFT_OVER.get(coordinate, TURNING))
+    return part_of(contact_speeds(source, geometry), LEFT_OVER.get(coordinate, TURNING))
 
 
 def contact_speeds(source: Source, geometry: Geometry) -> Array:
@@ -59,8 +59,9 @@ def contact_speeds(source: Source, geometry: Geometry) -> Array:
     return np.asarray(geometry.wheel_radius * source.inputs[source.moving[0], SLICES["beta_rate"]])
 
 
-def _part(speed: Array, part: float) -> float:
-    return part * float(np.sqrt(np.mean(speed**2))) if speed.size else 0.0
+def part_of(values: Array, part: float) -> float:
+    """A part of the rms of some values, in their unit; nothing of none."""
+    return part * float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
 def creep_columns(inputs: Array, source: Source, setting: Setting) -> Array:

@@ -71,8 +71,3 @@ def hammer(moved: Array, rms: Array) -> Array:
 def rattle_rows(inputs: Array, wheels: tuple[int, ...], radius: float) -> Array:
     """How far the motors of some wheels move with the hammer, beyond what their gears give way by (N, wheels) [m]."""
     return np.asarray(radius * inputs[:, SLICES["rattle"]][:, wheels])
-
-
-def untold(rows: Array, part: float) -> float:
-    """Rms up to which what is left of rows (n,) means nothing, in their unit."""
-    return part * float(np.sqrt(np.mean(rows**2))) if rows.size else 0.0

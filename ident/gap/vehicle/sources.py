@@ -34,10 +34,10 @@ OVERSAMPLED: Final = 3.0
 ASKEW: Final = 0.4
 """Steering angle beyond which a wheel that steers at standstill pushes the chassis aside [rad]."""
 
-RATTLING: Final = 1000.0
-"""Bandwidth of the signals [rad/s]: motors on the compliance of their gears' teeth rattle more slowly than that."""
+SIGNAL_BANDWIDTH: Final = 1000.0
+"""Of the signals [rad/s]: motors on the compliance of their gears' teeth rattle more slowly than that."""
 
-RATTLING_SHARE: Final = 0.64
+SIGNAL_SHARE: Final = 0.64
 """The same at most, in units of the Nyquist frequency."""
 
 
@@ -58,7 +58,7 @@ class Source:
         record: for messages.
         rolling: (M,) rows that roll, were no motor to rattle.
         rattles: (M, 4) where the motor of each wheel rattles in its gear.
-        rattling: wheels, if the rows are those of motors that rattle instead of what rolls.
+        motors: wheels whose motors rattle, if the rows are those of these motors instead of what rolls.
     """
 
     channel: Channel
@@ -73,13 +73,13 @@ class Source:
     record: str
     rolling: NDArray[np.bool_]
     rattles: NDArray[np.bool_]
-    rattling: tuple[int, ...] = ()
+    motors: tuple[int, ...] = ()
 
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of its rows, a block each."""
-        if self.rattling:
-            return tuple(f"rattle_{WHEELS[wheel]}" for wheel in self.rattling)
+        if self.motors:
+            return tuple(f"rattle_{WHEELS[wheel]}" for wheel in self.motors)
         return rows.coordinates(self.channel, self.spec)
 
     @property
@@ -90,7 +90,7 @@ class Source:
     @property
     def rolls(self) -> bool:
         """Whether its rows are those of rolling wheels that travel."""
-        return self.channel is Channel.KINEMATIC and self.travels and not self.rattling
+        return self.channel is Channel.KINEMATIC and self.travels and not self.motors
 
     def as_recorded(self) -> Source:
         """The same as if no motor rattled."""
@@ -123,25 +123,11 @@ def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], proces
     return [source for source in found if source.rattles.any() or any(mask.any() for mask in source.moving)]
 
 
-def rattling_sources(sources: Sequence[Source], processing: Processing) -> list[Source]:
-    """Rows of the motors that rattle while the vehicle drives, away from the ends of the filter."""
-    found = []
-    for source in sources:
-        ends = round(processing.guard / source.sample_time)
-        inside = np.arange(len(source.rattles)) >= ends
-        inside &= inside[::-1]
-        wheels = tuple(np.flatnonzero(source.rattles.any(axis=0)).tolist())
-        if source.rolls and wheels:
-            moving = tuple(source.rattles[:, wheel] & inside for wheel in wheels)
-            found.append(replace(source, rattling=wheels, moving=moving))
-    return found
-
-
 def processing_of(records: Sequence[Record]) -> Processing:
     """Filters of the estimate, but signals that still show a motor that rattles in its gear."""
     usual = Processing()
     nyquist = min((np.pi / segment.sample_time for record in records for segment in record.segments), default=0.0)
-    return replace(usual, signal_cutoff=float(np.clip(RATTLING_SHARE * nyquist, usual.signal_cutoff, RATTLING)))
+    return replace(usual, signal_cutoff=float(np.clip(SIGNAL_SHARE * nyquist, usual.signal_cutoff, SIGNAL_BANDWIDTH)))
 
 
 def _spec(step: str, steps: Sequence[Step]) -> RowsOfStep | None:
@@ -181,7 +167,19 @@ def _sources(signals: Signals, spec: RowsOfStep, geometry: Geometry, processing:
     names = rows.kinematic_coordinates(spec)
     if names:
         quiet = rolling & ~rattles.any()
-        yield Source(channel=Channel.KINEMATIC, moving=(quiet,) * len(names), **common)  # type: ignore[arg-type]
+        rolled = Source(channel=Channel.KINEMATIC, moving=(quiet,) * len(names), **common)  # type: ignore[arg-type]
+        yield rolled
+        if rolled.rolls and rattles.any():
+            yield _of_motors(rolled, processing)
+
+
+def _of_motors(rolled: Source, processing: Processing) -> Source:
+    """Rows of the motors that rattle while wheels roll, away from the ends of the filter."""
+    ends = round(processing.guard / rolled.sample_time)
+    inside = np.arange(len(rolled.rattles)) >= ends
+    inside &= inside[::-1]
+    motors = tuple(np.flatnonzero(rolled.rattles.any(axis=0)).tolist())
+    return replace(rolled, motors=motors, moving=tuple(rolled.rattles[:, wheel] & inside for wheel in motors))
 
 
 def _hammered(recorded: Array, rms: Array, rattles: NDArray[np.bool_], geometry: Geometry, sample_time: float) -> Array:

@@ -17,7 +17,7 @@ from ident.gap.vehicle.ideal import Drive, ideal_record
 from ident.gap.vehicle.rattling import above_band, hammer, rattle_rows, rattling
 from ident.gap.vehicle.rows import INPUTS, SLICES
 from ident.gap.vehicle.sliding import ahead_of_others, rolled_with_others
-from ident.gap.vehicle.sources import processing_of, rattling_sources, sources_of
+from ident.gap.vehicle.sources import processing_of, sources_of
 from ident.gap.vehicle.transforms import Setting, transform_cause
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
@@ -26,7 +26,7 @@ from ident.vehicle.effects import EffectName
 Array = NDArray[np.float64]
 
 DT = 0.002
-RATTLING = Processing(signal_cutoff=1000.0)
+FAST = Processing(signal_cutoff=1000.0)
 GAP, COMPLIANCE = 6e-4, 5e-5
 SHAKE = 2 * math.pi * 70.0
 
@@ -51,7 +51,7 @@ def shaken(prototype: VehicleDescription) -> tuple[Array, NDArray[np.bool_], Set
     """Signals of four wheels that stand, the first motor thrown about; where it rattles; and what else is needed."""
     setting = Setting(prototype.geometry, prototype.prior.values, DT)
     angle, torque = thrown(12.0, setting["B_w"] / 2)
-    fast = zero_phase(angle, RATTLING.signal_cutoff, DT)
+    fast = zero_phase(angle, FAST.signal_cutoff, DT)
     inputs = np.zeros((len(fast), INPUTS))
     columns = [
         ("beta", fast),
@@ -61,10 +61,10 @@ def shaken(prototype: VehicleDescription) -> tuple[Array, NDArray[np.bool_], Set
     ]
     for name, values in columns:
         inputs[:, SLICES[name].start] = values
-    smooth = zero_phase(torque, RATTLING.signal_cutoff, DT)
+    smooth = zero_phase(torque, FAST.signal_cutoff, DT)
     inputs[:, SLICES["torques"].start] = smooth / prototype.geometry.gear_ratio
     beta = inputs[:, SLICES["beta"]]
-    rms, rattles = rattling(beta, RATTLING, DT)
+    rms, rattles = rattling(beta, FAST, DT)
     moved = above_band(beta, DT)
     inputs[:, SLICES["hammer"]] = np.where(rattles, hammer(moved, rms), 0.0)
     inputs[:, SLICES["rattle"]] = inputs[:, SLICES["hammer"]] * moved
@@ -91,15 +91,15 @@ def test_play_and_flanks_are_told_from_the_motion_above_the_band(prototype: Vehi
 
 def test_noise_that_all_encoders_share_is_no_rattling() -> None:
     noise = 1e-3 * np.random.default_rng(4).normal(size=(3000, 4))
-    assert not rattling(noise, RATTLING, DT)[1].any()
+    assert not rattling(noise, FAST, DT)[1].any()
 
 
 def test_a_motor_that_rattles_once_in_a_drive_does_not_rattle_in_it() -> None:
     beta = np.zeros((6000, 4))
     beta[1000:1200, 2] = 1e-3 * np.sin(SHAKE * DT * np.arange(200))
-    assert not rattling(beta, RATTLING, DT)[1].any()
+    assert not rattling(beta, FAST, DT)[1].any()
     beta[1000:2200, 2] = 1e-3 * np.sin(SHAKE * DT * np.arange(1200))
-    assert rattling(beta, RATTLING, DT)[1].any(axis=0).tolist() == [False, False, True, False]
+    assert rattling(beta, FAST, DT)[1].any(axis=0).tolist() == [False, False, True, False]
 
 
 def test_where_all_motors_rattle_none_is_said_to() -> None:
@@ -108,7 +108,7 @@ def test_where_all_motors_rattle_none_is_said_to() -> None:
     for wheel in range(4):
         part = slice(2000 * wheel, 2000 * (wheel + 1))
         beta[part, wheel] = 1e-3 * np.sin(SHAKE * DT * np.arange(2000))
-    assert not rattling(beta, RATTLING, DT)[1].any()
+    assert not rattling(beta, FAST, DT)[1].any()
 
 
 def test_a_wheel_made_to_roll_with_the_others_no_longer_runs_ahead(prototype: VehicleDescription) -> None:
@@ -145,9 +145,9 @@ def hammered(prototype: VehicleDescription) -> Record:
 def test_rolling_says_nothing_in_a_drive_that_rattles(hammered: Record, prototype: VehicleDescription) -> None:
     processing = processing_of([hammered])
     sources = sources_of(hammered, prototype.geometry, [Step.STRAIGHT, Step.ROTATION], processing)
-    used = {source.step: source.moving[0].any() for source in sources if source.channel is Channel.KINEMATIC}
+    used = {source.step: source.moving[0].any() for source in sources if source.rolls}
     assert used == {Step.STRAIGHT: False, Step.ROTATION: True}
-    (rows,) = rattling_sources(sources, processing)
+    (rows,) = [source for source in sources if source.motors]
     assert (rows.step, rows.coordinates) == (Step.STRAIGHT, ("rattle_fr",))
 
 
