@@ -21,6 +21,11 @@ def orthonormal(columns: Array, rank: float = RANK) -> Array:
     return np.asarray(vectors[:, singular > rank * singular.max(initial=0.0)])
 
 
+def rms(values: Array) -> float:
+    """Root of the mean square of all values; zero of none."""
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+
+
 def least_squares(design: Array, target: Array) -> Array:
     """Coefficients of columns of any scale; of dependent ones, the smallest."""
     scale = np.linalg.norm(design, axis=0)

@@ -85,7 +85,8 @@ def repeated(rows: Rows, floors: Array, models: Series) -> Mapping[str, float]:
 def lasting(rows: Rows, floors: Array, models: Series) -> Mapping[str, float]:
     """The same of what repeats in the records that are fitted and in those that confirm: the smaller of the two.
 
-    What one campaign alone repeats comes from how it began: wheels a few increments askew after an alignment.
+    Where only one of them has rows of a coordinate, what those repeat. What one campaign alone repeats comes from how
+    it began: wheels a few increments askew after an alignment.
     """
     fitted, confirming = (_repeated(rows, floors, models, (part,)) for part in (False, True))
     return {label: min(size, confirming.get(label, size)) for label, size in {**confirming, **fitted}.items()}
@@ -95,7 +96,8 @@ def _repeated(rows: Rows, floors: Array, models: Series, parts: Collection[bool]
     """In the records whose rows confirm, or not, as `parts` says."""
     sums: dict[str, tuple[float, int]] = {}
     for index, (block, kept) in enumerate(rows.blocks):
-        if len(kept.samples) < 2 or bool(rows.confirming[rows.block_slices[index]].any()) not in parts:
+        confirms = bool(rows.confirming[rows.block_slices[index]].any())
+        if len(kept.samples) < 2 or not kept.samples.size or confirms not in parts:
             continue
         excess = _excess(block, kept, models[index], floors[index])
         total, count = sums.get(block.label, (0.0, 0))

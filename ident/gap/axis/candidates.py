@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from ident.gap.axis.motion import AxisMotion, derivative
+from ident.gap.axis.motion import AxisMotion
+from ident.gap.derivatives import derivative
 from ident.gap.problem import Candidate, Variant
 from ident.records.axis_record import AxisKind
 from ident.vehicle.effects import EffectName, EffectParameter

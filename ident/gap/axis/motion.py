@@ -12,6 +12,7 @@ from scipy import ndimage, signal
 
 from ident.errors import EstimationError
 from ident.estimate.axis.processing import smoothed
+from ident.gap.derivatives import derivative
 from ident.gap.rows import ROWS_PER_CUTOFF
 from ident.records.axis_record import AxisRecord, AxisSignals
 
@@ -34,7 +35,6 @@ MOST_ROWS: Final = 4000
 """Rows of a repeat beyond which more say nothing new and take long."""
 EFFORT_SHARE: Final = 0.99
 """Of the power of the effort that the rows keep. What lies above belongs to drives and structures, not to the axis."""
-DIFFERENCES: Final = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60
 STUCK_SPEED: Final = 0.01
 """Over the 95th percentile of the speed: below it an axis may stick."""
 REPEAT_MISMATCH: Final = 0.03
@@ -116,14 +116,6 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth:
     rate = derivative(axis.position, dt)
     linear = np.stack([derivative(rate, dt), rate], axis=1)
     return AxisMotion(position, velocity, derivative(velocity, dt), linear, axis.effort, moving)
-
-
-def derivative(values: Array, sample_time: float) -> Array:
-    """Central differences of sixth order along axis 0, the ends repeated.
-
-    Those of second order lose a sixth of (ω T)², twice for the acceleration: as much as an elastic drive would.
-    """
-    return np.asarray(ndimage.correlate1d(values, DIFFERENCES, axis=0, mode="nearest") / sample_time)
 
 
 def effort_bandwidth(effort: Array, duration: float, limit: float, sample_time: float) -> float:

@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.estimate.filters import Processing
+from ident.gap.linear import rms
 from ident.gap.problem import Block, Channel, Nominal, Problem
 from ident.gap.vehicle import rows
 from ident.gap.vehicle.candidates import candidate_of, causes_of, seen_together, slid_by_any
 from ident.gap.vehicle.context import MODEL_COLUMNS, Context, make_context, table_of
-from ident.gap.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, part_of, tolerated_creep
+from ident.gap.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
 from ident.gap.vehicle.library import TermCause
-from ident.gap.vehicle.rattling import SHAKEN, UNTOLD
+from ident.gap.vehicle.rattling import SHAKEN, UNTOLD, rattle_rows
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
 from ident.gap.vehicle.sources import DIAGNOSED, Source, processing_of, sources_of
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import Effect, EffectName
-from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters
 
 Array = NDArray[np.float64]
@@ -99,18 +99,19 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
             period=source.period[:: source.factor],
             regions=regions_of(position, rate, acceleration, load),
             features=features_of(position, rate, acceleration, load),
-            tolerance=_tolerance(source, row, target, context.geometry),
+            tolerance=_tolerance(source, row, target, context),
         )
 
 
-def _tolerance(source: Source, row: int, target: Array, geometry: Geometry) -> float:
+def _tolerance(source: Source, row: int, target: Array, context: Context) -> float:
     """What a row may lack for reasons that no cause has, rms in its unit."""
-    used = target[source.moving[row][:: source.factor]]
+    used = source.moving[row][:: source.factor]
     if source.motors:
-        return part_of(used, UNTOLD)
+        moved = rattle_rows(source.inputs, source.motors, context.geometry.wheel_radius)
+        return UNTOLD * rms(context.filtered(moved, source)[used, row])
     if source.channel is Channel.DYNAMIC:
-        return part_of(used, SHAKEN) if source.travels and source.rattles.any() else 0.0
-    return tolerated_creep(source, source.coordinates[row], geometry)
+        return SHAKEN * rms(target[used]) if source.rattles.any() else 0.0
+    return tolerated_creep(source, source.coordinates[row], context.geometry)
 
 
 def _creep(source: Source, context: Context) -> Array:

@@ -115,8 +115,8 @@ def channel_gaps(
     processing = Processing()
 
     def left_by(model: ExtendedModel, some: Sequence[Record]) -> list[Series]:
-        found = [s for record in some for s in sources_of(record, vehicle.geometry, tuple(ROWS), processing)]
-        sources = [source.as_recorded() for source in found if not source.motors]
+        steps, lengths = tuple(ROWS), vehicle.geometry
+        sources = [s for record in some for s in sources_of(record, lengths, steps, processing, as_recorded=True)]
         return list(_series(sources, vehicle, model, processing))
 
     first, second = left_by(before, records), left_by(after, records)

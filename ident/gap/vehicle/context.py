@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 PRIOR_WEIGHT: Final = 1e-4
 """Of the vehicle file's guesses against the rows, per unit-norm column: only what no row shows is taken from them."""
 
+HELD: Final = 1.0
+"""The same of a parameter that stays at the guess."""
+
 FORMULAS_KEPT: Final = 4
 """Libraries of causes, and sets of given effects, whose generated formulas a process keeps."""
 
@@ -124,9 +127,9 @@ def fitted_parameters(sources: Sequence[Source], vehicle: VehicleDescription, co
     something is wrong with them: a gear that gives way made it 40 % too large. Wheels in the air show it.
     """
     prior = vehicle.prior.values
-    guessed = np.full(len(prior), PRIOR_WEIGHT)
+    weights = np.full(len(prior), PRIOR_WEIGHT)
     if not any(source.spec.mode is None for source in sources):
-        guessed[PARAMETER_NAMES.index("B_w")] = 1.0
+        weights[PARAMETER_NAMES.index("B_w")] = HELD
     normal, right = np.zeros((2, len(prior), len(prior)))[0], np.zeros(len(prior))
     for source in sources:
         if source.channel is Channel.DYNAMIC:
@@ -137,7 +140,7 @@ def fitted_parameters(sources: Sequence[Source], vehicle: VehicleDescription, co
                 normal += theta.T @ theta
                 right += theta.T @ (-kept[:, 0] - theta.sum(axis=1))
     scale = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
-    weighted = normal / np.outer(scale, scale) + np.diag(guessed)
+    weighted = normal / np.outer(scale, scale) + np.diag(weights)
     return np.asarray(prior * (1 + np.linalg.solve(weighted, right / scale) / scale))
 
 

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.gap.linear import rms
 from ident.gap.vehicle.rows import SLICES, in_coordinates
 from ident.gap.vehicle.sliding import traction, wheel_load
 from ident.gap.vehicle.sources import Source
@@ -46,22 +47,17 @@ Front and rear wheels are held parallel by a coupling that gives way itself, whi
 
 def granted_creep(mode: Mode | None, speed: Array) -> float:
     """What creep takes (rms) from contacts that roll at some speeds (..., 4) [m/s] in a mode [m/s]."""
-    return part_of(speed, TURNING if mode is Mode.ALIGNMENT else GRANTED)
+    return (TURNING if mode is Mode.ALIGNMENT else GRANTED) * rms(speed)
 
 
 def tolerated_creep(source: Source, coordinate: str, geometry: Geometry) -> float:
     """What a kinematic coordinate may lack beside creep in proportion to traction, rms [m/s]."""
-    return part_of(contact_speeds(source, geometry), LEFT_OVER.get(coordinate, TURNING))
+    return LEFT_OVER.get(coordinate, TURNING) * rms(contact_speeds(source, geometry))
 
 
 def contact_speeds(source: Source, geometry: Geometry) -> Array:
     """At which the wheels roll in the moving rows of a kinematic source (N, 4) [m/s]."""
     return np.asarray(geometry.wheel_radius * source.inputs[source.moving[0], SLICES["beta_rate"]])
-
-
-def part_of(values: Array, part: float) -> float:
-    """A part of the rms of some values, in their unit; nothing of none."""
-    return part * float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
 def creep_columns(inputs: Array, source: Source, setting: Setting) -> Array:

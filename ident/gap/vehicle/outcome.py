@@ -55,7 +55,7 @@ def outcomes(source: Source, model: ExtendedModel, geometry: Geometry) -> list[O
     starts, repeat, place = _starts(source, length)
     if not len(starts):
         return []
-    inputs = without_encoder_errors(source.recorded, model, source.sample_time)[starts[:, None] + np.arange(length)]
+    inputs = without_encoder_errors(source.inputs, model, source.sample_time)[starts[:, None] + np.arange(length)]
     read = Readings(inputs[..., SLICES["alpha_rate"]], inputs[..., SLICES["beta_rate"]])
     recorded = _velocities(source, inputs, read, geometry)
     start = Motion(

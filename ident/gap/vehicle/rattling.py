@@ -6,7 +6,9 @@ the steering loose. So the rolling rows of such a drive say nothing, and that wh
 What they lose stands above their bandwidth: β, what the motor moves beyond what the others say of its wheel, is there
 what its gear gives way by, under a load that is known. That is a row of its own, made slow by weighing it with itself:
 
-    R <(β_f - twist_f) β_f / |β_f|> = 0,    x_f = x above `BAND`, |β_f| its rms, <.> what passes the filter of all rows.
+    R <(β_f - twist_f) β_f / |β_f|> = 0,
+
+x_f being x above `BAND`, |β_f| the rms of the motor there, <.> what passes the filter of all rows.
 """
 
 from __future__ import annotations

@@ -61,8 +61,8 @@ _ENDS: Final = np.cumsum(list(_SIZES.values())).tolist()
 SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS, strict=True)}
 """What was measured, as columns of one array; `twist` is that of the two steering couplings.
 
-`beta` is the angle of a wheel. Motors turn as their wheels do until a cause or the others say how those roll, but for
-`motor_acceleration`, which stays as it was measured.
+`beta` is what the encoder of a motor reads, at the wheel; its derivatives are those of the wheel once that is made to
+roll as the others say, and `motor_acceleration` stays that of the motor.
 
 `hammer` [-] and `rattle` [rad] are zero but where a motor rattles in its gear (`ident.gap.vehicle.rattling`).
 """

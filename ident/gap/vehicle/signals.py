@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ident.errors import RecordError
 from ident.estimate.filters import FILTER_ORDER, Processing, zero_phase
-from ident.gap.vehicle.derivatives import accelerations, rates
+from ident.gap.derivatives import derivative, second_derivative
 from ident.gap.vehicle.rows import INPUTS, SLICES
 from ident.records.record import Record, Segment
 from ident.vehicle import kinematics
@@ -107,11 +107,11 @@ def _signals(segment: Segment, source: str, processing: Processing) -> Signals:
         record=source,
         heading=np.zeros(len(segment)),
         alpha=alpha,
-        alpha_rate=rates(alpha, dt),
-        alpha_acceleration=accelerations(alpha, dt),
+        alpha_rate=derivative(alpha, dt),
+        alpha_acceleration=second_derivative(alpha, dt),
         beta=beta,
-        beta_rate=rates(beta, dt),
-        beta_acceleration=accelerations(beta, dt),
+        beta_rate=derivative(beta, dt),
+        beta_acceleration=second_derivative(beta, dt),
         torques=segment.motor_torques,
     )
 
@@ -131,11 +131,6 @@ def decimation(segment: Segment, cutoff: float) -> int:
     starts = [int(np.argmax(segment.period == number)) for number in segment.periods]
     gaps = [*lengths, *np.diff(starts)]
     return next(factor for factor in range(most, 0, -1) if all(gap % factor == 0 for gap in gaps))
-
-
-def filtered(values: Array, cutoff: float, sample_time: float, factor: int) -> Array:
-    """Columns (N, ...) through the zero-phase filter, every `factor`-th row of them."""
-    return zero_phase(values, cutoff, sample_time)[::factor]
 
 
 def shifted(values: Array, delay: float, sample_time: float) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.estimate.filters import zero_phase
-from ident.gap.vehicle.derivatives import rates
+from ident.gap.derivatives import derivative
 from ident.gap.vehicle.rattling import BAND
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.transforms import LOAD_CUTOFF, Setting, contact_force
@@ -133,9 +133,9 @@ def traction(inputs: Array, wheel: int, setting: Setting) -> Array:
     return zero_phase(contact_force(inputs, wheel, setting), LOAD_CUTOFF, setting.sample_time)
 
 
-def ahead_of_others(inputs: Array, geometry: Geometry, sample_time: float, without: Sequence[int] = ()) -> Array:
-    """Speed (N, 4) [m/s] that the wheels run ahead of the floor, its twist by odometry without those of `without`."""
-    return zero_phase(_odometry(inputs, geometry, without)[0], LOAD_CUTOFF, sample_time)
+def ahead_of_others(inputs: Array, geometry: Geometry, sample_time: float) -> Array:
+    """Speed (N, 4) [m/s] that the wheels run ahead of the floor, its twist by odometry of them all."""
+    return zero_phase(_odometry(inputs, geometry, ())[0], LOAD_CUTOFF, sample_time)
 
 
 def ahead_of_the_rest(inputs: Array, geometry: Geometry, sample_time: float) -> Array:
@@ -200,7 +200,7 @@ def rolled_with_others(inputs: Array, wheels: Sequence[int], geometry: Geometry,
     changed = inputs.copy()
     own = inputs[:, SLICES["beta_rate"]][:, wheels]
     ahead = zero_phase(own - rolling_rates(inputs, wheels, geometry), BAND, sample_time)
-    for name, change in (("beta_rate", ahead), ("beta_acceleration", rates(ahead, sample_time))):
+    for name, change in (("beta_rate", ahead), ("beta_acceleration", derivative(ahead, sample_time))):
         changed[:, [SLICES[name].start + wheel for wheel in wheels]] -= change
     return changed
 
@@ -213,8 +213,9 @@ def rolling_rates(inputs: Array, wheels: Sequence[int], geometry: Geometry) -> A
 
 def _roll(inputs: Array, wheel: int, ahead: Array, setting: Setting) -> None:
     """Take `ahead` (N,) [rad/s] off a wheel, and off its drive what it took."""
-    more = rates(ahead, setting.sample_time)
+    more = derivative(ahead, setting.sample_time)
     inputs[:, SLICES["beta_rate"].start + wheel] -= ahead
-    inputs[:, SLICES["beta_acceleration"].start + wheel] -= more
+    for name in ("beta_acceleration", "motor_acceleration"):
+        inputs[:, SLICES[name].start + wheel] -= more
     torque = setting["d_vw"] * ahead + setting["B_w"] * more
     inputs[:, SLICES["torques"].start + wheel] -= torque / setting.geometry.gear_ratio

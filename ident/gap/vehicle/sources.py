@@ -50,13 +50,11 @@ class Source:
         step: the segment's own name.
         spec: rows that the step has.
         inputs: (M, INPUTS) at a rate that the smoothed signals allow; wheels whose motors rattle roll as the others do.
-        recorded: the same as it was measured.
         sample_time: of them [s].
         factor: every how manieth becomes a row of a block.
-        moving: (M,) rows to be used.
+        moving: rows to be used (M,), a mask for each of its coordinates.
         period: (M,).
         record: for messages.
-        rolling: (M,) rows that roll, were no motor to rattle.
         rattles: (M, 4) where the motor of each wheel rattles in its gear.
         motors: wheels whose motors rattle, if the rows are those of these motors instead of what rolls.
     """
@@ -65,13 +63,11 @@ class Source:
     step: str
     spec: RowsOfStep
     inputs: Array
-    recorded: Array
     sample_time: float
     factor: int
     moving: tuple[NDArray[np.bool_], ...]
     period: NDArray[np.int64]
     record: str
-    rolling: NDArray[np.bool_]
     rattles: NDArray[np.bool_]
     motors: tuple[int, ...] = ()
 
@@ -92,14 +88,18 @@ class Source:
         """Whether its rows are those of rolling wheels that travel."""
         return self.channel is Channel.KINEMATIC and self.travels and not self.motors
 
-    def as_recorded(self) -> Source:
-        """The same as if no motor rattled."""
-        moving = (self.rolling,) * len(self.coordinates) if self.channel is Channel.KINEMATIC else self.moving
-        return replace(self, inputs=self.recorded, rattles=np.zeros_like(self.rattles), moving=moving)
 
+def sources_of(
+    record: Record, geometry: Geometry, steps: Sequence[Step], processing: Processing, *, as_recorded: bool = False
+) -> list[Source]:
+    """Rows of a record that belong to the steps; of what does not move or says nothing there are none.
 
-def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], processing: Processing) -> list[Source]:
-    """Rows of a record that belong to the steps; of those in which nothing moves or rattles there are none.
+    Args:
+        record: of the vehicle.
+        geometry: its lengths.
+        steps: whose rows are wanted, variants of them included.
+        processing: filters and thresholds.
+        as_recorded: whether all is taken as it was measured, motors that rattle too.
 
     Raises:
         RecordError: it has none of the steps, or moves in none of them.
@@ -108,7 +108,7 @@ def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], proces
         source
         for signals in signals_of(record, geometry, processing)
         if (spec := _spec(signals.segment.step, steps)) is not None
-        for source in _sources(signals, spec, geometry, processing)
+        for source in _sources(signals, spec, geometry, processing, as_recorded)
     ]
     if not found:
         raise RecordError(
@@ -120,7 +120,7 @@ def sources_of(record: Record, geometry: Geometry, steps: Sequence[Step], proces
             f"{record.source} does not move in any step of a diagnosis.",
             "Record a drive: angles of wheels and steering must change.",
         )
-    return [source for source in found if source.rattles.any() or any(mask.any() for mask in source.moving)]
+    return [source for source in found if any(mask.any() for mask in source.moving)]
 
 
 def processing_of(records: Sequence[Record]) -> Processing:
@@ -135,7 +135,9 @@ def _spec(step: str, steps: Sequence[Step]) -> RowsOfStep | None:
     return ROWS[base] if base is not None and base in steps else None
 
 
-def _sources(signals: Signals, spec: RowsOfStep, geometry: Geometry, processing: Processing) -> Iterable[Source]:
+def _sources(
+    signals: Signals, spec: RowsOfStep, geometry: Geometry, processing: Processing, as_recorded: bool
+) -> Iterable[Source]:
     segment = signals.segment
     factor = decimation(segment, processing.cutoff)
     most = max(1, int(np.pi / (OVERSAMPLED * processing.signal_cutoff * segment.sample_time)))
@@ -145,41 +147,38 @@ def _sources(signals: Signals, spec: RowsOfStep, geometry: Geometry, processing:
         recorded[:, rows.SLICES["torques"]], processing.signal_cutoff, segment.sample_time
     )
     rms, rattles = rattling(signals.beta, processing, segment.sample_time)
-    if spec.mode is None:
-        # No floor is hammered, and nothing rolls.
+    if as_recorded or spec.mode is None:
+        # In the air no floor is hammered, and nothing rolls.
         rattles[:] = False
     inputs = _hammered(recorded, rms, rattles, geometry, segment.sample_time) if rattles.any() else recorded
-    rolling = _rolling(signals, spec, processing)[::stride]
     common = {
         "step": segment.step,
         "spec": spec,
         "inputs": inputs[::stride],
-        "recorded": recorded[::stride],
         "sample_time": segment.sample_time * stride,
         "factor": factor // stride,
         "period": segment.period[::stride],
         "record": signals.record,
-        "rolling": rolling,
         "rattles": rattles[::stride],
     }
     dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
-    if names:
-        quiet = rolling & ~rattles.any()
-        rolled = Source(channel=Channel.KINEMATIC, moving=(quiet,) * len(names), **common)  # type: ignore[arg-type]
-        yield rolled
-        if rolled.rolls and rattles.any():
-            yield _of_motors(rolled, processing)
+    if rattles.any():
+        motors = tuple(np.flatnonzero(rattles.any(axis=0)).tolist())
+        inside = _inside(rattles, processing, segment.sample_time)
+        shaking = tuple(inside[::stride, wheel] for wheel in motors)
+        yield Source(channel=Channel.KINEMATIC, moving=shaking, motors=motors, **common)  # type: ignore[arg-type]
+    elif names:
+        rolling = _rolling(signals, spec, processing)[::stride]
+        yield Source(channel=Channel.KINEMATIC, moving=(rolling,) * len(names), **common)  # type: ignore[arg-type]
 
 
-def _of_motors(rolled: Source, processing: Processing) -> Source:
-    """Rows of the motors that rattle while wheels roll, away from the ends of the filter."""
-    ends = round(processing.guard / rolled.sample_time)
-    inside = np.arange(len(rolled.rattles)) >= ends
-    inside &= inside[::-1]
-    motors = tuple(np.flatnonzero(rolled.rattles.any(axis=0)).tolist())
-    return replace(rolled, motors=motors, moving=tuple(rolled.rattles[:, wheel] & inside for wheel in motors))
+def _inside(rattles: NDArray[np.bool_], processing: Processing, sample_time: float) -> NDArray[np.bool_]:
+    """Where motors rattle (N, 4), away from the ends of the filter."""
+    ends, found = round(processing.guard / sample_time), rattles.copy()
+    found[:ends] = found[len(found) - ends :] = False
+    return found
 
 
 def _hammered(recorded: Array, rms: Array, rattles: NDArray[np.bool_], geometry: Geometry, sample_time: float) -> Array:

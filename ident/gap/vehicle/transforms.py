@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.estimate.filters import zero_phase
-from ident.gap.vehicle.derivatives import accelerations, rates
+from ident.gap.derivatives import derivative, second_derivative
 from ident.gap.vehicle.rattling import above_band
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.signals import shifted
@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 LOAD_CUTOFF: Final = 150.0
 """Of the filter on the torque that twists a coupling [rad/s], which is differentiated twice."""
+
+_MOTION: Final = ("beta", "beta_rate", "beta_acceleration", "motor_acceleration")
 
 CONTACT_SHARE: Final = 0.25
 """Load at which tooth flanks are taken to touch, in units of the joint's Coulomb friction: play is crossed below."""
@@ -156,8 +158,8 @@ def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> 
         # The wheel of a motor that rattles has been made to roll as the others say: what is slow is gone already.
         twist = above_band(twist, setting.sample_time)
         changed[:, SLICES["rattle"].start + wheel] -= hammer * twist
-    rate, acceleration = (each(twist, setting.sample_time) for each in (rates, accelerations))
-    for name, change in (("beta", twist), ("beta_rate", rate), ("beta_acceleration", acceleration)):
+    rate, acceleration = derivative(twist, setting.sample_time), second_derivative(twist, setting.sample_time)
+    for name, change in zip(_MOTION, (twist, rate, acceleration, acceleration), strict=True):
         changed[:, SLICES[name].start + wheel] -= change
     own = MOTOR_SHARE * setting["B_w"] / setting.geometry.gear_ratio
     changed[:, SLICES["torques"].start + wheel] -= own * acceleration
@@ -167,7 +169,7 @@ def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> 
 def _rear_behind_front(inputs: Array, side: int, twist: Array, setting: Setting) -> Array:
     changed, twist = inputs.copy(), zero_phase(twist, LOAD_CUTOFF, setting.sample_time)
     changed[:, SLICES["twist"].start + side] += twist
-    changed[:, SLICES["twist_rate"].start + side] += rates(twist, setting.sample_time)
+    changed[:, SLICES["twist_rate"].start + side] += derivative(twist, setting.sample_time)
     return changed
 
 

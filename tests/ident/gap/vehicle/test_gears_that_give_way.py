@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
-from ident.gap.vehicle.derivatives import accelerations, rates
+from ident.gap.derivatives import derivative, second_derivative
 from ident.gap.vehicle.rows import INPUTS, SLICES
 from ident.gap.vehicle.transforms import Setting, transform_cause
 from ident.vehicle.effects import EffectName
@@ -71,7 +71,7 @@ def slope(values: Array) -> Array:
 def inputs_of(ride: Ride) -> Array:
     inputs = np.zeros((len(ride.torque), INPUTS))
     inputs[:, SLICES["torques"].start] = ride.torque / GEOMETRY.gear_ratio
-    rate, acceleration = rates(ride.motor, DT), accelerations(ride.motor, DT)
+    rate, acceleration = derivative(ride.motor, DT), second_derivative(ride.motor, DT)
     for name, values in zip(
         ("beta", "beta_rate", "beta_acceleration", "motor_acceleration"),
         (ride.motor, rate, acceleration, acceleration),
@@ -102,6 +102,20 @@ def test_the_wheel_is_found_behind_its_motor(
     assert np.std(left) < 0.3 * np.std(truth)
     share = truth @ (truth - left) / (truth @ truth)
     assert share == pytest.approx(1.0, abs=0.08)
+
+
+@pytest.mark.parametrize("hammered", [False, True])
+@pytest.mark.parametrize(("name", "sizes"), [(EffectName.ELASTICITY, (1.5e-4,)), (EffectName.BACKLASH, (1e-3, 3e-5))])
+def test_half_of_a_gear_taken_out_twice_is_all_of_it(
+    name: EffectName, sizes: tuple[float, ...], hammered: bool
+) -> None:
+    """The load of the gear stays what it was, whatever part of its twist is known already."""
+    inputs, setting = inputs_of(ride(1e-3, 3e-5)), Setting(GEOMETRY, KNOWN, DT)
+    inputs[:, SLICES["hammer"].start] = float(hammered)
+    cause, half = transform_cause(name, "drive_fl"), np.array(sizes) / 2
+    once = cause.without(inputs, 2 * half, setting)
+    twice = cause.without(cause.without(inputs, half, setting), half, setting)
+    assert np.std(twice - once, axis=0) == pytest.approx(np.zeros(INPUTS), abs=1e-9 * np.abs(inputs).max())
 
 
 def test_what_accelerates_the_motor_beyond_its_wheel_does_not_reach_the_wheel() -> None:
