@@ -110,7 +110,7 @@ def _tolerance(source: Source, row: int, target: Array, context: Context) -> flo
         moved = rattle_rows(source.inputs, source.motors, context.geometry.wheel_radius)
         return UNTOLD * rms(context.filtered(moved, source)[used, row])
     if source.channel is Channel.DYNAMIC:
-        return SHAKEN * rms(target[used]) if source.rattles.any() else 0.0
+        return SHAKEN * rms(target[used]) if source.travels and source.rattles.any() else 0.0
     return tolerated_creep(source, source.coordinates[row], context.geometry)
 
 

@@ -165,6 +165,9 @@ def _sources(
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
     if rattles.any():
+        if spec.mode is Mode.ALIGNMENT:
+            # The steered unit swings back against the motor, which no other wheel shows.
+            return
         motors = tuple(np.flatnonzero(rattles.any(axis=0)).tolist())
         inside = _inside(rattles, processing, segment.sample_time)
         shaking = tuple(inside[::stride, wheel] for wheel in motors)

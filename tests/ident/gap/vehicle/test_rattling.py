@@ -209,9 +209,7 @@ def test_what_is_tolerated_of_a_motion_does_not_shrink_with_what_is_known_of_it(
     assert left < after.tolerance < 0.05 * moved
 
 
-def test_a_motor_that_rings_while_its_side_is_steered_has_rows_too(prototype: VehicleDescription) -> None:
+def test_a_motor_that_rings_while_its_side_is_steered_leaves_the_forces_alone(prototype: VehicleDescription) -> None:
+    """What swings back is the steered unit, by more than any other wheel shows."""
     record, _ = ringing(Step.STEERING_LEFT, 0, 35.0, prototype)
-    blocks = {block.coordinate: block for block in build_problem([record], prototype).blocks}
-    assert set(blocks) == {"alpha_l", "rattle_fl"}
-    assert blocks["rattle_fl"].moving.any()
-    assert blocks["alpha_l"].tolerance > 0
+    assert {block.coordinate for block in build_problem([record], prototype).blocks} == {"alpha_l"}
