@@ -164,17 +164,15 @@ def _sources(
     dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
-    if rattles.any():
-        if spec.mode is Mode.ALIGNMENT:
-            # The steered unit swings back against the motor, which no other wheel shows.
-            return
+    if names and not rattles.any():
+        rolling = _rolling(signals, spec, processing)[::stride]
+        yield Source(channel=Channel.KINEMATIC, moving=(rolling,) * len(names), **common)  # type: ignore[arg-type]
+    if rattles.any() and spec.mode is not Mode.ALIGNMENT:
+        # While steering at standstill the unit swings back against the motor, which no other wheel shows.
         motors = tuple(np.flatnonzero(rattles.any(axis=0)).tolist())
         inside = _inside(rattles, processing, segment.sample_time)
         shaking = tuple(inside[::stride, wheel] for wheel in motors)
         yield Source(channel=Channel.KINEMATIC, moving=shaking, motors=motors, **common)  # type: ignore[arg-type]
-    elif names:
-        rolling = _rolling(signals, spec, processing)[::stride]
-        yield Source(channel=Channel.KINEMATIC, moving=(rolling,) * len(names), **common)  # type: ignore[arg-type]
 
 
 def _inside(rattles: NDArray[np.bool_], processing: Processing, sample_time: float) -> NDArray[np.bool_]:

@@ -13,8 +13,10 @@ from ident.estimate.equations import usable_equations
 from ident.estimate.filters import Processing
 from ident.gap.problem import Block, Channel, Problem
 from ident.gap.vehicle.build import build_problem
-from ident.gap.vehicle.ideal import DIAGNOSTIC, FOUR, ideal_record
-from ident.records.record import Record, Segment
+from ident.gap.vehicle.context import make_context
+from ident.gap.vehicle.ideal import DIAGNOSTIC, FOUR, Drive, ideal_record
+from ident.gap.vehicle.sources import DIAGNOSED, sources_of
+from ident.records.record import Record, Segment, Step
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EffectName, make_effect
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
@@ -177,3 +179,22 @@ def test_exact_contributions_begin_as_their_columns(vehicle: VehicleDescription)
             expected = np.zeros(1) if column is None else column @ small
             scale = 1e-12 + np.abs(expected).max()
             assert np.allclose((0.0 if change is None else change) / scale, expected / scale, atol=1e-3), candidate.key
+
+
+@pytest.mark.parametrize("lifted", [False, True])
+def test_forces_inside_take_the_inertia_of_wheels_from_those_that_turn_in_the_air(
+    lifted: bool, vehicle: VehicleDescription
+) -> None:
+    """One motor swings against its wheel, which rows on the floor would explain by any inertia."""
+    record = ideal_record([*FOUR, Drive(Step.WHEEL_LIFTED)] if lifted else FOUR, vehicle)
+
+    def swinging(segment: Segment) -> Segment:
+        swing = 2e-3 * np.sin(40.0 * segment.time) * (segment.step == Step.STRAIGHT)
+        return replace(segment, wheel_angles=segment.wheel_angles + swing[:, None] * np.eye(4)[0])
+
+    guess = 1.2 * vehicle.prior.values
+    wrong = replace(vehicle, prior=replace(vehicle.prior, values=guess))
+    sources = sources_of(flawed(record, swinging), wrong.geometry, DIAGNOSED, Processing())
+    found = make_context(sources, wrong, None, (), Processing()).known[PARAMETER_NAMES.index("B_w")]
+    truth = vehicle.prior.values[-1] if lifted else guess[-1]
+    assert found == pytest.approx(truth, rel=0.06)
