@@ -40,7 +40,7 @@ UNTOLD: Final = 0.03
 """Part of its motion that may stay unexplained: in flight no load tells where the motor is."""
 
 SHAKEN: Final = 0.01
-"""Part of the generalized forces that may stay unexplained where wheels slide: hammered loose, or askew [-]."""
+"""Part of the generalized forces of such a drive that may stay unexplained: wheels that slide push each other [-]."""
 
 
 def above_band(values: Array, sample_time: float) -> Array:
