@@ -36,7 +36,7 @@ On the emulator they run ahead of the others by up to 2 mm/s from there on, by 0
 """
 
 PUSHED: Final = 4e-3
-"""Part of the generalized force that may stay unexplained then: a drag of 6 N s²/m² on the prototype, of 1 N rms [-]."""
+"""Part of the generalized force that may stay unexplained then [-]: a drag of 6 N s²/m² on the prototype, 1 N rms."""
 
 
 def stands_askew(candidate: Candidate) -> bool:
