@@ -3,9 +3,6 @@
 While all of them roll, what an askew wheel does to the rolling rows is a matter of geometry. Once one slides, forces
 decide (see `ident.gap.vehicle.sliding`), and geometry says nothing. So the kinematic columns of such a cause end where
 a wheel slides, and the sliding itself, as it was found, may come along with it.
-
-An alignment leaves wheels askew too, by an increment or two, as their encoders say. Beyond `PUSHING` they push each
-other aside until they slide a little all the time: the vehicle then accelerates not quite as its wheels do.
 """
 
 from __future__ import annotations
@@ -18,25 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.gap.problem import Candidate, Variant
-from ident.gap.vehicle.rows import SLICES
-from ident.vehicle import kinematics
 from ident.vehicle.effects import STEERING, EffectName
-from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 ASKEW: Final = (EffectName.STEERING_OFFSET, EffectName.ELASTICITY, EffectName.BACKLASH)
 """Causes that leave the wheels of a vehicle askew, at the places of `STEERING`."""
-
-PUSHING: Final = 1e-4
-"""Angle, of `askew_angle`, from which wheels push each other aside until they slide [rad].
-
-On the emulator they run ahead of the others by up to 2 mm/s from there on, by 0.4 mm/s below.
-"""
-
-PUSHED: Final = 4e-3
-"""Part of the generalized force that may stay unexplained then [-]: a drag of 6 N s²/m² on the prototype, 1 N rms."""
 
 
 def stands_askew(candidate: Candidate) -> bool:
@@ -99,17 +84,3 @@ def _masked(series: Array, rolling: Mask | None) -> Array:
     if rolling is None:
         return series
     return series * (rolling if series.ndim == 1 else rolling[:, None])
-
-
-def askew_angle(inputs: Array, geometry: Geometry) -> float:
-    """Angle by which wheels point beside where the vehicle goes, rms over the wheels of its mean while they roll [rad].
-
-    `inputs` (N, INPUTS) are the signals of a drive.
-    """
-    alpha, alpha_rate, beta_rate = (inputs[:, SLICES[name]] for name in ("alpha", "alpha_rate", "beta_rate"))
-    twist = kinematics.odometry(alpha, alpha_rate, beta_rate, geometry)
-    across = kinematics.constraint_matrix(alpha, geometry)[:, :4]
-    slip = np.einsum("nij,nj->ni", across, np.hstack([twist, alpha_rate, beta_rate]))
-    speed = geometry.wheel_radius * beta_rate
-    angles = np.sum(slip * speed, axis=0) / np.maximum(np.sum(speed**2, axis=0), np.finfo(float).tiny)
-    return float(np.sqrt(np.mean(angles**2)))

@@ -12,7 +12,6 @@ from ident.estimate.filters import Processing
 from ident.gap.linear import rms
 from ident.gap.problem import Block, Channel, Nominal, Problem
 from ident.gap.vehicle import rows
-from ident.gap.vehicle.askew import PUSHED, PUSHING, askew_angle
 from ident.gap.vehicle.candidates import candidate_of, causes_of, seen_together, slid_by_any
 from ident.gap.vehicle.context import MODEL_COLUMNS, Context, make_context, table_of
 from ident.gap.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
@@ -111,17 +110,8 @@ def _tolerance(source: Source, row: int, target: Array, context: Context) -> flo
         moved = rattle_rows(source.inputs, source.motors, context.geometry.wheel_radius)
         return UNTOLD * rms(context.filtered(moved, source)[used, row])
     if source.channel is Channel.DYNAMIC:
-        return _slid_part(source, context) * rms(target[used])
+        return SHAKEN * rms(target[used]) if source.travels and source.rattles.any() else 0.0
     return tolerated_creep(source, source.coordinates[row], context.geometry)
-
-
-def _slid_part(source: Source, context: Context) -> float:
-    """Part of the generalized force that wheels which slide may take: one hammers the floor, or they stand askew."""
-    if not source.travels:
-        return 0.0
-    if source.rattles.any():
-        return SHAKEN
-    return PUSHED if askew_angle(source.inputs, context.geometry) > PUSHING else 0.0
 
 
 def _creep(source: Source, context: Context) -> Array:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from ident.estimate.filters import Processing, differentiate, zero_phase
 from ident.gap.problem import Candidate, Channel, Variant
-from ident.gap.vehicle.askew import PUSHING, askew_angle, beside_sliding
-from ident.gap.vehicle.build import build_problem
+from ident.gap.vehicle.askew import beside_sliding
 from ident.gap.vehicle.ideal import Drive, ideal_record
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.sliding import slides_alone, sliding_cause, sliding_times, traction
@@ -153,18 +150,3 @@ def test_what_stands_askew_says_nothing_of_rows_in_which_a_wheel_slides() -> Non
     (exact, _) = beside.contribution(values, np.zeros(11))
     assert exact is not None
     assert exact == pytest.approx(columns @ values)
-
-
-@pytest.mark.parametrize(("toe", "pushing"), [(0.0, False), (5e-5, False), (-1.5e-4, True), (2e-4, True)])
-def test_wheels_that_point_to_different_centres_push_each_other(
-    toe: float, pushing: bool, prototype: VehicleDescription
-) -> None:
-    """Then a part of the generalized force is tolerated."""
-    record = ideal_record([Drive(Step.STRAIGHT)], prototype)
-    (segment,) = record.segments
-    turned = replace(segment, steering_angles=segment.steering_angles + toe * np.array([1.0, -1.0]))
-    record = replace(record, segments=[turned])
-    source = sources_of(record, prototype.geometry, [Step.STRAIGHT], Processing())[0]
-    assert askew_angle(source.inputs, prototype.geometry) == pytest.approx(abs(toe), rel=0.2, abs=1e-6)
-    forces = next(block for block in build_problem([record], prototype).blocks if block.channel is Channel.DYNAMIC)
-    assert (forces.tolerance > 0) == pushing == (abs(toe) > PUSHING)
