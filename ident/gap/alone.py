@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.gap.findings import Findings
-from ident.gap.linear import least_squares
+from ident.gap.linear import least_squares, rms
 from ident.gap.problem import Problem
 from ident.gap.remainder import held_out_gap, noise_floors
 from ident.gap.rows import Column, Rows, make_rows
@@ -125,5 +125,5 @@ def _weights(rows: Rows, left: Array) -> Array:
     weights = np.ones(len(rows))
     for group in np.unique(rows.group):
         place = rows.group == group
-        weights[place] = 1 / max(float(np.sqrt(np.mean(left[place] ** 2))), np.finfo(float).tiny)
+        weights[place] = 1 / max(rms(left[place]), np.finfo(float).tiny)
     return weights

@@ -15,7 +15,7 @@ from ident.gap.diagnosis import Gap, Verdict
 from ident.gap.findings import Cause, Findings
 from ident.gap.generic import SmoothFunction
 from ident.gap.limits import Limits
-from ident.gap.linear import least_squares
+from ident.gap.linear import least_squares, rms
 from ident.gap.probability import calibration, rank
 from ident.gap.problem import Problem
 from ident.gap.refit import refit
@@ -290,6 +290,6 @@ def _weights(regression: Regression, found: Found) -> Whitener:
     design = np.hstack([rows.baseline, regression.columns_of(found.variants)])
     white = found.whitener.apply(rows, np.column_stack([design, rows.target]))
     residual = rows.target - design @ least_squares(white[:, :-1], white[:, -1])
-    deviations = [float(np.sqrt(np.mean(residual[rows.group == group] ** 2))) for group in np.unique(rows.group)]
+    deviations = [rms(residual[rows.group == group]) for group in np.unique(rows.group)]
     tiny = np.finfo(float).tiny
     return Whitener(tuple(Predictor((np.zeros(0),), np.array([max(one, tiny)])) for one in deviations))

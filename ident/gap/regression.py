@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.gap.evidence import Directions, Evidence, White, directions, gather
-from ident.gap.linear import least_squares
+from ident.gap.linear import least_squares, rms
 from ident.gap.problem import Problem
 from ident.gap.rows import Rows
 from ident.gap.whitening import ORDER, Colour, Whitener, colours_of_repeats, fit_whitener
@@ -200,7 +200,7 @@ class Regression:
             place = self.rows.group == group
             baseline, target = self.rows.baseline[place], self.rows.target[place]
             left = target - baseline @ least_squares(baseline, target)
-            size = float(np.sqrt(np.mean(left**2)))
+            size = rms(left)
             scale[place] = size if size > SILENT else 1.0
         return scale
 

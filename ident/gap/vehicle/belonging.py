@@ -9,6 +9,7 @@ import numpy as np
 
 from ident.campaign.steps import EXCITATIONS
 from ident.errors import RecordError
+from ident.gap.linear import rms
 from ident.records.record import Record, Segment, Step, base_step
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.modes import Mode
@@ -58,7 +59,7 @@ def _of_posture(segment: Segment, expected: Sequence[float], moved: str) -> str:
 def _of_rolling(segment: Segment, geometry: Geometry) -> str:
     side = 0 if base_step(segment.step) is Step.STEERING_LEFT else 1
     angle = segment.steering_angles[:, side] - segment.steering_angles[:, side].mean()
-    if float(np.sqrt(np.mean(angle**2))) < TURNED:
+    if rms(angle) < TURNED:
         return ""
     wheels = segment.wheel_angles[:, 2 * side : 2 * side + 2]
     ratios = (wheels - wheels.mean(axis=0)).T @ angle / float(angle @ angle)

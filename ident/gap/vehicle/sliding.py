@@ -192,14 +192,13 @@ def _surely(forward: Array, speed: Array) -> Mask:
     return np.asarray((speed > MOVING) & (forward > SLIDING * speed) & (forward > LEAST), dtype=np.bool_)
 
 
-def rolled_with_others(inputs: Array, wheels: Sequence[int], geometry: Geometry, sample_time: float) -> Array:
+def rolled_with_others(inputs: Array, wheels: Sequence[int], rolled: Array, sample_time: float) -> Array:
     """Signals (N, INPUTS) as if some wheels rolled as the others say, as far as that is slow; their angles are kept.
 
-    So are the torques: what a wheel that hammers loses in sliding is not known.
+    So are the torques: what a wheel that hammers loses in sliding is not known. `rolled` are its `rolling_rates`.
     """
     changed = inputs.copy()
-    own = inputs[:, SLICES["beta_rate"]][:, wheels]
-    ahead = zero_phase(own - rolling_rates(inputs, wheels, geometry), BAND, sample_time)
+    ahead = zero_phase(inputs[:, SLICES["beta_rate"]][:, wheels] - rolled, BAND, sample_time)
     for name, change in (("beta_rate", ahead), ("beta_acceleration", derivative(ahead, sample_time))):
         changed[:, [SLICES[name].start + wheel for wheel in wheels]] -= change
     return changed

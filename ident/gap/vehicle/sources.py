@@ -185,8 +185,8 @@ def _inside(rattles: NDArray[np.bool_], processing: Processing, sample_time: flo
 def _hammered(recorded: Array, rms: Array, rattles: NDArray[np.bool_], geometry: Geometry, sample_time: float) -> Array:
     """Signals (N, INPUTS) with what motors do that rattle, and with wheels that roll in spite of it."""
     wheels = np.flatnonzero(rattles.any(axis=0)).tolist()
-    inputs = rolled_with_others(recorded, wheels, geometry, sample_time)
     rolled = rolling_rates(recorded, wheels, geometry)
+    inputs = rolled_with_others(recorded, wheels, rolled, sample_time)
     against = recorded[:, rows.SLICES["beta"]].copy()
     against[:, wheels] -= cumulative_trapezoid(rolled, dx=sample_time, axis=0, initial=0)
     moved = above_band(against, sample_time)

@@ -117,7 +117,7 @@ def test_a_wheel_made_to_roll_with_the_others_no_longer_runs_ahead(prototype: Ve
     inputs, dt = source.inputs.copy(), source.sample_time
     ahead = 0.02 * np.sin(2 * np.arange(len(inputs)) * dt)
     inputs[:, SLICES["beta_rate"].start + 1] += ahead / prototype.geometry.wheel_radius
-    found = rolled_with_others(inputs, [1], prototype.geometry, dt)
+    found = rolled_with_others(inputs, [1], rolling_rates(inputs, [1], prototype.geometry), dt)
     left = found[:, SLICES["beta_rate"].start + 1] - rolling_rates(found, [1], prototype.geometry)[:, 0]
     assert prototype.geometry.wheel_radius * np.abs(left).max() < 0.01 * np.abs(ahead).max()
     assert np.array_equal(found[:, SLICES["beta_rate"]][:, [0, 2, 3]], inputs[:, SLICES["beta_rate"]][:, [0, 2, 3]])
