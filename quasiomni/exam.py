@@ -44,6 +44,9 @@ def seal(
     none: Annotated[int, typer.Option(min=0, help="Cases without any.")] = _DEFAULT.none,
     unknown: Annotated[int, typer.Option(min=0, help="Cases with one the library lacks.")] = _DEFAULT.unknown,
     invisible: Annotated[int, typer.Option(min=0, help="Cases with one below the noise.")] = _DEFAULT.invisible,
+    excitations: Annotated[
+        int, typer.Option(min=1, help="Pairs of campaigns, to fit and to confirm, that the cases share.")
+    ] = _DEFAULT.excitations,
     sizes: Annotated[Path, typer.Option(help="Table of sizes.")] = SIZES_FILE,
     jobs: JobsOption = 2,
     scheduler: SchedulerOption = None,
@@ -52,7 +55,7 @@ def seal(
     load_emulation()
     from hil.exam.sealing import SealingOrder, seal
 
-    composition = Composition(effects, pairs, none, unknown, invisible)
+    composition = Composition(effects, pairs, none, unknown, invisible, excitations)
     order = SealingOrder(out, "prototype", composition, first_seed, jobs, scheduler)
     with _bar("sealing") as shown:
         sealed = seal(order, load_sizes(sizes), shown)

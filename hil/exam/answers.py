@@ -14,7 +14,7 @@ import numpy as np
 
 from hil.exam.cases import Case, Injected, Kind
 from hil.exam.folder import ExamFolder, open_answer, read_exam
-from hil.exam.identity import Identities, Identity, exam_identities
+from hil.exam.identity import Identity, exam_identities
 from hil.exam.statistics import Z95
 from ident.errors import UserError
 from ident.gap.vehicle.library import DRIFTS, SHAPES
@@ -263,8 +263,12 @@ def read_answers(folder: ExamFolder, *, removed: bool = False) -> list[Answer]:
     }
     if not said:
         raise UserError(f"{folder.path} holds no diagnoses.", "Diagnose first: quasiomni exam diagnose FOLDER.")
-    known: Identities = exam_identities(folder)
-    return [Answer(case, said[case.identifier], known.of_case(case)) for case in cases if case.identifier in said]
+    known = exam_identities(folder)
+    return [
+        Answer(case, said[case.identifier], known[case.excitation].of_case(case))
+        for case in cases
+        if case.identifier in said
+    ]
 
 
 def said_from(content: Mapping[str, Any]) -> Said:

@@ -58,6 +58,7 @@ class Case:
         effects: that the vehicle has.
         noise_units: size of each of them, zero without one.
         seed: of the noise while fitting; the next one while confirming.
+        excitation: number of the pair of campaigns that it drives.
     """
 
     identifier: str
@@ -65,6 +66,7 @@ class Case:
     effects: tuple[Injected, ...]
     noise_units: float
     seed: int
+    excitation: int
 
     def as_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -74,24 +76,30 @@ class Case:
             "effects": [vars(effect) for effect in self.effects],
             "noise_units": self.noise_units,
             "seed": self.seed,
+            "excitation": self.excitation,
         }
 
 
 def case_from_json(entry: dict[str, Any]) -> Case:
     """The case of `Case.as_json`."""
     effects = tuple(Injected(**effect) for effect in entry["effects"])
-    return Case(entry["identifier"], Kind(entry["kind"]), effects, entry["noise_units"], entry["seed"])
+    return Case(**{**entry, "kind": Kind(entry["kind"]), "effects": effects})
 
 
 @dataclass(frozen=True)
 class Composition:
-    """How many cases of each kind."""
+    """How many cases of each kind, and how many pairs of campaigns they share.
+
+    One excitation shows some effects better than another and leaves the wheels askew in its own way: rates of cases
+    that all drive the same one are those of that excitation.
+    """
 
     effects: int = 240
     pairs: int = 24
     none: int = 60
     unknown: int = 40
     invisible: int = 24
+    excitations: int = 24
 
     @property
     def total(self) -> int:
@@ -123,7 +131,8 @@ def draw_cases(table: SizeTable, composition: Composition, seed: int, generator:
     cases = []
     for number, (position, identifier) in enumerate(zip(order.tolist(), identifiers, strict=True)):
         kind, effects, noise_units = questions[position]
-        cases.append(Case(identifier, kind, effects, noise_units, seed + SEEDS_PER_CASE * number))
+        noise, excitation = seed + SEEDS_PER_CASE * number, number % composition.excitations
+        cases.append(Case(identifier, kind, effects, noise_units, noise, excitation))
     return cases
 
 

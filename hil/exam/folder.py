@@ -23,7 +23,7 @@ from typing import Any, Final
 from hil.exam.cases import Case, case_from_json
 from ident.errors import UserError
 
-SCHEMA: Final = "quasiomni.exam/1"
+SCHEMA: Final = "quasiomni.exam/2"
 RECORDS: Final = ("fit", "confirm")
 
 
@@ -81,21 +81,21 @@ class Exam:
     Attributes:
         prototype: of the emulator, by name.
         cycle: T_s [s].
-        plans: the two campaigns, as JSON text.
+        plans: the pairs of campaigns that the cases drive, as JSON texts.
         identifiers: of the cases, in shuffled order.
         answer_hash: SHA-256 of the sealed answer.
     """
 
     prototype: str
     cycle: float
-    plans: str
+    plans: tuple[str, ...]
     identifiers: tuple[str, ...]
     answer_hash: str
 
 
 def write_exam(folder: ExamFolder, exam: Exam) -> None:
     """Write the manifest."""
-    content = {"schema": SCHEMA, **vars(exam), "identifiers": list(exam.identifiers)}
+    content = {"schema": SCHEMA, **vars(exam)}
     write_atomically(folder.manifest, json.dumps(content, indent=1).encode())
 
 
@@ -103,7 +103,7 @@ def read_exam(folder: ExamFolder) -> Exam:
     """Read the manifest.
 
     Raises:
-        UserError: there is none.
+        UserError: there is none, or another version wrote it.
     """
     try:
         content: dict[str, Any] = json.loads(folder.manifest.read_text(encoding="utf-8"))
@@ -111,8 +111,12 @@ def read_exam(folder: ExamFolder) -> Exam:
         raise UserError(
             f"{folder.path} holds no exam: {error}.", "Seal one first: quasiomni exam seal --out FOLDER."
         ) from error
-    content.pop("schema")
-    return Exam(**{**content, "identifiers": tuple(content["identifiers"])})
+    if (schema := content.pop("schema", None)) != SCHEMA:
+        raise UserError(
+            f"{folder.manifest} has the schema {schema}, not {SCHEMA}.",
+            "Go on with the version that sealed it, or seal the exam again into another folder.",
+        )
+    return Exam(**{**content, "plans": tuple(content["plans"]), "identifiers": tuple(content["identifiers"])})
 
 
 def sealed(cases: Sequence[Case], salt: bytes) -> bytes:

@@ -92,12 +92,15 @@ class Identities:
         return tuple(self.of(effect) for effect in case.effects)
 
 
-def exam_identities(folder: ExamFolder) -> Identities:
-    """Identities in the two campaigns of an exam, from its plans, its vehicle and its model."""
+def exam_identities(folder: ExamFolder) -> tuple[Identities, ...]:
+    """Identities in every pair of campaigns of an exam, from its plans, its vehicle and its model."""
     exam, vehicle, model = read_exam(folder), load_vehicle(folder.vehicle), read_model(folder.model)
-    plans = plans_from_text(exam.plans, vehicle, exam.cycle)
-    records = [planned_record(plan, model.parameters) for plan in (plans.fit, plans.confirm)]
-    return identities(build_problem(records, vehicle, model.parameters, given=model.effects))
+    found = []
+    for text in exam.plans:
+        plans = plans_from_text(text, vehicle, exam.cycle)
+        records = [planned_record(plan, model.parameters) for plan in (plans.fit, plans.confirm)]
+        found.append(identities(build_problem(records, vehicle, model.parameters, given=model.effects)))
+    return tuple(found)
 
 
 def planned_record(plan: Plan, parameters: Parameters) -> Record:

@@ -1,4 +1,4 @@
-"""The two short campaigns of an exam case, planned once: one to fit, and another to confirm."""
+"""The two short campaigns of an exam case: one to fit, and another to confirm."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ CONFIRMING: Final = _shortened(
 
 @dataclass(frozen=True)
 class ExamPlans:
-    """What every case of an exam drives.
+    """What a case of an exam drives.
 
     Attributes:
         fit: the campaign that the diagnosis fits.

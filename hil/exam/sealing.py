@@ -78,13 +78,14 @@ def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
         UserError: the folder holds another exam.
     """
     folder = ExamFolder(order.out)
+    progress(0, order.composition.total)
     if not folder.manifest.is_file():
         _draw(folder, order, table)
     exam = read_exam(folder)
     cases = open_answer(folder, exam.answer_hash)
     _refuse_other(cases, exam, order)
     left = [case for case in cases if not _finished(folder, case.identifier)]
-    tasks = [(exam.plans, exam.prototype, exam.cycle, case) for case in left]
+    tasks = [(exam.plans[case.excitation], exam.prototype, exam.cycle, case) for case in left]
     done = len(cases) - len(left)
     progress(done, len(cases))
     for identifier, contents in run_all(drive_case, tasks, jobs=order.jobs, scheduler=order.scheduler):
@@ -128,7 +129,7 @@ def unlibraried_unit(name: str) -> str:
     return UNLIBRARIED[UnlibrariedName(name)].unit
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=32)
 def _plans(text: str, prototype: str, cycle: float) -> ExamPlans:
     return plans_from_text(text, load_vehicle(prototype), cycle)
 
@@ -137,20 +138,32 @@ def _draw(folder: ExamFolder, order: SealingOrder, table: SizeTable) -> None:
     """Everything but the records."""
     cycle = load_network(network_file_of(order.prototype)).cycle_period
     cases = draw_cases(table, order.composition, order.seed, np.random.default_rng(order.seed))
-    plans = plan_exam(load_vehicle(order.prototype), order.seed, cycle)
+    plans = _draw_plans(order, cycle)
     answer = sealed(cases, secrets.token_bytes(16))
     write_atomically(folder.answer, answer)
     shutil.copyfile(find_data_file("ident.vehicle", order.prototype), folder.vehicle)
     shutil.copyfile(MODEL_FILE, folder.model)
     identifiers = tuple(case.identifier for case in cases)
-    write_exam(folder, Exam(order.prototype, cycle, plans_text(plans), identifiers, answer_hash(answer)))
+    write_exam(folder, Exam(order.prototype, cycle, plans, identifiers, answer_hash(answer)))
+
+
+def _draw_plans(order: SealingOrder, cycle: float) -> tuple[str, ...]:
+    tasks = [(number, order.prototype, order.seed + number, cycle) for number in range(order.composition.excitations)]
+    return tuple(text for _, text in sorted(run_all(draw_plans, tasks, jobs=order.jobs, scheduler=order.scheduler)))
+
+
+def draw_plans(number: int, prototype: str, seed: int, cycle: float) -> tuple[int, str]:
+    """A pair of campaigns under its number; runs in a worker."""
+    return number, plans_text(plan_exam(load_vehicle(prototype), seed, cycle))
 
 
 def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
     first = min(case.seed for case in cases)
-    if (exam.prototype, len(cases), first) != (order.prototype, order.composition.total, order.seed):
+    held = (exam.prototype, len(cases), len(exam.plans), first)
+    if held != (order.prototype, order.composition.total, order.composition.excitations, order.seed):
         raise UserError(
-            f"{order.out} holds another exam: {len(cases)} cases of {exam.prototype} from seed {first}.",
+            f"{order.out} holds another exam: {len(cases)} cases of {exam.prototype} on {len(exam.plans)} "
+            f"excitations from seed {first}.",
             "Go on with it as it was begun, or name another folder (--out).",
         )
 

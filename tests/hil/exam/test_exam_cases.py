@@ -86,3 +86,15 @@ def test_a_size_goes_through_the_points_measured() -> None:
 def test_a_kind_without_effects_is_refused(table: SizeTable) -> None:
     with pytest.raises(UserError, match="no effect of a kind"):
         draw_cases(SizeTable((), (), ()), Composition(4, 0, 0, 0, 0), 1, np.random.default_rng(0))
+
+
+def test_every_excitation_is_driven_as_often_as_another(cases: list[Case]) -> None:
+    driven = Counter(case.excitation for case in cases)
+    assert set(driven) == set(range(Composition().excitations))
+    assert max(driven.values()) - min(driven.values()) <= 1
+
+
+def test_no_kind_of_case_keeps_to_a_few_excitations(cases: list[Case]) -> None:
+    for kind in Kind:
+        own = [case.excitation for case in cases if case.kind is kind]
+        assert len(set(own)) > min(len(own), Composition().excitations) / 2

@@ -14,7 +14,7 @@ from ident.records.files import read_record
 
 pytestmark = pytest.mark.slow
 
-CASES = ["--effects", "1", "--pairs", "0", "--none", "1", "--unknown", "1", "--invisible", "0"]
+CASES = ["--effects", "1", "--pairs", "0", "--none", "1", "--unknown", "1", "--invisible", "0", "--excitations", "2"]
 
 
 def quasiomni(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -51,7 +51,7 @@ def answer(
     **said: Any,
 ) -> Answer:
     """An answer to a case with a torque bias of the front left drive."""
-    case = Case("id", Kind.EFFECT, (Injected(name, "drive_fl", "bias", size),), noise_units, 1)
+    case = Case("id", Kind.EFFECT, (Injected(name, "drive_fl", "bias", size),), noise_units, 1, 0)
     content = {"verdict": "effect" if effects else "none", "closed": 0.9, **said}
     return Answer(case, Said(effects=effects, **content), (identity,))
 
@@ -163,7 +163,7 @@ def test_a_size_is_held_within_1_96_standard_deviations() -> None:
 
 
 def test_half_a_turn_of_a_direction_is_the_other_sign_of_a_size() -> None:
-    downhill = Case("id", Kind.EFFECT, (Injected("slope", "chassis", "angle", -0.005),), 1.0, 1)
+    downhill = Case("id", Kind.EFFECT, (Injected("slope", "chassis", "angle", -0.005),), 1.0, 1, 0)
     parameters = {"angle": {"value": 0.005, "std": 1e-4}, "direction": {"value": math.pi, "std": 0.1}}
     said = Said("effect", (entry("slope", "chassis", parameters=parameters),))
     assert Answer(downhill, said, (Identity(frozenset({"slope"}), frozenset({"chassis"})),)).size_held is True
@@ -180,7 +180,7 @@ def test_every_effect_of_a_pair_needs_an_entry_of_its_own(cases: list[Case], tru
 
 def test_an_effect_of_a_pair_that_is_only_in_a_set_is_covered_not_named() -> None:
     effects = (Injected("torque_bias", "drive_fl", "bias", 0.1), Injected("slope", "chassis", "angle", 0.01))
-    case = Case("id", Kind.PAIR, effects, 1.0, 1)
+    case = Case("id", Kind.PAIR, effects, 1.0, 1, 0)
     said = Said("effect", (entry("torque_bias"), entry("scrub", among=("slope",))))
     pair = Answer(case, said, (apart(), apart("slope")))
     assert not pair.both
