@@ -40,7 +40,7 @@ T = TypeVar("T")
 FOLLOWING_ERRORS: Final = {"alpha": 0.35, "x": 0.25, "y": 0.25, "gamma": 0.35, "beta": 3.0}
 """Largest position error before a campaign stops, by coordinate [rad or m]."""
 
-DEAD_BANDS: Final = {"alpha": 1e-4, "x": 5e-4, "y": 5e-4, "gamma": 5e-4, "beta": 5e-3}
+DEAD_BANDS: Final = {"alpha": 6e-5, "x": 5e-4, "y": 5e-4, "gamma": 5e-4, "beta": 5e-3}
 """Position error at standstill that the integrators leave alone, by coordinate [rad or m]."""
 
 HOLDING_BAND: Final = 3e-3
