@@ -17,7 +17,7 @@ from ident.campaign.loops import STEERING_RATE_CYCLES, LoopDesign
 from ident.campaign.reference import STEERING_LOOPS, Reference
 from ident.errors import CampaignError
 
-STANDSTILL_GAIN = 6.0
+STANDSTILL_GAIN = 12.0
 """Factor on the integral gain while the reference stands still: the coordinate sticks, so the integrator only has to
 cross the band of Coulomb friction, and a fast one does so in a second."""
 

@@ -173,7 +173,7 @@ def _shaped_move(progress: Array, stroke: Array, duration: float) -> tuple[Array
     return shape * stroke, rate * stroke / duration, curvature * stroke / duration**2
 
 
-ALIGNMENT_SETTLING: Final = 2.5
+ALIGNMENT_SETTLING: Final = 3.0
 """Standstill after an alignment [s], in which the integrators bring the wheels into their dead band."""
 
 CREEP: Final = 0.08
