@@ -48,6 +48,15 @@ ALONE: Final = 0.9
 """Part of all the time that wheels surely slide in which it must be one wheel, for the floor under it to be the cause:
 what sets wheels against each other (see `ident.gap.vehicle.askew`) makes several of them slide [-]."""
 
+GIVING_WAY: Final = 2e-4
+"""Speed beside what is proportional to its own by which a wheel must run ahead for a moment to have given way [m/s]."""
+
+SLOWLY: Final = 30.0
+"""Below which that is looked at [rad/s]: encoders leave a tenth of `GIVING_WAY` there."""
+
+MOMENTARY: Final = 0.3
+"""Part of the motion that such moments may last; what lasts longer belongs to the vehicle [-]."""
+
 ALONG: Final = 0.8
 """Part of the friction cone that the traction has filled when a wheel slides; the rest acts across its plane [-]."""
 
@@ -180,6 +189,22 @@ def sliding_times(inputs: Array, setting: Setting) -> Array:
     sense = np.sign(np.stack([traction(inputs, wheel, setting) for wheel in range(len(WHEEL_PLACES))], axis=1))
     forward = sense * ahead_of_the_rest(inputs, setting.geometry, setting.sample_time)
     return np.asarray(setting.sample_time * np.sum(_surely(forward, speed), axis=0))
+
+
+def giving_way(inputs: Array, geometry: Geometry, sample_time: float) -> Mask:
+    """Moments (N,) in which wheels of a drive, `inputs` (N, INPUTS), do not roll but give way to one another.
+
+    Wheels that an alignment has left a few increments askew push each other aside, until at some speed the steering
+    moves and they slide: equations of rolling wheels do not hold then. What runs ahead in proportion to its speed is
+    another radius, and what does so most of the time is no moment: neither is meant.
+    """
+    rates = geometry.wheel_radius * inputs[:, SLICES["beta_rate"]]
+    moving = np.abs(rates).min(axis=1) > MOVING
+    ahead = zero_phase(ahead_of_the_rest(inputs, geometry, sample_time), SLOWLY, sample_time)
+    power = np.sum(rates[moving] ** 2, axis=0)
+    share = np.sum((ahead * rates)[moving], axis=0) / np.maximum(power, np.finfo(float).tiny)
+    moments = np.any(np.abs(ahead - share * rates) > GIVING_WAY, axis=1) & moving
+    return np.asarray(moments & (moments.sum() < MOMENTARY * moving.sum()))
 
 
 def _slides(forward: Array, speed: Array) -> Mask:

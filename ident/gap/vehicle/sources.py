@@ -18,7 +18,7 @@ from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
 from ident.gap.vehicle.rattling import above_band, hammer, rattling
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
-from ident.gap.vehicle.sliding import rolled_with_others, rolling_rates
+from ident.gap.vehicle.sliding import giving_way, rolled_with_others, rolling_rates
 from ident.records.record import Record, Step, base_step
 from ident.vehicle.geometry import WHEELS, Geometry
 from ident.vehicle.modes import Mode
@@ -161,7 +161,8 @@ def _sources(
         "record": signals.record,
         "rattles": rattles[::stride],
     }
-    dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)
+    rolls = _rolls(recorded, spec, geometry, processing, segment.sample_time)
+    dynamic = tuple((_moving(signals, spec, name, processing) & rolls)[::stride] for name in spec.coordinates)
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
     if names and not rattles.any():
@@ -202,6 +203,17 @@ def _moving(signals: Signals, spec: RowsOfStep, coordinate: str, processing: Pro
     elif coordinate == "x":
         joints = [2, 3, 4, 5]
     return moving_rows(signals.joint_rates[:, joints], processing, signals.segment.sample_time)
+
+
+def _rolls(
+    inputs: Array, spec: RowsOfStep, geometry: Geometry, processing: Processing, sample_time: float
+) -> NDArray[np.bool_]:
+    """Where (N,) no wheel gives way for a moment, nor has or will within the memory of the filter."""
+    if spec.mode in (None, Mode.ALIGNMENT):
+        return np.ones(len(inputs), dtype=bool)
+    width = 4 * round(processing.guard / sample_time) + 1
+    near = ndimage.binary_dilation(giving_way(inputs, geometry, sample_time), np.ones(width, dtype=bool))
+    return np.asarray(~near)
 
 
 def _rolling(signals: Signals, spec: RowsOfStep, processing: Processing) -> NDArray[np.bool_]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -11,17 +13,20 @@ from ident.gap.problem import Candidate, Channel, Variant
 from ident.gap.vehicle.askew import beside_sliding
 from ident.gap.vehicle.ideal import Drive, ideal_record
 from ident.gap.vehicle.rows import SLICES
-from ident.gap.vehicle.sliding import slides_alone, sliding_cause, sliding_times, traction
+from ident.gap.vehicle.sliding import giving_way, slides_alone, sliding_cause, sliding_times, traction
 from ident.gap.vehicle.sources import Source, sources_of
 from ident.gap.vehicle.transforms import Setting, transform_cause
-from ident.records.record import Step
-from ident.vehicle.description import VehicleDescription
+from ident.records.record import Record, Step
+from ident.vehicle.description import VehicleDescription, load_vehicle
 from ident.vehicle.effects import EffectName
 
 Array = NDArray[np.float64]
 
 CREEP = 0.02
 """Part of its speed by which the sliding wheel runs ahead under load."""
+
+
+RADIUS = load_vehicle("prototype").geometry.wheel_radius
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +107,63 @@ def test_what_slid_is_taken_off_speed_and_torque_of_the_wheel(straight: Source, 
             for signals in (rolling, inputs)
         )
         assert np.sqrt(np.mean(left**2)) < 0.1 * np.sqrt(np.mean(added**2)), name
+
+
+def ahead_by(straight: Source, wheel: int, speeds: Array) -> Array:
+    """Signals of the drive with a wheel that runs ahead by `speeds` (N,) [m/s]."""
+    inputs = straight.inputs.copy()
+    inputs[:, SLICES["beta_rate"].start + wheel] += speeds / RADIUS
+    return inputs
+
+
+@pytest.mark.parametrize("wheel", range(4))
+def test_a_wheel_gives_way_when_it_runs_ahead_for_a_moment(
+    straight: Source, prototype: VehicleDescription, wheel: int
+) -> None:
+    time = np.arange(len(straight.inputs)) * straight.sample_time
+    fastest = time[np.argmax(straight.inputs[:, SLICES["beta_rate"].start])]
+    inputs = ahead_by(straight, wheel, 1e-3 * np.exp(-(((time - fastest) / 0.1) ** 2)))
+    found = giving_way(inputs, prototype.geometry, straight.sample_time)
+    assert found[np.abs(time - fastest) < 0.1].all()
+    assert not found[np.abs(time - fastest) > 0.5].any()
+
+
+@pytest.mark.parametrize("part", [1e-4, 5e-3])
+def test_a_wheel_of_another_radius_does_not_give_way(
+    straight: Source, prototype: VehicleDescription, part: float
+) -> None:
+    inputs = ahead_by(straight, 1, part * RADIUS * straight.inputs[:, SLICES["beta_rate"].start + 1])
+    assert not giving_way(inputs, prototype.geometry, straight.sample_time).any()
+
+
+def test_what_lasts_is_no_moment(straight: Source, prototype: VehicleDescription) -> None:
+    """An eccentric wheel runs ahead once a turn, all the way."""
+    turn = straight.inputs[:, SLICES["beta"].start]
+    inputs = ahead_by(straight, 0, 5e-3 * RADIUS * straight.inputs[:, SLICES["beta_rate"].start] * np.cos(turn))
+    assert not giving_way(inputs, prototype.geometry, straight.sample_time).any()
+
+
+def test_forces_are_not_looked_at_while_a_wheel_gives_way(prototype: VehicleDescription) -> None:
+    record = ideal_record([Drive(Step.STRAIGHT)], prototype)
+    (segment,) = record.segments
+    time = segment.time - segment.time[0]
+    fastest = time[np.argmax(np.gradient(segment.wheel_angles[:, 0]))]
+    angles = segment.wheel_angles.copy()
+    angles[:, 0] += 2e-4 / RADIUS * (1 + np.tanh((time - fastest) / 0.1))
+    slid = Record([replace(segment, wheel_angles=angles)])
+    rolled, given_way = (
+        next(
+            source
+            for source in sources_of(one, prototype.geometry, [Step.STRAIGHT], Processing())
+            if source.channel is Channel.DYNAMIC
+        )
+        for one in (record, slid)
+    )
+    left_out = rolled.moving[0] & ~given_way.moving[0]
+    when = np.arange(len(left_out)) * rolled.sample_time
+    assert left_out[np.abs(when - fastest) < 0.2].any()
+    assert not left_out[np.abs(when - fastest) > 0.8].any()
+    assert not (given_way.moving[0] & (np.abs(when - fastest) < 0.15)).any()
 
 
 def held(load: Array, friction: float) -> Array:
