@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hil.exam.cases import Case
-from hil.exam.folder import ExamFolder, answer_hash, open_answer, sealed, write_atomically
+from hil.exam.folder import Exam, ExamFolder, answer_hash, open_answer, read_exam, sealed, write_atomically, write_exam
 from hil.exam.record_bytes import record_bytes, record_from_bytes
 from ident.errors import UserError
 from ident.records.record import Record, Segment
@@ -57,6 +57,20 @@ def test_the_answer_opens_only_as_it_was_sealed(cases: list[Case], tmp_path: Pat
     write_atomically(folder.answer, sealed(cases[::-1], b"salt"))
     with pytest.raises(UserError, match="not the answer that was sealed"):
         open_answer(folder, answer_hash(content))
+
+
+def test_a_manifest_survives_being_written(tmp_path: Path) -> None:
+    folder, exam = ExamFolder(tmp_path), Exam("prototype", 0.002, ("one", "two"), ("a", "b", "c"), "hash")
+    write_exam(folder, exam)
+    assert read_exam(folder) == exam
+
+
+def test_an_exam_of_another_version_is_refused(tmp_path: Path) -> None:
+    folder = ExamFolder(tmp_path)
+    write_atomically(folder.manifest, b'{"schema": "quasiomni.exam/1", "plans": "one"}')
+    with pytest.raises(UserError, match="exam/1, not") as refused:
+        read_exam(folder)
+    assert "seal the exam again" in refused.value.remedy
 
 
 def test_the_salt_keeps_the_hash_from_being_guessed(cases: list[Case]) -> None:
