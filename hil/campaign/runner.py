@@ -35,7 +35,11 @@ different centres slip, and half a milliradian already adds one per cent to the 
 
 PARALLEL: Final = 1e-4
 """Difference of the errors of both sides that needs no further alignment [rad], two increments. An error that both
-share only turns the motion; another makes the wheels slide, and from 0.2 mrad on they push the steering aside."""
+share only turns the motion; another makes the wheels slide, and from 0.2 mrad on they push the steering aside. Across,
+where either does, it is no worse than `ALIGNED`."""
+
+READINGS = 25
+"""Cycles over which the steering is read at standstill: a single reading scatters by half an increment."""
 
 ALIGNMENTS: Final = 6
 """Attempts at an alignment."""
@@ -184,10 +188,11 @@ class CampaignRunner:
     def _align(self, master: Master, step: str) -> None:
         target = self._plan.posture(step)
         for _ in range(ALIGNMENTS):
-            start = np.array(master.exchange(_STANDSTILL).steering_angles)
+            start = _steering_at_rest(master)
             if self._spare_alignments and _aligned(start - target):
                 return
-            reached = np.array(self._drive(master, self._plan.alignment(start, step, self._plan.vehicle.prior)))
+            self._drive(master, self._plan.alignment(start, step, self._plan.vehicle.prior))
+            reached = _steering_at_rest(master)
             if _aligned(reached - target):
                 return
         error = float(np.abs(reached - target).max())
@@ -197,8 +202,8 @@ class CampaignRunner:
                 "Look for a blocked steering unit, or give its friction in the vehicle file's [prior].",
             )
 
-    def _drive(self, master: Master, reference: Reference) -> Sequence[float]:
-        """Drive one reference into a log of its own; gives the steering angles at its end."""
+    def _drive(self, master: Master, reference: Reference) -> None:
+        """Drive one reference into a log of its own."""
         vehicle = self._plan.vehicle
         controller = Controller(
             reference,
@@ -215,7 +220,6 @@ class CampaignRunner:
                 if index % PROGRESS_CYCLES == 0:
                     self._progress(reference.step, index, total)
         self._progress(reference.step, total, total)
-        return sample.steering_angles
 
     def _parameters(self, step: str) -> Parameters:
         """Feed-forward by the guesses, and for the validation by what the steps before it have shown."""
@@ -230,6 +234,12 @@ class CampaignRunner:
         finished = {step for step, _ in finished_steps(self._run.folder.frames)}
         needed = {str(step) for step in FIT_STEPS if step is not Step.LATERAL}
         return needed <= finished and (self._run.known_inertia is not None or Step.WHEEL_LIFTED in finished)
+
+
+def _steering_at_rest(master: Master) -> NDArray[np.float64]:
+    """Steering angles (2,) of wheels that stand [rad]."""
+    readings = [master.exchange(_STANDSTILL).steering_angles for _ in range(READINGS)]
+    return np.asarray(np.mean(readings, axis=0))
 
 
 def _aligned(errors: NDArray[np.float64]) -> bool:

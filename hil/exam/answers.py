@@ -14,7 +14,7 @@ import numpy as np
 
 from hil.exam.cases import Case, Injected, Kind
 from hil.exam.folder import ExamFolder, open_answer, read_exam
-from hil.exam.identity import Identity, exam_identities
+from hil.exam.identity import Identities, Identity
 from hil.exam.statistics import Z95
 from ident.errors import UserError
 from ident.gap.vehicle.library import DRIFTS, SHAPES
@@ -249,8 +249,8 @@ class Answer:
         return MappingProxyType({name: value for name, value in wrong.items() if math.isfinite(value)})
 
 
-def read_answers(folder: ExamFolder, *, removed: bool = False) -> list[Answer]:
-    """The answers of the diagnosing side beside the truth.
+def read_answers(folder: ExamFolder, known: Sequence[Identities], *, removed: bool = False) -> list[Answer]:
+    """The answers of the diagnosing side beside the truth; `known` are the identities of every pair of campaigns.
 
     Raises:
         UserError: there is no exam, no diagnosis, or the sealed answer is another one.
@@ -263,7 +263,6 @@ def read_answers(folder: ExamFolder, *, removed: bool = False) -> list[Answer]:
     }
     if not said:
         raise UserError(f"{folder.path} holds no diagnoses.", "Diagnose first: quasiomni exam diagnose FOLDER.")
-    known = exam_identities(folder)
     return [
         Answer(case, said[case.identifier], known[case.excitation].of_case(case))
         for case in cases

@@ -58,7 +58,7 @@ class Case:
         effects: that the vehicle has.
         noise_units: size of each of them, zero without one.
         seed: of the noise while fitting; the next one while confirming.
-        excitation: number of the pair of campaigns that it drives.
+        excitation: number of the pair of campaigns that it drives, among the plans of the exam.
     """
 
     identifier: str
@@ -106,6 +106,11 @@ class Composition:
         """Of all kinds."""
         return self.effects + self.pairs + self.none + self.unknown + self.invisible
 
+    @property
+    def driven(self) -> int:
+        """Excitations that some case drives."""
+        return min(self.excitations, self.total)
+
 
 def draw_cases(table: SizeTable, composition: Composition, seed: int, generator: np.random.Generator) -> list[Case]:
     """Cases in shuffled order.
@@ -131,7 +136,7 @@ def draw_cases(table: SizeTable, composition: Composition, seed: int, generator:
     cases = []
     for number, (position, identifier) in enumerate(zip(order.tolist(), identifiers, strict=True)):
         kind, effects, noise_units = questions[position]
-        noise, excitation = seed + SEEDS_PER_CASE * number, number % composition.excitations
+        noise, excitation = seed + SEEDS_PER_CASE * number, number % composition.driven
         cases.append(Case(identifier, kind, effects, noise_units, noise, excitation))
     return cases
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from hil.exam.answers import chance, permuted, read_answers
 from hil.exam.folder import ExamFolder
+from hil.exam.identity import exam_identities
 from hil.exam.score_names import ASKED, PERMUTED, RIGHT
 from hil.exam.scoring import Group, Score, missing_cases, removal_rates, score
 from hil.exam.statistics import Rate
@@ -48,13 +49,14 @@ def score_exam(folder: ExamFolder, generator: np.random.Generator) -> ScoreRepor
     Raises:
         UserError: there is no exam, no diagnosis, or the sealed answer is another one.
     """
-    answers = read_answers(folder)
+    known = exam_identities(folder)
+    answers = read_answers(folder, known)
     without = folder.diagnosed(removed=True)
     return ScoreReport(
         score=score(answers, missing_cases(folder)),
         permuted=score(permuted(answers, generator)).rates[RIGHT],
         chance=chance(answers),
-        without=removal_rates(read_answers(folder, removed=True)) if without else {},
+        without=removal_rates(read_answers(folder, known, removed=True)) if without else {},
     )
 
 

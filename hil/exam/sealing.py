@@ -56,7 +56,7 @@ class SealingOrder:
         out: folder.
         prototype: of the emulator, by name.
         composition: how many cases of each kind.
-        seed: first of the noise, two a case; it seeds the excitations and everything drawn as well.
+        seed: first of the noise, two a case; of the excitations, one each; and of everything drawn.
         jobs: processes on this machine.
         scheduler: of a Dask cluster, None for this machine.
     """
@@ -75,9 +75,12 @@ def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
     A case whose effects stop the campaign has no records: what was wrong is sealed with the answer.
 
     Raises:
-        UserError: the folder holds another exam.
+        UserError: no case is asked for, or the folder holds another exam.
     """
+    if not order.composition.total:
+        raise UserError("An exam without cases is none.", "Ask for some: --effects, --none, --unknown.")
     folder = ExamFolder(order.out)
+    # The excitations take minutes before the first case is done.
     progress(0, order.composition.total)
     if not folder.manifest.is_file():
         _draw(folder, order, table)
@@ -129,7 +132,7 @@ def unlibraried_unit(name: str) -> str:
     return UNLIBRARIED[UnlibrariedName(name)].unit
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=Composition.excitations)
 def _plans(text: str, prototype: str, cycle: float) -> ExamPlans:
     return plans_from_text(text, load_vehicle(prototype), cycle)
 
@@ -148,7 +151,7 @@ def _draw(folder: ExamFolder, order: SealingOrder, table: SizeTable) -> None:
 
 
 def _draw_plans(order: SealingOrder, cycle: float) -> tuple[str, ...]:
-    tasks = [(number, order.prototype, order.seed + number, cycle) for number in range(order.composition.excitations)]
+    tasks = [(number, order.prototype, order.seed + number, cycle) for number in range(order.composition.driven)]
     return tuple(text for _, text in sorted(run_all(draw_plans, tasks, jobs=order.jobs, scheduler=order.scheduler)))
 
 
@@ -160,7 +163,7 @@ def draw_plans(number: int, prototype: str, seed: int, cycle: float) -> tuple[in
 def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
     first = min(case.seed for case in cases)
     held = (exam.prototype, len(cases), len(exam.plans), first)
-    if held != (order.prototype, order.composition.total, order.composition.excitations, order.seed):
+    if held != (order.prototype, order.composition.total, order.composition.driven, order.seed):
         raise UserError(
             f"{order.out} holds another exam: {len(cases)} cases of {exam.prototype} on {len(exam.plans)} "
             f"excitations from seed {first}.",

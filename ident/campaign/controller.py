@@ -19,7 +19,7 @@ from ident.errors import CampaignError
 
 STANDSTILL_GAIN = 12.0
 """Factor on the integral gain while the reference stands still: the coordinate sticks, so the integrator only has to
-cross the band of Coulomb friction, and a fast one does so in a second."""
+cross the band of Coulomb friction: that of steering takes 1.5 s at 0.3 mrad."""
 
 LEAK_TIME = 0.1
 """Time in which an integrator gives up its torque at standstill [s], once its coordinate is inside the dead band

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ident.estimate.filters import zero_phase
 from ident.gap.derivatives import derivative
+from ident.gap.linear import least_squares
 from ident.gap.vehicle.rattling import BAND
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.transforms import LOAD_CUTOFF, Setting, contact_force
@@ -49,13 +50,10 @@ ALONE: Final = 0.9
 what sets wheels against each other (see `ident.gap.vehicle.askew`) makes several of them slide [-]."""
 
 GIVING_WAY: Final = 2e-4
-"""Speed beside what is proportional to its own by which a wheel must run ahead for a moment to have given way [m/s]."""
+"""Speed by which a wheel must run ahead, beside what goes with its speed and its creep, to have given way [m/s]."""
 
-SLOWLY: Final = 30.0
-"""Below which that is looked at [rad/s]: encoders leave a tenth of `GIVING_WAY` there."""
-
-MOMENTARY: Final = 0.3
-"""Part of the motion that such moments may last; what lasts longer belongs to the vehicle [-]."""
+GIVING_WAY_CUTOFF: Final = 30.0
+"""Of the filter through which that is looked at [rad/s]: encoders leave a tenth of `GIVING_WAY` there."""
 
 ALONG: Final = 0.8
 """Part of the friction cone that the traction has filled when a wheel slides; the rest acts across its plane [-]."""
@@ -196,15 +194,17 @@ def giving_way(inputs: Array, geometry: Geometry, sample_time: float) -> Mask:
 
     Wheels that an alignment has left a few increments askew push each other aside, until at some speed the steering
     moves and they slide: equations of rolling wheels do not hold then. What runs ahead in proportion to its speed is
-    another radius, and what does so most of the time is no moment: neither is meant.
+    another radius, and in proportion to its speed and its torque it creeps; neither is meant.
     """
     rates = geometry.wheel_radius * inputs[:, SLICES["beta_rate"]]
     moving = np.abs(rates).min(axis=1) > MOVING
-    ahead = zero_phase(ahead_of_the_rest(inputs, geometry, sample_time), SLOWLY, sample_time)
-    power = np.sum(rates[moving] ** 2, axis=0)
-    share = np.sum((ahead * rates)[moving], axis=0) / np.maximum(power, np.finfo(float).tiny)
-    moments = np.any(np.abs(ahead - share * rates) > GIVING_WAY, axis=1) & moving
-    return np.asarray(moments & (moments.sum() < MOMENTARY * moving.sum()))
+    ahead = zero_phase(ahead_of_the_rest(inputs, geometry, sample_time), GIVING_WAY_CUTOFF, sample_time)
+    lasting = np.stack([rates, np.abs(rates) * inputs[:, SLICES["torques"]]], axis=2)
+    beside = [
+        column - regular @ least_squares(regular[moving], column[moving])
+        for column, regular in zip(ahead.T, np.swapaxes(lasting, 0, 1), strict=True)
+    ]
+    return np.asarray(moving & np.any(np.abs(beside) > GIVING_WAY, axis=0))
 
 
 def _slides(forward: Array, speed: Array) -> Mask:

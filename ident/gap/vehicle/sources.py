@@ -19,7 +19,7 @@ from ident.gap.vehicle import rows
 from ident.gap.vehicle.rattling import above_band, hammer, rattling
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
 from ident.gap.vehicle.sliding import giving_way, rolled_with_others, rolling_rates
-from ident.records.record import Record, Step, base_step
+from ident.records.record import Record, Segment, Step, base_step
 from ident.vehicle.geometry import WHEELS, Geometry
 from ident.vehicle.modes import Mode
 
@@ -33,6 +33,9 @@ OVERSAMPLED: Final = 3.0
 
 ASKEW: Final = 0.4
 """Steering angle beyond which a wheel that steers at standstill pushes the chassis aside [rad]."""
+
+MOMENTARY: Final = 0.5
+"""Part of the motion of a step that wheels may give way for; what takes more belongs to the vehicle [-]."""
 
 SIGNAL_BANDWIDTH: Final = 1000.0
 """Of the signals [rad/s]: motors on the compliance of their gears' teeth rattle more slowly than that."""
@@ -161,8 +164,10 @@ def _sources(
         "record": signals.record,
         "rattles": rattles[::stride],
     }
-    rolls = _rolls(recorded, spec, geometry, processing, segment.sample_time)
-    dynamic = tuple((_moving(signals, spec, name, processing) & rolls)[::stride] for name in spec.coordinates)
+    moving = [_moving(signals, spec, name, processing) for name in spec.coordinates]
+    if not as_recorded and spec.mode not in (None, Mode.ALIGNMENT):
+        moving = _undisturbed(moving, recorded, signals, geometry, processing)
+    dynamic = tuple(mask[::stride] for mask in moving)
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
     if names and not rattles.any():
@@ -205,15 +210,27 @@ def _moving(signals: Signals, spec: RowsOfStep, coordinate: str, processing: Pro
     return moving_rows(signals.joint_rates[:, joints], processing, signals.segment.sample_time)
 
 
-def _rolls(
-    inputs: Array, spec: RowsOfStep, geometry: Geometry, processing: Processing, sample_time: float
-) -> NDArray[np.bool_]:
-    """Where (N,) no wheel gives way for a moment, nor has or will within the memory of the filter."""
-    if spec.mode in (None, Mode.ALIGNMENT):
-        return np.ones(len(inputs), dtype=bool)
-    width = 4 * round(processing.guard / sample_time) + 1
-    near = ndimage.binary_dilation(giving_way(inputs, geometry, sample_time), np.ones(width, dtype=bool))
-    return np.asarray(~near)
+def _undisturbed(
+    moving: list[NDArray[np.bool_]], inputs: Array, signals: Signals, geometry: Geometry, processing: Processing
+) -> list[NDArray[np.bool_]]:
+    """Moving rows (N,) of coordinates in which no wheel gives way for a moment: equations are those of rolling ones.
+
+    What is lost in one repeat is lost in all. Where that is most of the motion, no moment is meant, and all rows stay.
+    """
+    segment = signals.segment
+    # What gives way was looked at through one filter, and the rows pass another: each remembers as long as the guard.
+    width = 4 * round(processing.guard / segment.sample_time) + 1
+    near = ndimage.binary_dilation(giving_way(inputs, geometry, segment.sample_time), np.ones(width, dtype=bool))
+    return [mask & ~near if _lost(mask, near, segment) < MOMENTARY else mask for mask in moving]
+
+
+def _lost(moving: NDArray[np.bool_], near: NDArray[np.bool_], segment: Segment) -> float:
+    """Part of the motion that is lost where the same phase of every repeat is."""
+    repeats = [segment.period == number for number in segment.periods] or [np.ones(len(near), dtype=bool)]
+    length = min(int(repeat.sum()) for repeat in repeats)
+    moves, lost = (np.stack([values[repeat][:length] for repeat in repeats]) for values in (moving, near))
+    everywhere = moves.all(axis=0)
+    return float(np.mean(lost[:, everywhere].any(axis=0))) if everywhere.any() else 0.0
 
 
 def _rolling(signals: Signals, spec: RowsOfStep, processing: Processing) -> NDArray[np.bool_]:

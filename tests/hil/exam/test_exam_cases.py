@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from emulator.effects.injection import inject
 from emulator.prototype import load_prototype
 from hil.exam.cases import SIZES, Case, Composition, Kind, case_from_json, draw_cases
-from hil.exam.sealing import effect_of
+from hil.exam.sealing import SealingOrder, effect_of, seal
 from hil.exam.sizes import EffectSize, SizeTable
 from ident.errors import UserError
 from ident.vehicle.effects import EFFECTS
@@ -98,3 +99,16 @@ def test_no_kind_of_case_keeps_to_a_few_excitations(cases: list[Case]) -> None:
     for kind in Kind:
         own = [case.excitation for case in cases if case.kind is kind]
         assert len(set(own)) > min(len(own), Composition().excitations) / 2
+
+
+def test_an_exam_has_no_more_excitations_than_cases(table: SizeTable) -> None:
+    few = Composition(effects=2, pairs=0, none=1, unknown=0, invisible=0)
+    assert few.driven == 3
+    assert {case.excitation for case in draw_cases(table, few, 1, np.random.default_rng(1))} == {0, 1, 2}
+
+
+def test_an_exam_without_cases_is_refused_before_anything_is_planned(table: SizeTable, tmp_path: Path) -> None:
+    order = SealingOrder(tmp_path / "exam", "prototype", Composition(0, 0, 0, 0, 0), 1, 1, None)
+    with pytest.raises(UserError, match="without cases"):
+        seal(order, table, lambda *_: None)
+    assert not order.out.exists()

@@ -136,34 +136,68 @@ def test_a_wheel_of_another_radius_does_not_give_way(
     assert not giving_way(inputs, prototype.geometry, straight.sample_time).any()
 
 
-def test_what_lasts_is_no_moment(straight: Source, prototype: VehicleDescription) -> None:
-    """An eccentric wheel runs ahead once a turn, all the way."""
-    turn = straight.inputs[:, SLICES["beta"].start]
-    inputs = ahead_by(straight, 0, 5e-3 * RADIUS * straight.inputs[:, SLICES["beta_rate"].start] * np.cos(turn))
+def test_a_wheel_that_creeps_does_not_give_way(straight: Source, prototype: VehicleDescription) -> None:
+    rates, torques = (straight.inputs[:, SLICES[name].start + 2] for name in ("beta_rate", "torques"))
+    inputs = ahead_by(straight, 2, 5e-3 * RADIUS * np.abs(rates) * torques / np.abs(torques).max())
     assert not giving_way(inputs, prototype.geometry, straight.sample_time).any()
 
 
-def test_forces_are_not_looked_at_while_a_wheel_gives_way(prototype: VehicleDescription) -> None:
-    record = ideal_record([Drive(Step.STRAIGHT)], prototype)
+def test_nothing_gives_way_where_nothing_moves(straight: Source, prototype: VehicleDescription) -> None:
+    assert not giving_way(np.zeros_like(straight.inputs), prototype.geometry, straight.sample_time).any()
+
+
+def in_forces(record: Record, prototype: VehicleDescription, **how: bool) -> tuple[Array, Array]:
+    """Times (N,) [s] of the dynamic rows of a straight drive, and which of them are used."""
+    found = sources_of(record, prototype.geometry, [Step.STRAIGHT], Processing(), **how)
+    source = next(source for source in found if source.channel is Channel.DYNAMIC)
+    return np.arange(len(source.inputs)) * source.sample_time, source.moving[0]
+
+
+def slid(record: Record, metres: Array) -> Record:
+    """The record with a wheel that has run ahead by `metres` (N,)."""
     (segment,) = record.segments
-    time = segment.time - segment.time[0]
-    fastest = time[np.argmax(np.gradient(segment.wheel_angles[:, 0]))]
     angles = segment.wheel_angles.copy()
-    angles[:, 0] += 2e-4 / RADIUS * (1 + np.tanh((time - fastest) / 0.1))
-    slid = Record([replace(segment, wheel_angles=angles)])
-    rolled, given_way = (
-        next(
-            source
-            for source in sources_of(one, prototype.geometry, [Step.STRAIGHT], Processing())
-            if source.channel is Channel.DYNAMIC
-        )
-        for one in (record, slid)
+    angles[:, 0] += metres / RADIUS
+    return Record([replace(segment, wheel_angles=angles)])
+
+
+@pytest.fixture(scope="module")
+def rolled(prototype: VehicleDescription) -> Record:
+    return ideal_record([Drive(Step.STRAIGHT)], prototype)
+
+
+def test_forces_are_not_looked_at_while_a_wheel_gives_way(rolled: Record, prototype: VehicleDescription) -> None:
+    (segment,) = rolled.segments
+    fastest = segment.time[np.argmax(np.gradient(segment.wheel_angles[:, 0]))]
+    moment = slid(rolled, 2e-4 * (1 + np.tanh((segment.time - fastest) / 0.1)))
+    time, used = in_forces(rolled, prototype)
+    _, left = in_forces(moment, prototype)
+    since = np.abs(time - (fastest - segment.time[0]))
+    assert used[since < 0.1].all()
+    assert not left[since < 0.15].any()
+    assert np.array_equal(left[since > 0.8], used[since > 0.8])
+
+
+def test_as_recorded_forces_are_looked_at_all_the_time(rolled: Record, prototype: VehicleDescription) -> None:
+    (segment,) = rolled.segments
+    fastest = segment.time[np.argmax(np.gradient(segment.wheel_angles[:, 0]))]
+    moment = slid(rolled, 2e-4 * (1 + np.tanh((segment.time - fastest) / 0.1)))
+    assert np.array_equal(
+        in_forces(moment, prototype, as_recorded=True)[1], in_forces(rolled, prototype, as_recorded=True)[1]
     )
-    left_out = rolled.moving[0] & ~given_way.moving[0]
-    when = np.arange(len(left_out)) * rolled.sample_time
-    assert left_out[np.abs(when - fastest) < 0.2].any()
-    assert not left_out[np.abs(when - fastest) > 0.8].any()
-    assert not (given_way.moving[0] & (np.abs(when - fastest) < 0.15)).any()
+
+
+def test_what_wheels_do_most_of_the_time_is_no_moment(rolled: Record, prototype: VehicleDescription) -> None:
+    """An eccentric wheel runs ahead once a turn, all the way."""
+    (segment,) = rolled.segments
+    eccentric = slid(rolled, 5e-4 * np.sin(segment.wheel_angles[:, 0]))
+    assert giving_way_somewhere(eccentric, prototype)
+    assert np.array_equal(in_forces(eccentric, prototype)[1], in_forces(rolled, prototype)[1])
+
+
+def giving_way_somewhere(record: Record, prototype: VehicleDescription) -> bool:
+    source = sources_of(record, prototype.geometry, [Step.STRAIGHT], Processing())[0]
+    return bool(giving_way(source.inputs, prototype.geometry, source.sample_time).any())
 
 
 def held(load: Array, friction: float) -> Array:
