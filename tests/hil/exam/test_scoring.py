@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -14,9 +15,10 @@ import numpy as np
 import pytest
 
 from hil.exam import score_names as names
-from hil.exam.answers import Alone, Answer, Said, chance, permuted, said_from
+from hil.exam.answers import Alone, Answer, Said, chance, permuted, read_answers, said_from
 from hil.exam.cases import Case, Injected, Kind
-from hil.exam.identity import Identity
+from hil.exam.folder import Exam, ExamFolder, answer_hash, sealed, write_atomically, write_exam
+from hil.exam.identity import Identities, Identity
 from hil.exam.score_figures import confusion_svg, reliability_svg
 from hil.exam.score_report import ScoreReport, score_json, score_markdown, summary_lines
 from hil.exam.scoring import removal_rates, score
@@ -301,3 +303,16 @@ def test_the_pictures_are_well_formed_and_hold_every_case(answers: list[Answer])
     texts = [element.text or "" for element in picture.iter("{http://www.w3.org/2000/svg}text")]
     shown = sum(int(text) for text in texts if text.isdigit())
     assert shown == sum(each.case.kind is not Kind.PAIR for each in answers)
+
+
+def test_an_answer_is_judged_by_the_excitation_that_its_case_drove(tmp_path: Path) -> None:
+    folder = ExamFolder(tmp_path)
+    case = Case("a", Kind.EFFECT, (Injected("torque_bias", "drive_fl", "bias", 0.01),), 1.0, 1, 1)
+    content = sealed([case], b"salt")
+    write_atomically(folder.answer, content)
+    write_exam(folder, Exam("prototype", 0.002, ("first", "second"), ("a",), answer_hash(content)))
+    said = {"verdict": "none", "effects": [], "invisible": [], "gap": {"closed": None}}
+    write_atomically(folder.diagnosis("a"), json.dumps(said).encode())
+    alike = {("torque_bias@drive_fl", True): ["asymmetric_coulomb@wheel_fl"]}
+    (answer,) = read_answers(folder, [Identities({}), Identities(alike)])
+    assert answer.identity.names == {"torque_bias", "asymmetric_coulomb"}
