@@ -16,6 +16,7 @@ from ident.gap.vehicle.candidates import candidate_of, causes_of, seen_together,
 from ident.gap.vehicle.context import MODEL_COLUMNS, Context, make_context, table_of
 from ident.gap.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
 from ident.gap.vehicle.library import TermCause
+from ident.gap.vehicle.moments import apart_from_moments
 from ident.gap.vehicle.rattling import SHAKEN, UNTOLD, rattle_rows
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
 from ident.gap.vehicle.sources import DIAGNOSED, Source, processing_of, sources_of
@@ -52,7 +53,9 @@ def build_problem(
         RecordError: none of the steps is in a record.
     """
     processing = processing or processing_of(records)
-    sources = [source for record in records for source in sources_of(record, vehicle.geometry, steps, processing)]
+    lengths = vehicle.geometry
+    found = [sources_of(record, lengths, steps, processing) for record in records]
+    sources = [source for each in found for source in apart_from_moments(each, lengths, processing)]
     context = make_context(sources, vehicle, model, given, processing)
     causes = causes_of(tuple(effects), model is not None)
     units = [unit for cause in causes if isinstance(cause, TermCause) for v in cause.variants for unit in v.units]

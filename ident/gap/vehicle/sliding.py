@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from ident.estimate.filters import zero_phase
 from ident.gap.derivatives import derivative
-from ident.gap.linear import least_squares
 from ident.gap.vehicle.rattling import BAND
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.transforms import LOAD_CUTOFF, Setting, contact_force
@@ -48,12 +47,6 @@ HELD: Final = 10.0
 ALONE: Final = 0.9
 """Part of all the time that wheels surely slide in which it must be one wheel, for the floor under it to be the cause:
 what sets wheels against each other (see `ident.gap.vehicle.askew`) makes several of them slide [-]."""
-
-GIVING_WAY: Final = 2e-4
-"""Speed by which a wheel must run ahead, beside what goes with its speed and its creep, to have given way [m/s]."""
-
-GIVING_WAY_CUTOFF: Final = 30.0
-"""Of the filter through which that is looked at [rad/s]: encoders leave a tenth of `GIVING_WAY` there."""
 
 ALONG: Final = 0.8
 """Part of the friction cone that the traction has filled when a wheel slides; the rest acts across its plane [-]."""
@@ -187,24 +180,6 @@ def sliding_times(inputs: Array, setting: Setting) -> Array:
     sense = np.sign(np.stack([traction(inputs, wheel, setting) for wheel in range(len(WHEEL_PLACES))], axis=1))
     forward = sense * ahead_of_the_rest(inputs, setting.geometry, setting.sample_time)
     return np.asarray(setting.sample_time * np.sum(_surely(forward, speed), axis=0))
-
-
-def giving_way(inputs: Array, geometry: Geometry, sample_time: float) -> Mask:
-    """Moments (N,) in which wheels of a drive, `inputs` (N, INPUTS), do not roll but give way to one another.
-
-    Wheels that an alignment has left a few increments askew push each other aside, until at some speed the steering
-    moves and they slide: equations of rolling wheels do not hold then. What runs ahead in proportion to its speed is
-    another radius, and in proportion to its speed and its torque it creeps; neither is meant.
-    """
-    rates = geometry.wheel_radius * inputs[:, SLICES["beta_rate"]]
-    moving = np.abs(rates).min(axis=1) > MOVING
-    ahead = zero_phase(ahead_of_the_rest(inputs, geometry, sample_time), GIVING_WAY_CUTOFF, sample_time)
-    lasting = np.stack([rates, np.abs(rates) * inputs[:, SLICES["torques"]]], axis=2)
-    beside = [
-        column - regular @ least_squares(regular[moving], column[moving])
-        for column, regular in zip(ahead.T, np.swapaxes(lasting, 0, 1), strict=True)
-    ]
-    return np.asarray(moving & np.any(np.abs(beside) > GIVING_WAY, axis=0))
 
 
 def _slides(forward: Array, speed: Array) -> Mask:

@@ -18,8 +18,8 @@ from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
 from ident.gap.vehicle.rattling import above_band, hammer, rattling
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
-from ident.gap.vehicle.sliding import giving_way, rolled_with_others, rolling_rates
-from ident.records.record import Record, Segment, Step, base_step
+from ident.gap.vehicle.sliding import rolled_with_others, rolling_rates
+from ident.records.record import Record, Step, base_step
 from ident.vehicle.geometry import WHEELS, Geometry
 from ident.vehicle.modes import Mode
 
@@ -33,9 +33,6 @@ OVERSAMPLED: Final = 3.0
 
 ASKEW: Final = 0.4
 """Steering angle beyond which a wheel that steers at standstill pushes the chassis aside [rad]."""
-
-MOMENTARY: Final = 0.5
-"""Part of the motion of a step that wheels may give way for; what takes more belongs to the vehicle [-]."""
 
 SIGNAL_BANDWIDTH: Final = 1000.0
 """Of the signals [rad/s]: motors on the compliance of their gears' teeth rattle more slowly than that."""
@@ -164,10 +161,7 @@ def _sources(
         "record": signals.record,
         "rattles": rattles[::stride],
     }
-    moving = [_moving(signals, spec, name, processing) for name in spec.coordinates]
-    if not as_recorded and spec.mode not in (None, Mode.ALIGNMENT):
-        moving = _undisturbed(moving, recorded, signals, geometry, processing)
-    dynamic = tuple(mask[::stride] for mask in moving)
+    dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
     if names and not rattles.any():
@@ -208,29 +202,6 @@ def _moving(signals: Signals, spec: RowsOfStep, coordinate: str, processing: Pro
     elif coordinate == "x":
         joints = [2, 3, 4, 5]
     return moving_rows(signals.joint_rates[:, joints], processing, signals.segment.sample_time)
-
-
-def _undisturbed(
-    moving: list[NDArray[np.bool_]], inputs: Array, signals: Signals, geometry: Geometry, processing: Processing
-) -> list[NDArray[np.bool_]]:
-    """Moving rows (N,) of coordinates in which no wheel gives way for a moment: equations are those of rolling ones.
-
-    What is lost in one repeat is lost in all. Where that is most of the motion, no moment is meant, and all rows stay.
-    """
-    segment = signals.segment
-    # What gives way was looked at through one filter, and the rows pass another: each remembers as long as the guard.
-    width = 4 * round(processing.guard / segment.sample_time) + 1
-    near = ndimage.binary_dilation(giving_way(inputs, geometry, segment.sample_time), np.ones(width, dtype=bool))
-    return [mask & ~near if _lost(mask, near, segment) < MOMENTARY else mask for mask in moving]
-
-
-def _lost(moving: NDArray[np.bool_], near: NDArray[np.bool_], segment: Segment) -> float:
-    """Part of the motion that is lost where the same phase of every repeat is."""
-    repeats = [segment.period == number for number in segment.periods] or [np.ones(len(near), dtype=bool)]
-    length = min(int(repeat.sum()) for repeat in repeats)
-    moves, lost = (np.stack([values[repeat][:length] for repeat in repeats]) for values in (moving, near))
-    everywhere = moves.all(axis=0)
-    return float(np.mean(lost[:, everywhere].any(axis=0))) if everywhere.any() else 0.0
 
 
 def _rolling(signals: Signals, spec: RowsOfStep, processing: Processing) -> NDArray[np.bool_]:
