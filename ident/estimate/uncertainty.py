@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from ident.records.repeats import repeats_of
+
 Array = NDArray[np.float64]
 
 BLOCK_TIME = 0.02
@@ -85,11 +87,8 @@ def _of_part(part: Scores) -> list[LongRun]:
 
 def _fold(part: Scores) -> Array | None:
     """Scores by period (P, T, n), or None for fewer than two repeats."""
-    numbers = [number for number in np.unique(part.period) if number >= 0]
-    if len(numbers) < 2:
-        return None
-    length = min(int(np.sum(part.period == number)) for number in numbers)
-    return np.stack([part.values[part.period == number][:length] for number in numbers])
+    samples = repeats_of(part.period)
+    return part.values[samples] if len(samples) > 1 else None
 
 
 def _of_periods(folded: Array, sample_time: float) -> list[LongRun]:

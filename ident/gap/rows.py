@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.gap.problem import Block, Candidate, Problem
+from ident.records.repeats import repeats_of
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -117,8 +118,7 @@ class Rows:
 def kept_rows(block: Block) -> Kept:
     """Moving rows, thinned; repeats beside each other where there are at least two."""
     stride = max(1, math.floor(2 * math.pi / (ROWS_PER_CUTOFF * block.bandwidth * block.sample_time)))
-    repeats = _repeats(block.period)
-    samples = np.stack([repeat[::stride] for repeat in repeats])
+    samples = repeats_of(block.period)[:, ::stride]
     usable = block.moving[samples].all(axis=0)
     runs = np.cumsum(np.diff(usable.astype(np.int64), prepend=0) == 1)
     return Kept(samples[:, usable], runs[usable], 1 / (stride * block.sample_time))
@@ -148,15 +148,6 @@ def make_rows(fit: Problem, confirm: Problem | None = None) -> Rows:
         confirming=np.repeat(np.array([number == 1 for number, _, _ in blocks], dtype=bool), counts),
         blocks=tuple((block, rows) for _, block, rows in blocks),
     )
-
-
-def _repeats(period: Indices) -> list[Indices]:
-    numbers = [number for number in np.unique(period) if number >= 0]
-    if len(numbers) < 2:
-        return [np.arange(len(period))]
-    repeats = [np.flatnonzero(period == number) for number in numbers]
-    length = min(len(repeat) for repeat in repeats)
-    return [repeat[:length] for repeat in repeats]
 
 
 def _stack(kept: Sequence[Kept], series: Sequence[Array | None], width: int | None) -> Array:

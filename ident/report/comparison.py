@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ident.campaign.reference import sample_times
 from ident.estimate.equations import Equations, column
 from ident.estimate.identify import Identification
+from ident.records.repeats import repeats_of
 from ident.report.rows import Role, role_of
 
 Array = NDArray[np.float64]
@@ -99,16 +100,13 @@ def _compare(equations: Equations, identification: Identification) -> Comparison
 
 def folded(comparison: Comparison) -> Folded | None:
     """The residual folded over its repeats; None for fewer than two, or when no phase moves in all of them."""
-    numbers = [number for number in np.unique(comparison.period) if number >= 0]
-    if len(numbers) < 2:
+    index = repeats_of(comparison.period)
+    if len(index) < 2:
         return None
-    rows = [np.flatnonzero(comparison.period == number) for number in numbers]
-    length = min(len(row) for row in rows)
-    index = np.stack([row[:length] for row in rows])
     residual: Array = np.where(comparison.moving[index], comparison.residual[index], np.nan)
     common = comparison.moving[index].all(axis=0)
     if not common.any():
         return None
     noise = float(np.sqrt(np.mean(residual[:, common].var(axis=0, ddof=1))))
-    phase = sample_times(length, comparison.sample_time)
+    phase = sample_times(index.shape[1], comparison.sample_time)
     return Folded(phase, residual, residual.mean(axis=0), noise)

@@ -110,8 +110,8 @@ def _tolerance(source: Source, row: int, target: Array, context: Context) -> flo
     """What a row may lack for reasons that no cause has, rms in its unit."""
     used = source.moving[row][:: source.factor]
     if source.motors:
-        moved = rattle_rows(source.inputs, source.motors, context.geometry.wheel_radius)
-        return UNTOLD * rms(context.filtered(moved, source)[used, row])
+        moved = rattle_rows(source.inputs, source.motors[row : row + 1], context.geometry.wheel_radius)
+        return UNTOLD * rms(context.filtered(moved, source)[used])
     if source.channel is Channel.DYNAMIC:
         return SHAKEN * rms(target[used]) if source.travels and source.rattles.any() else 0.0
     return tolerated_creep(source, source.coordinates[row], context.geometry)

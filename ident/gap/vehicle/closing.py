@@ -20,6 +20,7 @@ from ident.gap.vehicle.creep import contact_speeds, granted_creep
 from ident.gap.vehicle.outcome import outcomes
 from ident.gap.vehicle.sources import Source, sources_of
 from ident.records.record import Record
+from ident.records.repeats import repeats_of
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EffectName, make_effect
 from ident.vehicle.extended import ExtendedModel
@@ -146,12 +147,8 @@ def _creep(source: Source, vehicle: VehicleDescription) -> float:
 
 def _folded(values: Array, moving: NDArray[np.bool_], period: NDArray[np.int64]) -> Array:
     """Moving rows (P, N), those that move in every repeat."""
-    numbers = [number for number in np.unique(period) if number >= 0]
-    if len(numbers) < 2:
-        return values[moving][None]
-    length = min(int(np.sum(period == number)) for number in numbers)
-    kept = np.stack([moving[period == number][:length] for number in numbers]).all(axis=0)
-    return np.stack([values[period == number][:length][kept] for number in numbers])
+    samples = repeats_of(period)
+    return values[samples[:, moving[samples].all(axis=0)]]
 
 
 def _folded_runs(differences: Array, repeat: NDArray[np.int64], place: NDArray[np.int64]) -> Array:

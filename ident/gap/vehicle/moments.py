@@ -21,6 +21,7 @@ from ident.gap.problem import Channel
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.sliding import MOVING, ahead_of_the_rest
 from ident.gap.vehicle.sources import Source
+from ident.records.repeats import repeats_of
 from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]
@@ -66,12 +67,9 @@ def _undisturbed(source: Source, geometry: Geometry, processing: Processing) -> 
 
 def _lost(moving: Mask, clear: Mask, period: NDArray[np.int64]) -> float:
     """Part of the motion that is lost where the same phase of every repeat is."""
-    numbers = np.unique(period[period >= 0])
-    repeats = [period == number for number in numbers] or [np.ones(len(period), dtype=bool)]
-    length = min(int(repeat.sum()) for repeat in repeats)
-    moves, clears = (np.stack([values[repeat][:length] for repeat in repeats]) for values in (moving, clear))
-    everywhere = moves.all(axis=0)
-    return float(np.mean(~clears[:, everywhere].all(axis=0))) if everywhere.any() else 0.0
+    samples = repeats_of(period)
+    moves, lost = np.all(moving[samples], axis=0), np.any(~clear[samples], axis=0)
+    return float(np.mean(lost, where=moves)) if moves.any() else 0.0
 
 
 def giving_way(inputs: Array, geometry: Geometry, sample_time: float) -> Mask:
