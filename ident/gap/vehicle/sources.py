@@ -20,6 +20,7 @@ from ident.gap.vehicle.rattling import above_band, hammer, rattling
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
 from ident.gap.vehicle.sliding import rolled_with_others, rolling_rates
 from ident.records.record import Record, Step, base_step
+from ident.vehicle import kinematics
 from ident.vehicle.geometry import WHEELS, Geometry
 from ident.vehicle.modes import Mode
 
@@ -146,10 +147,7 @@ def _sources(
     recorded[:, rows.SLICES["torques"]] = zero_phase(
         recorded[:, rows.SLICES["torques"]], processing.signal_cutoff, segment.sample_time
     )
-    rms, rattles = rattling(signals.beta, processing, segment.sample_time)
-    if as_recorded or spec.mode is None:
-        # In the air no floor is hammered, and nothing rolls.
-        rattles[:] = False
+    rms, rattles = _rattling(signals, () if as_recorded else _against_one_another(spec), geometry, processing)
     inputs = _hammered(recorded, rms, rattles, geometry, segment.sample_time) if rattles.any() else recorded
     common = {
         "step": segment.step,
@@ -173,6 +171,32 @@ def _sources(
         inside = _inside(rattles, processing, segment.sample_time)
         shaking = tuple(inside[::stride, wheel] for wheel in motors)
         yield Source(channel=Channel.KINEMATIC, moving=shaking, motors=motors, **common)  # type: ignore[arg-type]
+
+
+def _against_one_another(spec: RowsOfStep) -> tuple[int, ...]:
+    """Wheels of a step whose motors may rattle and are compared; in the air no floor is hammered, and nothing rolls."""
+    if spec.mode is Mode.ALIGNMENT:
+        return tuple(WHEELS.index(name[-2:]) for name in rows.kinematic_coordinates(spec))
+    return () if spec.mode is None else tuple(range(len(WHEELS)))
+
+
+def _rattling(
+    signals: Signals, wheels: tuple[int, ...], geometry: Geometry, processing: Processing
+) -> tuple[Array, NDArray[np.bool_]]:
+    """`rattling` of some wheels, none of the others (N, 4).
+
+    What turns with the units is no rattling: at standstill a unit jumps where its friction reverses, and only one motor
+    that moves beside it rattles.
+    """
+    rms, rattles = np.zeros(signals.beta.shape), np.zeros(signals.beta.shape, dtype=np.bool_)
+    if not wheels:
+        return rms, rattles
+    motors = signals.beta
+    if len(wheels) < len(WHEELS):
+        motors = motors - signals.alpha @ kinematics.complement(Mode.ALIGNMENT, np.zeros((1, 2)), geometry)[0, 5:].T
+    picked = np.array(wheels)
+    rms[:, picked], rattles[:, picked] = rattling(motors[:, picked], processing, signals.segment.sample_time)
+    return rms, rattles
 
 
 def _inside(rattles: NDArray[np.bool_], processing: Processing, sample_time: float) -> NDArray[np.bool_]:

@@ -213,3 +213,18 @@ def test_a_motor_that_rings_while_its_side_is_steered_leaves_the_forces_alone(pr
     """What swings back is the steered unit, by more than any other wheel shows."""
     record, _ = ringing(Step.STEERING_LEFT, 0, 35.0, prototype)
     assert {block.coordinate for block in build_problem([record], prototype).blocks} == {"alpha_l"}
+
+
+@pytest.mark.parametrize("read", [1.0, 0.5], ids=["encoder in time", "encoder late"])
+def test_a_unit_that_jumps_at_standstill_takes_both_of_its_motors_along_and_neither_rattles(
+    read: float, prototype: VehicleDescription
+) -> None:
+    (segment,) = ideal_record([Drive(Step.STEERING_LEFT)], prototype).segments
+    jumps = 5e-4 * np.sin(SHAKE * segment.time) * (np.sin(segment.time) > 0.8)
+    steering, angles = segment.steering_angles.copy(), segment.wheel_angles.copy()
+    steering[:, 0] += read * jumps
+    angles[:, :2] += prototype.geometry.wheel_offset / prototype.geometry.wheel_radius * jumps[:, None] * [-1, 1]
+    jumped = Record([replace(segment, steering_angles=steering, wheel_angles=angles)])
+    sources = sources_of(jumped, prototype.geometry, [Step.STEERING_LEFT], processing_of([jumped]))
+    assert not any(source.rattles.any() for source in sources)
+    assert [source.coordinates for source in sources if source.channel is Channel.KINEMATIC] == [("roll_fl", "roll_rl")]
