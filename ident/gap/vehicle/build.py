@@ -17,7 +17,7 @@ from ident.gap.vehicle.context import MODEL_COLUMNS, Context, make_context, tabl
 from ident.gap.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
 from ident.gap.vehicle.library import TermCause
 from ident.gap.vehicle.moments import apart_from_moments
-from ident.gap.vehicle.rattling import SHAKEN, UNTOLD, rattle_rows
+from ident.gap.vehicle.rattling import SHAKEN
 from ident.gap.vehicle.regions import coordinate_motion, features_of, regions_of
 from ident.gap.vehicle.sources import DIAGNOSED, Source, processing_of, sources_of
 from ident.records.record import Record, Step
@@ -109,9 +109,8 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
 def _tolerance(source: Source, row: int, target: Array, context: Context) -> float:
     """What a row may lack for reasons that no cause has, rms in its unit."""
     used = source.moving[row][:: source.factor]
-    if source.motors:
-        moved = rattle_rows(source.inputs, source.motors[row : row + 1], context.geometry.wheel_radius)
-        return UNTOLD * rms(context.filtered(moved, source)[used])
+    if source.own is not None:
+        return source.own.untold * rms(context.filtered(source.own.of(source.inputs)[:, row], source)[used])
     if source.channel is Channel.DYNAMIC:
         return SHAKEN * rms(target[used]) if source.travels and source.rattles.any() else 0.0
     return tolerated_creep(source, source.coordinates[row], context.geometry)
@@ -119,12 +118,12 @@ def _tolerance(source: Source, row: int, target: Array, context: Context) -> flo
 
 def _creep(source: Source, context: Context) -> Array:
     """Columns of creep (N, rows, wheels); zeros in rows that nothing rolls in."""
-    if source.channel is not Channel.KINEMATIC or source.motors:
+    if source.channel is not Channel.KINEMATIC or source.own is not None:
         return np.zeros((len(source.inputs[:: source.factor]), len(source.coordinates), len(CREEP_NAMES)))
     return context.filtered(creep_columns(context.inputs(source), source, context.setting(source)), source)
 
 
 def _unit(source: Source, coordinate: str) -> str:
     if source.channel is Channel.KINEMATIC:
-        return "m" if source.motors else "m/s"
+        return "m" if source.own else "m/s"
     return "N" if coordinate in ("x", "y") else "Nm"

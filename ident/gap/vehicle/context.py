@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ident.estimate.filters import Processing, zero_phase
 from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
-from ident.gap.vehicle.rattling import rattle_rows
 from ident.gap.vehicle.sliding import SlidingCause, sliding_cause
 from ident.gap.vehicle.sources import Source
 from ident.gap.vehicle.transforms import Setting, TransformCause, transform_cause
@@ -91,8 +90,8 @@ class Context:
 
     def rows_of(self, inputs: Array, source: Source) -> Array:
         """The rows of a source (M, rows, 1) with other signals (M, INPUTS)."""
-        if source.motors:
-            return rattle_rows(inputs, source.motors, self.geometry.wheel_radius)[..., None]
+        if source.own is not None:
+            return source.own.of(inputs)[..., None]
         return np.asarray(self.formulas.exact(source.channel, source.spec)(inputs, *self.constants, np.zeros(0)))
 
     def filtered(self, values: Array, source: Source) -> Array:
@@ -146,7 +145,7 @@ def fitted_parameters(sources: Sequence[Source], vehicle: VehicleDescription, co
 
 def table_of(source: Source, context: Context, units: Sequence[rows.UnitTerm]) -> Array:
     """Filtered residual at p = 0, regressor and columns of a source: (N, rows, 12 + units)."""
-    if source.motors:
+    if source.own is not None:
         plain = context.filtered(context.plain(source), source)
         return np.concatenate([plain, np.zeros((*plain.shape[:2], MODEL_COLUMNS - 1 + len(units)))], axis=2)
     function = context.formulas.linearised(source.channel, source.spec, units)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from ident.gap.problem import Variant
 from ident.gap.vehicle.context import Context
 from ident.gap.vehicle.library import TermCause
-from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.sliding import SlidingCause
 from ident.gap.vehicle.sources import Source
 from ident.gap.vehicle.transforms import TransformCause
@@ -59,7 +58,7 @@ def _change(
         if np.array_equal(changed[:, seen], inputs[:, seen]):
             return None
         after = context.rows_of(changed, source)
-    elif source.motors:
+    elif source.own is not None:
         return None
     else:
         exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)
@@ -69,8 +68,8 @@ def _change(
 
 def _seen(source: Source, context: Context) -> list[int]:
     """Columns of the signals that the rows of a source are made of."""
-    if source.motors:
-        return [SLICES["rattle"].start + wheel for wheel in source.motors]
+    if source.own is not None:
+        return list(source.own.columns)
     plain = context.formulas.exact(source.channel, source.spec)
     return [element for argument, element in plain.inputs if argument == 0]
 

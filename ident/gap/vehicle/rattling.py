@@ -13,13 +13,15 @@ x_f being x above `BAND`, |β_f| the rms of the motor there, <.> what passes the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ident.estimate.filters import Processing, zero_phase
-from ident.gap.vehicle.rows import SLICES
+from ident.gap.vehicle.rows import SLICES, OwnRows
+from ident.vehicle.geometry import WHEELS, Geometry
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -32,6 +34,9 @@ LEAST: Final = 1e-4
 
 ABOVE_OTHERS: Final = 5.0
 """The same over that of the quietest motor, whose encoder has the same noise."""
+
+ABOVE_PARTNER: Final = 2.0
+"""The same over that of the other motor of a unit that steers at standstill: what moves the unit moves both."""
 
 OFTEN: Final = 0.05
 """Part of a drive that a motor must rattle for; what it has shaken loose then slides on in all of it [-]."""
@@ -48,19 +53,22 @@ def above_band(values: Array, sample_time: float) -> Array:
     return np.asarray(values - zero_phase(values, BAND, sample_time))
 
 
-def rattling(beta: Array, processing: Processing, sample_time: float) -> tuple[Array, Mask]:
-    """Rms motion of the motors above the band (N, 4) [rad], and where each that often rattles does so (N, 4).
+def rattling(
+    beta: Array, processing: Processing, sample_time: float, above: float = ABOVE_OTHERS
+) -> tuple[Array, Mask]:
+    """Rms motion of motors above the band (N, k) [rad], and where each that often rattles does so (N, k).
 
-    Where all four do, none is said to: no wheel is left that rolls.
+    Where all do, none is said to: no wheel is left that rolls.
 
     Args:
-        beta: angles of the motors in a drive, at the wheels (N, 4) [rad].
+        beta: angles of the motors in a drive, at the wheels (N, k) [rad].
         processing: its filter is what the rows pass.
         sample_time: [s].
+        above: rms over that of the quietest from which a motor rattles.
     """
     power = zero_phase(above_band(beta, sample_time) ** 2, processing.cutoff, sample_time)
     rms = np.sqrt(np.maximum(power, 0.0))
-    rattles = rms > np.maximum(LEAST, ABOVE_OTHERS * rms.min(axis=1, keepdims=True))
+    rattles = rms > np.maximum(LEAST, above * rms.min(axis=1, keepdims=True))
     rattles &= rattles.mean(axis=0) > OFTEN
     return rms, np.asarray(rattles & ~rattles.any(axis=0).all())
 
@@ -70,6 +78,8 @@ def hammer(moved: Array, rms: Array) -> Array:
     return np.asarray(moved / np.maximum(rms, LEAST))
 
 
-def rattle_rows(inputs: Array, wheels: tuple[int, ...], radius: float) -> Array:
-    """How far the motors of some wheels move with the hammer, beyond what their gears give way by (N, wheels) [m]."""
-    return np.asarray(radius * inputs[:, SLICES["rattle"]][:, wheels])
+def rattle_rows(wheels: Sequence[int], geometry: Geometry) -> OwnRows:
+    """How far the motors of some wheels move with the hammer, beyond what their gears give way by."""
+    names = tuple(f"rattle_{WHEELS[wheel]}" for wheel in wheels)
+    columns = tuple(SLICES["rattle"].start + wheel for wheel in wheels)
+    return OwnRows(names, columns, geometry.wheel_radius, UNTOLD)

@@ -56,6 +56,7 @@ _SIZES: Final = {
     "twist_rate": 2,
     "hammer": 4,
     "rattle": 4,
+    "wander": 2,
 }
 _ENDS: Final = np.cumsum(list(_SIZES.values())).tolist()
 SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS, strict=True)}
@@ -64,7 +65,8 @@ SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZE
 `beta` is what the encoder of a motor reads, at the wheel; its derivatives are those of the wheel once that is made to
 roll as the others say, and `motor_acceleration` stays that of the motor.
 
-`hammer` [-] and `rattle` [rad] are zero but where a motor rattles in its gear (`ident.gap.vehicle.rattling`).
+`hammer` [-] and `rattle` [rad] are zero but where a motor rattles in its gear (`ident.gap.vehicle.rattling`), `wander`
+[rad] but where a rear unit does so in its coupling (`ident.gap.vehicle.wandering`).
 """
 
 INPUTS: Final = _ENDS[-1]
@@ -99,6 +101,28 @@ class _Inputs:
     twist_rate: Expression
     hammer: Expression
     rattle: Expression
+    wander: Expression
+
+
+@dataclass(frozen=True)
+class OwnRows:
+    """Rows that are signals themselves, of which the model says nothing: what shows there is all of a cause.
+
+    Attributes:
+        coordinates: names, a block each.
+        columns: of the signals.
+        lever: what they are multiplied with [m].
+        untold: part that may stay unexplained [-].
+    """
+
+    coordinates: tuple[str, ...]
+    columns: tuple[int, ...]
+    lever: float
+    untold: float
+
+    def of(self, inputs: Array) -> Array:
+        """The rows (N, rows) [m] of signals (N, INPUTS)."""
+        return np.asarray(self.lever * inputs[:, self.columns])
 
 
 def _inputs() -> _Inputs:

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.integrate import cumulative_trapezoid
 
 from ident.errors import RecordError
 from ident.estimate.equations import ROWS, RowsOfStep
 from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
-from ident.gap.vehicle.rattling import above_band, hammer, rattling
+from ident.gap.vehicle.loose import as_it_was, taken_apart
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
-from ident.gap.vehicle.sliding import rolled_with_others, rolling_rates
+from ident.gap.vehicle.wandering import wanders
 from ident.records.record import Record, Step, base_step
-from ident.vehicle import kinematics
-from ident.vehicle.geometry import WHEELS, Geometry
+from ident.vehicle.geometry import Geometry
 from ident.vehicle.modes import Mode
 
 Array = NDArray[np.float64]
@@ -57,7 +55,7 @@ class Source:
         period: (M,).
         record: for messages.
         rattles: (M, 4) where the motor of each wheel rattles in its gear.
-        motors: wheels whose motors rattle, if the rows are those of these motors instead of what rolls.
+        own: its rows, if they are those of motors that rattle or a unit that wanders, instead of what rolls.
     """
 
     channel: Channel
@@ -70,13 +68,13 @@ class Source:
     period: NDArray[np.int64]
     record: str
     rattles: NDArray[np.bool_]
-    motors: tuple[int, ...] = ()
+    own: rows.OwnRows | None = None
 
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of its rows, a block each."""
-        if self.motors:
-            return tuple(f"rattle_{WHEELS[wheel]}" for wheel in self.motors)
+        if self.own is not None:
+            return self.own.coordinates
         return rows.coordinates(self.channel, self.spec)
 
     @property
@@ -87,7 +85,7 @@ class Source:
     @property
     def rolls(self) -> bool:
         """Whether its rows are those of rolling wheels that travel."""
-        return self.channel is Channel.KINEMATIC and self.travels and not self.motors
+        return self.channel is Channel.KINEMATIC and self.travels and self.own is None
 
 
 def sources_of(
@@ -121,7 +119,7 @@ def sources_of(
             f"{record.source} does not move in any step of a diagnosis.",
             "Record a drive: angles of wheels and steering must change.",
         )
-    return [source for source in found if any(mask.any() for mask in source.moving)]
+    return [source for source in _apart(found) if any(mask.any() for mask in source.moving)]
 
 
 def processing_of(records: Sequence[Record]) -> Processing:
@@ -147,76 +145,42 @@ def _sources(
     recorded[:, rows.SLICES["torques"]] = zero_phase(
         recorded[:, rows.SLICES["torques"]], processing.signal_cutoff, segment.sample_time
     )
-    rms, rattles = _rattling(signals, () if as_recorded else _against_one_another(spec), geometry, processing)
-    inputs = _hammered(recorded, rms, rattles, geometry, segment.sample_time) if rattles.any() else recorded
+    rolling = _rolling(signals, spec, processing)
+    loose = as_it_was(recorded)
+    if not as_recorded:
+        loose = taken_apart(recorded, signals, spec, rolling, geometry, processing)
     common = {
         "step": segment.step,
         "spec": spec,
-        "inputs": inputs[::stride],
+        "inputs": loose.inputs[::stride],
         "sample_time": segment.sample_time * stride,
         "factor": factor // stride,
         "period": segment.period[::stride],
         "record": signals.record,
-        "rattles": rattles[::stride],
+        "rattles": loose.rattles[::stride],
     }
     dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
-    if names and not rattles.any():
-        rolling = _rolling(signals, spec, processing)[::stride]
-        yield Source(channel=Channel.KINEMATIC, moving=(rolling,) * len(names), **common)  # type: ignore[arg-type]
-    if rattles.any() and spec.mode is not Mode.ALIGNMENT:
-        # While steering at standstill the unit swings back against the motor, which no other wheel shows.
-        motors = tuple(np.flatnonzero(rattles.any(axis=0)).tolist())
-        inside = _inside(rattles, processing, segment.sample_time)
-        shaking = tuple(inside[::stride, wheel] for wheel in motors)
-        yield Source(channel=Channel.KINEMATIC, moving=shaking, motors=motors, **common)  # type: ignore[arg-type]
+    if names and not loose.rattles.any():
+        kinematic = (rolling[::stride],) * len(names)
+        yield Source(channel=Channel.KINEMATIC, moving=kinematic, **common)  # type: ignore[arg-type]
+    if loose.own is not None:
+        moving = tuple(mask[::stride] for mask in loose.moving)
+        yield Source(channel=Channel.KINEMATIC, moving=moving, own=loose.own, **common)  # type: ignore[arg-type]
 
 
-def _against_one_another(spec: RowsOfStep) -> tuple[int, ...]:
-    """Wheels of a step whose motors may rattle and are compared; in the air no floor is hammered, and nothing rolls."""
-    if spec.mode is Mode.ALIGNMENT:
-        return tuple(WHEELS.index(name[-2:]) for name in rows.kinematic_coordinates(spec))
-    return () if spec.mode is None else tuple(range(len(WHEELS)))
-
-
-def _rattling(
-    signals: Signals, wheels: tuple[int, ...], geometry: Geometry, processing: Processing
-) -> tuple[Array, NDArray[np.bool_]]:
-    """`rattling` of some wheels, none of the others (N, 4).
-
-    What turns with the units is no rattling: at standstill a unit jumps where its friction reverses, and only one motor
-    that moves beside it rattles.
-    """
-    rms, rattles = np.zeros(signals.beta.shape), np.zeros(signals.beta.shape, dtype=np.bool_)
-    if not wheels:
-        return rms, rattles
-    motors = signals.beta
-    if len(wheels) < len(WHEELS):
-        motors = motors - signals.alpha @ kinematics.complement(Mode.ALIGNMENT, np.zeros((1, 2)), geometry)[0, 5:].T
-    picked = np.array(wheels)
-    rms[:, picked], rattles[:, picked] = rattling(motors[:, picked], processing, signals.segment.sample_time)
-    return rms, rattles
-
-
-def _inside(rattles: NDArray[np.bool_], processing: Processing, sample_time: float) -> NDArray[np.bool_]:
-    """Where motors rattle (N, 4), away from the ends of the filter."""
-    ends, found = round(processing.guard / sample_time), rattles.copy()
-    found[:ends] = found[len(found) - ends :] = False
-    return found
-
-
-def _hammered(recorded: Array, rms: Array, rattles: NDArray[np.bool_], geometry: Geometry, sample_time: float) -> Array:
-    """Signals (N, INPUTS) with what motors do that rattle, and with wheels that roll in spite of it."""
-    wheels = np.flatnonzero(rattles.any(axis=0)).tolist()
-    rolled = rolling_rates(recorded, wheels, geometry)
-    inputs = rolled_with_others(recorded, wheels, rolled, sample_time)
-    against = recorded[:, rows.SLICES["beta"]].copy()
-    against[:, wheels] -= cumulative_trapezoid(rolled, dx=sample_time, axis=0, initial=0)
-    moved = above_band(against, sample_time)
-    weights = np.where(rattles, hammer(moved, rms), 0.0)
-    inputs[:, rows.SLICES["hammer"]], inputs[:, rows.SLICES["rattle"]] = weights, weights * moved
-    return inputs
+def _apart(sources: Sequence[Source]) -> Iterator[Source]:
+    """The sources of a record, units that wander only where those of the other side do not."""
+    across: dict[rows.OwnRows, Array] = {}
+    for source in sources:
+        if source.own is not None and source.spec.mode is Mode.ALIGNMENT:
+            found = source.inputs[source.moving[0], source.own.columns[0]]
+            across[source.own] = np.append(across.get(source.own, []), found)
+    for source in sources:
+        others = [found for own, found in across.items() if own != source.own]
+        if source.own not in across or wanders(across[source.own], others):
+            yield source
 
 
 def _moving(signals: Signals, spec: RowsOfStep, coordinate: str, processing: Processing) -> NDArray[np.bool_]:

@@ -98,7 +98,9 @@ def _coupling_with_play(inputs: Array, place: int, sizes: Array, setting: Settin
     gap, compliance = sizes
     load, friction = _coupling_load(inputs, place, setting), _unit_friction(place, setting)
     twist = gap / 2 * _relay(load, friction) + compliance * _play(load, friction)
-    return _rear_behind_front(inputs, place, twist, setting)
+    changed, wander = _rear_behind_front(inputs, place, twist, setting), SLICES["wander"].start + place
+    changed[inputs[:, wander] > 0, wander] -= gap
+    return changed
 
 
 def _unit_friction(side: int, setting: Setting) -> float:

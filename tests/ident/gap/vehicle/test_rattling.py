@@ -76,7 +76,7 @@ def test_play_and_flanks_are_told_from_the_motion_above_the_band(prototype: Vehi
     cause = transform_cause(EffectName.BACKLASH, "drive_fl")
 
     def slow(sizes: tuple[float, float]) -> Array:
-        found = rattle_rows(cause.without(inputs, np.array(sizes), setting), (0,), setting.geometry.wheel_radius)
+        found = rattle_rows((0,), setting.geometry).of(cause.without(inputs, np.array(sizes), setting))
         return zero_phase(found[:, 0], 40.0, DT)[200:-200]
 
     bare = slow((0.0, 0.0))
@@ -146,7 +146,7 @@ def test_rolling_says_nothing_in_a_drive_that_rattles(hammered: Record, prototyp
     processing = processing_of([hammered])
     sources = sources_of(hammered, prototype.geometry, [Step.STRAIGHT, Step.ROTATION], processing)
     assert {source.step for source in sources if source.rolls} == {Step.ROTATION}
-    (rows,) = [source for source in sources if source.motors]
+    (rows,) = [source for source in sources if source.own is not None]
     assert (rows.step, rows.coordinates) == (Step.STRAIGHT, ("rattle_fr",))
 
 

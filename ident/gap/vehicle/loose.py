@@ -1,0 +1,122 @@
+"""What is loose in a drive: motors that rattle in their gears, a rear unit that wanders in its coupling."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+
+from ident.estimate.equations import RowsOfStep
+from ident.estimate.filters import Processing
+from ident.gap.vehicle.rattling import ABOVE_PARTNER, LEAST, above_band, hammer, rattle_rows, rattling
+from ident.gap.vehicle.rows import SLICES, OwnRows
+from ident.gap.vehicle.signals import Signals
+from ident.gap.vehicle.sliding import rolled_with_others, rolling_rates
+from ident.gap.vehicle.wandering import wander_rows, wandered
+from ident.vehicle import kinematics
+from ident.vehicle.geometry import WHEELS, Geometry
+from ident.vehicle.modes import Mode
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_SIDES: Final = ((0, 1), (2, 3))
+"""Front and rear wheel of either side."""
+
+
+@dataclass(frozen=True)
+class Loose:
+    """A drive and what is loose in it.
+
+    Attributes:
+        inputs: (N, INPUTS) signals with what is loose in columns of its own, wheels rolling in spite of it.
+        rattles: (N, 4) where the motor of each wheel rattles in its gear.
+        own: rows of what is loose; None where nothing is.
+        moving: (N,) rows to be used, a mask for each of those.
+    """
+
+    inputs: Array
+    rattles: Mask
+    own: OwnRows | None = None
+    moving: tuple[Mask, ...] = ()
+
+
+def as_it_was(recorded: Array) -> Loose:
+    """Signals (N, INPUTS) of a drive in which nothing is taken to be loose."""
+    return Loose(recorded, np.zeros((len(recorded), len(WHEELS)), dtype=np.bool_))
+
+
+def taken_apart(
+    recorded: Array, signals: Signals, spec: RowsOfStep, rolling: Mask, geometry: Geometry, processing: Processing
+) -> Loose:
+    """Signals (N, INPUTS) of a drive, and what is loose in it; `rolling` (N,) where its wheels roll.
+
+    In the air no floor is hammered. A motor that rattles while its side steers at standstill has no rows: what swings
+    back is the steered unit, which no other wheel shows; and where one does for a moment, no unit is said to wander.
+    """
+    if spec.mode is None:
+        return as_it_was(recorded)
+    dt, standstill = signals.segment.sample_time, spec.mode is Mode.ALIGNMENT
+    rms, rattles = (
+        _of_steered(signals, spec, geometry, processing) if standstill else rattling(signals.beta, processing, dt)
+    )
+    if rattles.any():
+        inputs = _hammered(recorded, rms, rattles, geometry, dt)
+        motors = np.flatnonzero(rattles.any(axis=0)).tolist()
+        inside = _inside(rattles, processing, dt)
+        own = None if standstill else rattle_rows(motors, geometry)
+        return Loose(inputs, rattles, own, tuple(inside[:, wheel] for wheel in motors))
+    if not standstill or (rms > LEAST).any():
+        return Loose(recorded, rattles)
+    side = _side(spec)
+    wheels, inputs = list(_SIDES[side]), recorded.copy()
+    turned = signals.beta[:, wheels] / _turned_by_steering(geometry)[wheels, side]
+    across = wandered(signals.alpha[:, side], turned, rolling, dt)
+    inputs[:, SLICES["wander"].start + side] = across
+    return Loose(inputs, rattles, wander_rows(side, geometry), (across > 0,))
+
+
+def _of_steered(signals: Signals, spec: RowsOfStep, geometry: Geometry, processing: Processing) -> tuple[Array, Mask]:
+    """`rattling` while a side steers at standstill (N, 4).
+
+    A unit jumps where its friction reverses, and both of its motors with it: one that moves beside its unit rattles.
+    """
+    dt = signals.segment.sample_time
+    rms, rattles = np.zeros(signals.beta.shape), np.zeros(signals.beta.shape, dtype=np.bool_)
+    wheels = list(_SIDES[_side(spec)])
+    beside = signals.beta - signals.alpha @ _turned_by_steering(geometry).T
+    rms[:, wheels], rattles[:, wheels] = rattling(beside[:, wheels], processing, dt, ABOVE_PARTNER)
+    return rms, rattles
+
+
+def _side(spec: RowsOfStep) -> int:
+    return kinematics.GENERALIZED_VELOCITIES[Mode.ALIGNMENT].index(spec.coordinates[0])
+
+
+def _turned_by_steering(geometry: Geometry) -> Array:
+    """Angles (4, 2) by which the wheels roll as either side steers at standstill [rad/rad]."""
+    found = kinematics.complement(Mode.ALIGNMENT, np.zeros((1, 2)), geometry)[0]
+    return np.asarray(found[-len(WHEELS) :])
+
+
+def _hammered(recorded: Array, rms: Array, rattles: Mask, geometry: Geometry, sample_time: float) -> Array:
+    """Signals (N, INPUTS) with what motors do that rattle, and with wheels that roll in spite of it."""
+    wheels = np.flatnonzero(rattles.any(axis=0)).tolist()
+    rolled = rolling_rates(recorded, wheels, geometry)
+    inputs = rolled_with_others(recorded, wheels, rolled, sample_time)
+    against = recorded[:, SLICES["beta"]].copy()
+    against[:, wheels] -= cumulative_trapezoid(rolled, dx=sample_time, axis=0, initial=0)
+    moved = above_band(against, sample_time)
+    weights = np.where(rattles, hammer(moved, rms), 0.0)
+    inputs[:, SLICES["hammer"]], inputs[:, SLICES["rattle"]] = weights, weights * moved
+    return inputs
+
+
+def _inside(rattles: Mask, processing: Processing, sample_time: float) -> Mask:
+    """Where motors rattle (N, 4), away from the ends of the filter."""
+    ends, found = round(processing.guard / sample_time), rattles.copy()
+    found[:ends] = found[len(found) - ends :] = False
+    return found

@@ -1,0 +1,81 @@
+"""Rear units that wander in the play of their coupling while their side steers at standstill.
+
+Both wheels of a side are driven alike there, so no load says on which flank of a play the rear unit lies, and which way
+it is carried differs from repeat to repeat. But it crosses the play again and again, and both wheels tell how far: what
+they roll turns their units by angles whose difference d stays constant without a play. What d ranges over within a
+second is a row of its own, which a play makes as large as itself: on the emulator 94 to 100 % of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from ident.gap.vehicle.rows import SLICES, OwnRows
+from ident.vehicle.geometry import Geometry
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+WINDOW: Final = 1.0
+"""Within which a unit has crossed its play [s]."""
+
+SMOOTH: Final = 0.04
+"""Over which d is averaged [s]: encoders leave some microradians there."""
+
+SHAPE: Final = (1, 2, 3)
+"""Powers of the steering angle that are no wandering: other radii and eccentric wheels are smooth functions of it."""
+
+LEAST: Final = 5e-5
+"""Range of d from which a unit wanders [rad]; without a play it is 0.02 mrad on the emulator."""
+
+ABOVE_OTHER: Final = 5.0
+"""The same over that of the other side: what both show is how the floor holds the wheels."""
+
+UNTOLD: Final = 0.1
+"""Part of the range that may stay unexplained: a unit does not always reach both flanks [-]."""
+
+COORDINATES: Final = ("wander_l", "wander_r")
+
+
+def wandered(alpha: Array, turned: Array, looked_at: Mask, sample_time: float) -> Array:
+    """Range of d within `WINDOW` around (N,) [rad]; zero where that leaves what is looked at.
+
+    Args:
+        alpha: steering angle of a side (N,) [rad].
+        turned: angles by which front and rear wheel have turned their units (N, 2) [rad].
+        looked_at: (N,) where wheels roll and nothing else.
+        sample_time: [s].
+    """
+    width = 2 * round(WINDOW / 2 / sample_time) + 1
+    inside = ndimage.binary_erosion(looked_at, np.ones(width, dtype=bool))
+    if not inside.any():
+        return np.zeros(len(alpha))
+    apart = ndimage.uniform_filter1d(turned[:, 1] - turned[:, 0], max(1, round(SMOOTH / sample_time)))
+    run = ndimage.label(looked_at)[0]
+    level = run[:, None] == np.arange(1, run.max() + 1)
+    design = np.hstack([level, np.stack([alpha**power for power in SHAPE], axis=1)])
+    smooth = design @ np.linalg.lstsq(design[looked_at], apart[looked_at], rcond=None)[0]
+    # A play is no function of the angle; what one takes from it by chance must not make it larger.
+    across = np.minimum(_range(apart, width), _range(apart - smooth, width))
+    return np.where(inside, across, 0.0)
+
+
+def _range(values: Array, width: int) -> Array:
+    """Largest less smallest value (N,) of the samples around each."""
+    return np.asarray(ndimage.maximum_filter1d(values, width) - ndimage.minimum_filter1d(values, width))
+
+
+def wanders(across: Array, others: Sequence[Array]) -> bool:
+    """Whether ranges (N,) [rad] are those of a play, and not what the other side shows too."""
+    typical = [float(np.median(each)) if each.size else 0.0 for each in (across, *others)]
+    return typical[0] > max([LEAST, *(ABOVE_OTHER * each for each in typical[1:])])
+
+
+def wander_rows(side: int, geometry: Geometry) -> OwnRows:
+    """How far the rear wheel of a side rolls across the play."""
+    return OwnRows((COORDINATES[side],), (SLICES["wander"].start + side,), geometry.wheel_offset, UNTOLD)
