@@ -23,6 +23,9 @@ from ident.vehicle.modes import Mode
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+ASKEW: Final = 0.4
+"""Steering angle beyond which a wheel that steers at standstill pushes the chassis aside [rad]."""
+
 _SIDES: Final = ((0, 1), (2, 3))
 """Front and rear wheel of either side."""
 
@@ -50,9 +53,9 @@ def as_it_was(recorded: Array) -> Loose:
 
 
 def taken_apart(
-    recorded: Array, signals: Signals, spec: RowsOfStep, rolling: Mask, geometry: Geometry, processing: Processing
+    recorded: Array, signals: Signals, spec: RowsOfStep, geometry: Geometry, processing: Processing
 ) -> Loose:
-    """Signals (N, INPUTS) of a drive, and what is loose in it; `rolling` (N,) where its wheels roll.
+    """Signals (N, INPUTS) of a drive, and what is loose in it.
 
     In the air no floor is hammered. A motor that rattles while its side steers at standstill has no rows: what swings
     back is the steered unit, which no other wheel shows; and where one does for a moment, no unit is said to wander.
@@ -74,7 +77,8 @@ def taken_apart(
     side = _side(spec)
     wheels, inputs = list(_SIDES[side]), recorded.copy()
     turned = signals.beta[:, wheels] / _turned_by_steering(geometry)[wheels, side]
-    across = wandered(signals.alpha[:, side], turned, rolling, dt)
+    near = np.all(np.abs(signals.alpha) < ASKEW, axis=1)
+    across = wandered(signals.alpha[:, side], turned, near, dt)
     inputs[:, SLICES["wander"].start + side] = across
     return Loose(inputs, rattles, wander_rows(side, geometry), (across > 0,))
 

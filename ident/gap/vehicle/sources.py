@@ -15,7 +15,7 @@ from ident.estimate.equations import ROWS, RowsOfStep
 from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
-from ident.gap.vehicle.loose import as_it_was, taken_apart
+from ident.gap.vehicle.loose import ASKEW, as_it_was, taken_apart
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
 from ident.gap.vehicle.wandering import wanders
 from ident.records.record import Record, Step, base_step
@@ -29,9 +29,6 @@ DIAGNOSED: Final = tuple(step for step in ROWS if step is not Step.LANE_CHANGE)
 
 OVERSAMPLED: Final = 3.0
 """Rate at which rows are evaluated, in units of the cutoff of the smoothed signals over π."""
-
-ASKEW: Final = 0.4
-"""Steering angle beyond which a wheel that steers at standstill pushes the chassis aside [rad]."""
 
 SIGNAL_BANDWIDTH: Final = 1000.0
 """Of the signals [rad/s]: motors on the compliance of their gears' teeth rattle more slowly than that."""
@@ -145,10 +142,7 @@ def _sources(
     recorded[:, rows.SLICES["torques"]] = zero_phase(
         recorded[:, rows.SLICES["torques"]], processing.signal_cutoff, segment.sample_time
     )
-    rolling = _rolling(signals, spec, processing)
-    loose = as_it_was(recorded)
-    if not as_recorded:
-        loose = taken_apart(recorded, signals, spec, rolling, geometry, processing)
+    loose = as_it_was(recorded) if as_recorded else taken_apart(recorded, signals, spec, geometry, processing)
     common = {
         "step": segment.step,
         "spec": spec,
@@ -163,7 +157,7 @@ def _sources(
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
     if names and not loose.rattles.any():
-        kinematic = (rolling[::stride],) * len(names)
+        kinematic = (_rolling(signals, spec, processing)[::stride],) * len(names)
         yield Source(channel=Channel.KINEMATIC, moving=kinematic, **common)  # type: ignore[arg-type]
     if loose.own is not None:
         moving = tuple(mask[::stride] for mask in loose.moving)
@@ -172,11 +166,11 @@ def _sources(
 
 def _apart(sources: Sequence[Source]) -> Iterator[Source]:
     """The sources of a record, units that wander only where those of the other side do not."""
-    across: dict[rows.OwnRows, Array] = {}
+    across: dict[rows.OwnRows, float] = {}
     for source in sources:
         if source.own is not None and source.spec.mode is Mode.ALIGNMENT:
-            found = source.inputs[source.moving[0], source.own.columns[0]]
-            across[source.own] = np.append(across.get(source.own, []), found)
+            found = float(source.inputs[:, source.own.columns].max())
+            across[source.own] = max(found, across.get(source.own, 0.0))
     for source in sources:
         others = [found for own, found in across.items() if own != source.own]
         if source.own not in across or wanders(across[source.own], others):

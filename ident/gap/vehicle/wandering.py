@@ -3,7 +3,7 @@
 Both wheels of a side are driven alike there, so no load says on which flank of a play the rear unit lies, and which way
 it is carried differs from repeat to repeat. But it crosses the play again and again, and both wheels tell how far: what
 they roll turns their units by angles whose difference d stays constant without a play. What d ranges over within a
-second is a row of its own, which a play makes as large as itself: on the emulator 94 to 100 % of it.
+second, in most seconds at most, is a row of its own, which a play makes as large as itself.
 """
 
 from __future__ import annotations
@@ -30,6 +30,9 @@ SMOOTH: Final = 0.04
 SHAPE: Final = (1, 2, 3)
 """Powers of the steering angle that are no wandering: other radii and eccentric wheels are smooth functions of it."""
 
+REACHED: Final = 0.9
+"""Quantile of the ranges of a step that is taken: in some seconds a unit stays on one flank."""
+
 LEAST: Final = 5e-5
 """Range of d from which a unit wanders [rad]; without a play it is 0.02 mrad on the emulator."""
 
@@ -43,12 +46,12 @@ COORDINATES: Final = ("wander_l", "wander_r")
 
 
 def wandered(alpha: Array, turned: Array, looked_at: Mask, sample_time: float) -> Array:
-    """Range of d within `WINDOW` around (N,) [rad]; zero where that leaves what is looked at.
+    """How far d ranges within `WINDOW` (N,) [rad], one value; zero where that leaves what is looked at.
 
     Args:
         alpha: steering angle of a side (N,) [rad].
         turned: angles by which front and rear wheel have turned their units (N, 2) [rad].
-        looked_at: (N,) where wheels roll and nothing else.
+        looked_at: (N,) where no wheel pushes the chassis aside.
         sample_time: [s].
     """
     width = 2 * round(WINDOW / 2 / sample_time) + 1
@@ -62,7 +65,7 @@ def wandered(alpha: Array, turned: Array, looked_at: Mask, sample_time: float) -
     smooth = design @ np.linalg.lstsq(design[looked_at], apart[looked_at], rcond=None)[0]
     # A play is no function of the angle; what one takes from it by chance must not make it larger.
     across = np.minimum(_range(apart, width), _range(apart - smooth, width))
-    return np.where(inside, across, 0.0)
+    return np.where(inside, np.quantile(across[inside], REACHED), 0.0)
 
 
 def _range(values: Array, width: int) -> Array:
@@ -70,10 +73,9 @@ def _range(values: Array, width: int) -> Array:
     return np.asarray(ndimage.maximum_filter1d(values, width) - ndimage.minimum_filter1d(values, width))
 
 
-def wanders(across: Array, others: Sequence[Array]) -> bool:
-    """Whether ranges (N,) [rad] are those of a play, and not what the other side shows too."""
-    typical = [float(np.median(each)) if each.size else 0.0 for each in (across, *others)]
-    return typical[0] > max([LEAST, *(ABOVE_OTHER * each for each in typical[1:])])
+def wanders(across: float, others: Sequence[float]) -> bool:
+    """Whether a range [rad] is that of a play, and not what the other side shows too."""
+    return across > max([LEAST, *(ABOVE_OTHER * other for other in others)])
 
 
 def wander_rows(side: int, geometry: Geometry) -> OwnRows:
