@@ -111,12 +111,13 @@ def sources_of(
             f"{record.source} holds none of the steps of a diagnosis.",
             f"It needs some of {', '.join(steps)} by these names in the channel step.",
         )
-    if not any(mask.any() for source in found for mask in source.moving):
+    shown = [source for source in _apart(found) if any(mask.any() for mask in source.moving)]
+    if not shown:
         raise RecordError(
             f"{record.source} does not move in any step of a diagnosis.",
             "Record a drive: angles of wheels and steering must change.",
         )
-    return [source for source in _apart(found) if any(mask.any() for mask in source.moving)]
+    return shown
 
 
 def processing_of(records: Sequence[Record]) -> Processing:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from ident.errors import RecordError
 from ident.gap.problem import Channel, Problem
 from ident.gap.vehicle.build import build_problem
 from ident.gap.vehicle.ideal import Drive, ideal_record
@@ -148,3 +149,11 @@ def test_a_motor_that_rattles_for_a_moment_is_no_unit_that_wanders(
     moment = np.abs(left.time - left.time.mean()) < 0.05 * np.ptp(left.time) / 3
     angles[:, 1] += 1e-3 * np.sin(440 * left.time) * moment
     assert wandering(replace(still, segments=[replace(left, wheel_angles=angles), right]), prototype) == []
+
+
+def test_a_vehicle_whose_encoders_only_scatter_does_not_move(still: Record, prototype: VehicleDescription) -> None:
+    left = still.segments[0]
+    noise = 1e-6 * np.random.default_rng(3).normal(size=(len(left), 4))
+    standing = replace(left, steering_angles=np.zeros((len(left), 2)), wheel_angles=noise)
+    with pytest.raises(RecordError, match="does not move"):
+        sources_of(Record([standing]), prototype.geometry, list(Step), processing_of([still]))
