@@ -11,7 +11,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from ident.estimate.equations import RowsOfStep
 from ident.estimate.filters import Processing
-from ident.gap.vehicle.rattling import ABOVE_PARTNER, LEAST, above_band, hammer, rattle_rows, rattling
+from ident.gap.vehicle.rattling import ABOVE_PARTNER, above_band, hammer, rattle_rows, rattling
 from ident.gap.vehicle.rows import SLICES, OwnRows
 from ident.gap.vehicle.signals import Signals
 from ident.gap.vehicle.sliding import rolled_with_others, rolling_rates
@@ -58,7 +58,7 @@ def taken_apart(
     """Signals (N, INPUTS) of a drive, and what is loose in it.
 
     In the air no floor is hammered. A motor that rattles while its side steers at standstill has no rows: what swings
-    back is the steered unit, which no other wheel shows; and where one does for a moment, no unit is said to wander.
+    back is the steered unit, which no other wheel shows.
     """
     if spec.mode is None:
         return as_it_was(recorded)
@@ -72,15 +72,15 @@ def taken_apart(
         inside = _inside(rattles, processing, dt)
         own = None if standstill else rattle_rows(motors, geometry)
         return Loose(inputs, rattles, own, tuple(inside[:, wheel] for wheel in motors))
-    if not standstill or (rms > LEAST).any():
+    if not standstill:
         return Loose(recorded, rattles)
     side = _side(spec)
     wheels, inputs = list(_SIDES[side]), recorded.copy()
     turned = signals.beta[:, wheels] / _turned_by_steering(geometry)[wheels, side]
     near = np.all(np.abs(signals.alpha) < ASKEW, axis=1)
-    across = wandered(signals.alpha[:, side], turned, near, dt)
+    across, unforetold = wandered(signals.alpha[:, side], turned, signals.torques[:, wheels], near, dt)
     inputs[:, SLICES["wander"].start + side] = across
-    return Loose(inputs, rattles, wander_rows(side, geometry), (across > 0,))
+    return Loose(inputs, rattles, wander_rows(side, geometry), ((across > 0) & unforetold,))
 
 
 def _of_steered(signals: Signals, spec: RowsOfStep, geometry: Geometry, processing: Processing) -> tuple[Array, Mask]:

@@ -33,6 +33,11 @@ SHAPE: Final = (1, 2, 3)
 REACHED: Final = 0.9
 """Quantile of the ranges of a step that is taken: in some seconds a unit stays on one flank."""
 
+UNFORETOLD: Final = 0.6
+"""Part of its range that d must keep beside what gears give way by: torques of both wheels, and their signs, times
+whatever fits. On the emulator a play of the coupling keeps 0.8 and more, those of a gear and compliances 0.05 to 0.45.
+"""
+
 LEAST: Final = 5e-5
 """Range of d from which a unit wanders [rad]; without a play it is 0.02 mrad on the emulator."""
 
@@ -45,27 +50,38 @@ UNTOLD: Final = 0.1
 COORDINATES: Final = ("wander_l", "wander_r")
 
 
-def wandered(alpha: Array, turned: Array, looked_at: Mask, sample_time: float) -> Array:
-    """How far d ranges within `WINDOW` (N,) [rad], one value; zero where that leaves what is looked at.
+def wandered(alpha: Array, turned: Array, torques: Array, looked_at: Mask, sample_time: float) -> tuple[Array, bool]:
+    """How far d ranges within `WINDOW` (N,) [rad], and whether no gear foretells it.
+
+    It is one value, zero where a window leaves what is looked at.
 
     Args:
         alpha: steering angle of a side (N,) [rad].
         turned: angles by which front and rear wheel have turned their units (N, 2) [rad].
+        torques: of their motors (N, 2), in whatever unit.
         looked_at: (N,) where no wheel pushes the chassis aside.
         sample_time: [s].
     """
     width = 2 * round(WINDOW / 2 / sample_time) + 1
     inside = ndimage.binary_erosion(looked_at, np.ones(width, dtype=bool))
     if not inside.any():
-        return np.zeros(len(alpha))
-    apart = ndimage.uniform_filter1d(turned[:, 1] - turned[:, 0], max(1, round(SMOOTH / sample_time)))
+        return np.zeros(len(alpha)), False
+    apart = _smooth(turned[:, 1] - turned[:, 0], sample_time)
     run = ndimage.label(looked_at)[0]
     level = run[:, None] == np.arange(1, run.max() + 1)
-    design = np.hstack([level, np.stack([alpha**power for power in SHAPE], axis=1)])
-    smooth = design @ np.linalg.lstsq(design[looked_at], apart[looked_at], rcond=None)[0]
+    shape = np.hstack([level, np.stack([alpha**power for power in SHAPE], axis=1)])
+    gears = _smooth(np.hstack([torques, np.sign(_smooth(torques, sample_time))]), sample_time)
+    plain, shaped, geared = (
+        _range(apart - design @ np.linalg.lstsq(design[looked_at], apart[looked_at], rcond=None)[0], width)[inside]
+        for design in (level, shape, np.hstack([shape, gears]))
+    )
     # A play is no function of the angle; what one takes from it by chance must not make it larger.
-    across = np.minimum(_range(apart, width), _range(apart - smooth, width))
-    return np.where(inside, np.quantile(across[inside], REACHED), 0.0)
+    across = float(np.quantile(np.minimum(plain, shaped), REACHED))
+    return np.where(inside, across, 0.0), bool(np.quantile(geared, REACHED) > UNFORETOLD * across)
+
+
+def _smooth(values: Array, sample_time: float) -> Array:
+    return np.asarray(ndimage.uniform_filter1d(values, max(1, round(SMOOTH / sample_time)), axis=0))
 
 
 def _range(values: Array, width: int) -> Array:
@@ -74,8 +90,8 @@ def _range(values: Array, width: int) -> Array:
 
 
 def wanders(across: float, others: Sequence[float]) -> bool:
-    """Whether a range [rad] is that of a play, and not what the other side shows too."""
-    return across > max([LEAST, *(ABOVE_OTHER * other for other in others)])
+    """Whether a range [rad] is that of a play, and not what the other side shows too, if that is known."""
+    return bool(others) and across > max(LEAST, *(ABOVE_OTHER * other for other in others))
 
 
 def wander_rows(side: int, geometry: Geometry) -> OwnRows:
