@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.estimate.equations import Equations
+from ident.records.repeats import repeats_of
 
 Array = NDArray[np.float64]
 
@@ -57,15 +58,10 @@ def _rms(values: Array) -> float:
 
 
 def _split(residual: Array, equations: Equations) -> tuple[float, float]:
-    numbers = [number for number in np.unique(equations.period) if number >= 0]
-    if len(numbers) < 2:
+    samples = repeats_of(equations.period)
+    folded = residual[samples[:, equations.moving[samples].all(axis=0)]]
+    if len(folded) < 2 or not folded.size:
         return float("nan"), float("nan")
-    length = min(int(np.sum(equations.period == number)) for number in numbers)
-    folded = np.stack([residual[equations.period == number][:length] for number in numbers])
-    moving = np.stack([equations.moving[equations.period == number][:length] for number in numbers]).all(axis=0)
-    if not moving.any():
-        return float("nan"), float("nan")
-    folded = folded[:, moving]
     variance = float(np.mean(folded.var(axis=0, ddof=1)))
-    repeated = float(np.mean(folded.mean(axis=0) ** 2)) - variance / len(numbers)
+    repeated = float(np.mean(folded.mean(axis=0) ** 2)) - variance / len(folded)
     return float(np.sqrt(variance)), float(np.sqrt(max(repeated, 0.0)))

@@ -125,5 +125,5 @@ def _creep(source: Source, context: Context) -> Array:
 
 def _unit(source: Source, coordinate: str) -> str:
     if source.channel is Channel.KINEMATIC:
-        return "m" if source.own else "m/s"
+        return "m/s" if source.own is None else "m"
     return "N" if coordinate in ("x", "y") else "Nm"

@@ -11,11 +11,11 @@ from scipy.integrate import cumulative_trapezoid
 
 from ident.estimate.equations import RowsOfStep
 from ident.estimate.filters import Processing
-from ident.gap.vehicle.rattling import ABOVE_PARTNER, above_band, hammer, rattle_rows, rattling
+from ident.gap.vehicle.rattling import above_band, hammer, rattle_rows, rattling, rattling_at_standstill
 from ident.gap.vehicle.rows import SLICES, OwnRows
 from ident.gap.vehicle.signals import Signals
 from ident.gap.vehicle.sliding import rolled_with_others, rolling_rates
-from ident.gap.vehicle.wandering import wander_rows, wandered
+from ident.gap.vehicle.wandering import wander_rows, wandering
 from ident.vehicle import kinematics
 from ident.vehicle.geometry import WHEELS, Geometry
 from ident.vehicle.modes import Mode
@@ -37,7 +37,7 @@ class Loose:
     Attributes:
         inputs: (N, INPUTS) signals with what is loose in columns of its own, wheels rolling in spite of it.
         rattles: (N, 4) where the motor of each wheel rattles in its gear.
-        own: rows of what is loose; None where nothing is.
+        own: rows of motors that rattle, or of a unit that may wander; None where there are neither.
         moving: (N,) rows to be used, a mask for each of those.
     """
 
@@ -55,45 +55,45 @@ def as_it_was(recorded: Array) -> Loose:
 def taken_apart(
     recorded: Array, signals: Signals, spec: RowsOfStep, geometry: Geometry, processing: Processing
 ) -> Loose:
-    """Signals (N, INPUTS) of a drive, and what is loose in it.
-
-    In the air no floor is hammered. A motor that rattles while its side steers at standstill has no rows: what swings
-    back is the steered unit, which no other wheel shows.
-    """
+    """Signals (N, INPUTS) of a drive, and what is loose in it; in the air no floor is hammered."""
     if spec.mode is None:
         return as_it_was(recorded)
-    dt, standstill = signals.segment.sample_time, spec.mode is Mode.ALIGNMENT
-    rms, rattles = (
-        _of_steered(signals, spec, geometry, processing) if standstill else rattling(signals.beta, processing, dt)
-    )
-    if rattles.any():
-        inputs = _hammered(recorded, rms, rattles, geometry, dt)
-        motors = np.flatnonzero(rattles.any(axis=0)).tolist()
-        inside = _inside(rattles, processing, dt)
-        own = None if standstill else rattle_rows(motors, geometry)
-        return Loose(inputs, rattles, own, tuple(inside[:, wheel] for wheel in motors))
-    if not standstill:
-        return Loose(recorded, rattles)
-    side = _side(spec)
-    wheels, inputs = list(_SIDES[side]), recorded.copy()
-    turned = signals.beta[:, wheels] / _turned_by_steering(geometry)[wheels, side]
-    near = np.all(np.abs(signals.alpha) < ASKEW, axis=1)
-    across, unforetold = wandered(signals.alpha[:, side], turned, signals.torques[:, wheels], near, dt)
-    inputs[:, SLICES["wander"].start + side] = across
-    return Loose(inputs, rattles, wander_rows(side, geometry), ((across > 0) & unforetold,))
-
-
-def _of_steered(signals: Signals, spec: RowsOfStep, geometry: Geometry, processing: Processing) -> tuple[Array, Mask]:
-    """`rattling` while a side steers at standstill (N, 4).
-
-    A unit jumps where its friction reverses, and both of its motors with it: one that moves beside its unit rattles.
-    """
+    if spec.mode is Mode.ALIGNMENT:
+        return _at_standstill(recorded, signals, _side(spec), geometry, processing)
     dt = signals.segment.sample_time
+    rms, rattles = rattling(signals.beta, processing, dt)
+    if not rattles.any():
+        return Loose(recorded, rattles)
+    motors = np.flatnonzero(rattles.any(axis=0)).tolist()
+    inside = _inside(rattles, processing, dt)
+    moving = tuple(inside[:, wheel] for wheel in motors)
+    return Loose(_hammered(recorded, rms, rattles, geometry, dt), rattles, rattle_rows(motors, geometry), moving)
+
+
+def near_middle(signals: Signals) -> Mask:
+    """Where (N,) no wheel that steers at standstill pushes the chassis aside."""
+    return np.asarray(np.all(np.abs(signals.alpha) < ASKEW, axis=1))
+
+
+def _at_standstill(recorded: Array, signals: Signals, side: int, geometry: Geometry, processing: Processing) -> Loose:
+    """A motor that rattles has no rows there: what swings back is the steered unit, which no other wheel shows."""
+    dt, wheels = signals.segment.sample_time, list(_SIDES[side])
     rms, rattles = np.zeros(signals.beta.shape), np.zeros(signals.beta.shape, dtype=np.bool_)
-    wheels = list(_SIDES[_side(spec)])
-    beside = signals.beta - signals.alpha @ _turned_by_steering(geometry).T
-    rms[:, wheels], rattles[:, wheels] = rattling(beside[:, wheels], processing, dt, ABOVE_PARTNER)
-    return rms, rattles
+    turned = signals.beta[:, wheels] / _turned_by_steering(geometry)[wheels, side]
+    beside = geometry.lever_ratio * (turned - signals.alpha[:, [side]])
+    rms[:, wheels], rattles[:, wheels] = rattling_at_standstill(beside, processing, dt)
+    if rattles.any():
+        return Loose(_hammered(recorded, rms, rattles, geometry, dt), rattles)
+    moving = np.abs(signals.alpha_rate[:, side]) > processing.moving
+    torques, alpha = signals.torques[:, wheels], signals.alpha[:, side]
+    near = near_middle(signals)
+    found = wandering(alpha, turned, torques, near, moving, dt)
+    if found is None:
+        return Loose(recorded, rattles)
+    inputs = recorded.copy()
+    # One number for the whole step: when the unit hops differs from repeat to repeat.
+    inputs[near, SLICES["wander"].start + side] = found.across
+    return Loose(inputs, rattles, wander_rows(side, geometry), (near & (not found.foretold),))
 
 
 def _side(spec: RowsOfStep) -> int:

@@ -35,9 +35,6 @@ LEAST: Final = 1e-4
 ABOVE_OTHERS: Final = 5.0
 """The same over that of the quietest motor, whose encoder has the same noise."""
 
-ABOVE_PARTNER: Final = 2.0
-"""The same over that of the other motor of a unit that steers at standstill: what moves the unit moves both."""
-
 OFTEN: Final = 0.05
 """Part of a drive that a motor must rattle for; what it has shaken loose then slides on in all of it [-]."""
 
@@ -53,24 +50,42 @@ def above_band(values: Array, sample_time: float) -> Array:
     return np.asarray(values - zero_phase(values, BAND, sample_time))
 
 
-def rattling(
-    beta: Array, processing: Processing, sample_time: float, above: float = ABOVE_OTHERS
-) -> tuple[Array, Mask]:
-    """Rms motion of motors above the band (N, k) [rad], and where each that often rattles does so (N, k).
+def rattling(beta: Array, processing: Processing, sample_time: float) -> tuple[Array, Mask]:
+    """Rms motion of the motors above the band (N, 4) [rad], and where each that often rattles does so (N, 4).
 
-    Where all do, none is said to: no wheel is left that rolls.
+    Where all four do, none is said to: no wheel is left that rolls.
 
     Args:
-        beta: angles of the motors in a drive, at the wheels (N, k) [rad].
+        beta: angles of the motors in a drive, at the wheels (N, 4) [rad].
         processing: its filter is what the rows pass.
         sample_time: [s].
-        above: rms over that of the quietest from which a motor rattles.
     """
-    power = zero_phase(above_band(beta, sample_time) ** 2, processing.cutoff, sample_time)
-    rms = np.sqrt(np.maximum(power, 0.0))
-    rattles = rms > np.maximum(LEAST, above * rms.min(axis=1, keepdims=True))
-    rattles &= rattles.mean(axis=0) > OFTEN
-    return rms, np.asarray(rattles & ~rattles.any(axis=0).all())
+    rms = _rms_above_band(beta, processing, sample_time)
+    rattles = _often(rms > np.maximum(LEAST, ABOVE_OTHERS * rms.min(axis=1, keepdims=True)))
+    return rms, rattles & ~rattles.any(axis=0).all()
+
+
+def rattling_at_standstill(beside: Array, processing: Processing, sample_time: float) -> tuple[Array, Mask]:
+    """The same of the two motors (N, 2) of a unit that steers, as they move beside its encoder.
+
+    What both do is the unit's, which jumps where its friction reverses, or whose encoder is late.
+
+    Args:
+        beside: angles of the motors less that of the unit, the way it turns, at the wheels (N, 2) [rad].
+        processing: its filter is what the rows pass.
+        sample_time: [s].
+    """
+    rms = _rms_above_band(np.column_stack([beside, beside[:, 0] - beside[:, 1]]), processing, sample_time)
+    return rms[:, :2], _often((rms[:, :2] > LEAST) & (rms[:, 2:] > LEAST))
+
+
+def _rms_above_band(values: Array, processing: Processing, sample_time: float) -> Array:
+    power = zero_phase(above_band(values, sample_time) ** 2, processing.cutoff, sample_time)
+    return np.asarray(np.sqrt(np.maximum(power, 0.0)))
+
+
+def _often(rattles: Mask) -> Mask:
+    return np.asarray(rattles & (rattles.mean(axis=0) > OFTEN))
 
 
 def hammer(moved: Array, rms: Array) -> Array:
@@ -79,7 +94,7 @@ def hammer(moved: Array, rms: Array) -> Array:
 
 
 def rattle_rows(wheels: Sequence[int], geometry: Geometry) -> OwnRows:
-    """How far the motors of some wheels move with the hammer, beyond what their gears give way by."""
+    """How far the motors of some wheels (0 to 3) move with the hammer, beyond what their gears give way by [m]."""
     names = tuple(f"rattle_{WHEELS[wheel]}" for wheel in wheels)
     columns = tuple(SLICES["rattle"].start + wheel for wheel in wheels)
     return OwnRows(names, columns, geometry.wheel_radius, UNTOLD)

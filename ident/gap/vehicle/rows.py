@@ -66,7 +66,7 @@ SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZE
 roll as the others say, and `motor_acceleration` stays that of the motor.
 
 `hammer` [-] and `rattle` [rad] are zero but where a motor rattles in its gear (`ident.gap.vehicle.rattling`), `wander`
-[rad] but where a rear unit does so in its coupling (`ident.gap.vehicle.wandering`).
+[rad] but where it can be told how far a rear unit moves in its coupling (`ident.gap.vehicle.wandering`).
 """
 
 INPUTS: Final = _ENDS[-1]

@@ -15,7 +15,7 @@ from ident.estimate.equations import ROWS, RowsOfStep
 from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
-from ident.gap.vehicle.loose import ASKEW, as_it_was, taken_apart
+from ident.gap.vehicle.loose import as_it_was, near_middle, taken_apart
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
 from ident.gap.vehicle.wandering import wanders
 from ident.records.record import Record, Step, base_step
@@ -95,7 +95,7 @@ def sources_of(
         geometry: its lengths.
         steps: whose rows are wanted, variants of them included.
         processing: filters and thresholds.
-        as_recorded: whether all is taken as it was measured, motors that rattle too.
+        as_recorded: whether all is taken as it was measured, what is loose too.
 
     Raises:
         RecordError: it has none of the steps, or moves in none of them.
@@ -111,7 +111,7 @@ def sources_of(
             f"{record.source} holds none of the steps of a diagnosis.",
             f"It needs some of {', '.join(steps)} by these names in the channel step.",
         )
-    shown = [source for source in _apart(found) if any(mask.any() for mask in source.moving)]
+    shown = [source for source in _judged_by_other_side(found) if any(mask.any() for mask in source.moving)]
     if not shown:
         raise RecordError(
             f"{record.source} does not move in any step of a diagnosis.",
@@ -165,16 +165,21 @@ def _sources(
         yield Source(channel=Channel.KINEMATIC, moving=moving, own=loose.own, **common)  # type: ignore[arg-type]
 
 
-def _apart(sources: Sequence[Source]) -> Iterator[Source]:
-    """The sources of a record, units that wander only where those of the other side do not."""
-    across: dict[rows.OwnRows, float] = {}
+def _judged_by_other_side(sources: Sequence[Source]) -> Iterator[Source]:
+    """The sources of a record; of a unit that may wander, the step in which it goes furthest, if that is a play."""
+    furthest: dict[rows.OwnRows, tuple[float, Source]] = {}
     for source in sources:
         if source.own is not None and source.spec.mode is Mode.ALIGNMENT:
-            found = float(source.inputs[:, source.own.columns].max())
-            across[source.own] = max(found, across.get(source.own, 0.0))
+            across = float(source.inputs[:, source.own.columns].max())
+            if source.own not in furthest or across > furthest[source.own][0]:
+                furthest[source.own] = (across, source)
     for source in sources:
-        others = [found for own, found in across.items() if own != source.own]
-        if source.own not in across or wanders(across[source.own], others):
+        if source.own is None or source.own not in furthest:
+            yield source
+            continue
+        across, best = furthest[source.own]
+        others = [found for own, (found, _) in furthest.items() if own != source.own]
+        if source is best and wanders(across, others):
             yield source
 
 
@@ -198,5 +203,5 @@ def _rolling(signals: Signals, spec: RowsOfStep, processing: Processing) -> NDAr
     near = ndimage.binary_dilation(moving, np.ones(width, dtype=bool))
     near[: width // 2] = near[-(width // 2) :] = False
     if spec.mode is Mode.ALIGNMENT:
-        near &= np.all(np.abs(signals.alpha) < ASKEW, axis=1)
+        near &= near_middle(signals)
     return np.asarray(near)

@@ -2,19 +2,21 @@
 
 Both wheels of a side are driven alike there, so no load says on which flank of a play the rear unit lies, and which way
 it is carried differs from repeat to repeat. But it crosses the play again and again, and both wheels tell how far: what
-they roll turns their units by angles whose difference d stays constant without a play. What d ranges over within a
-second, in most seconds at most, is a row of its own, which a play makes as large as itself.
+they roll turns their units by angles whose difference d stays constant without a play. The range of d within a second,
+its 0.9 quantile over a step, is a row of its own, which a play makes as large as itself.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from ident.gap.linear import least_squares
 from ident.gap.vehicle.rows import SLICES, OwnRows
 from ident.vehicle.geometry import Geometry
 
@@ -33,13 +35,13 @@ SHAPE: Final = (1, 2, 3)
 REACHED: Final = 0.9
 """Quantile of the ranges of a step that is taken: in some seconds a unit stays on one flank."""
 
-UNFORETOLD: Final = 0.6
-"""Part of its range that d must keep beside what gears give way by: torques of both wheels, and their signs, times
-whatever fits. On the emulator a play of the coupling keeps 0.8 and more, those of a gear and compliances 0.05 to 0.45.
+FORETOLD: Final = 0.6
+"""Part of its range that d may keep beside what gears give way by: torques of both wheels, and their signs, times
+whatever fits. On the emulator plays and compliances of a gear keep 0.05 to 0.45, plays of the coupling 0.8 and more.
 """
 
 LEAST: Final = 5e-5
-"""Range of d from which a unit wanders [rad]; without a play it is 0.02 mrad on the emulator."""
+"""Range of d from which a unit wanders [rad]; without a play it is up to 0.02 mrad on the emulator."""
 
 ABOVE_OTHER: Final = 5.0
 """The same over that of the other side: what both show is how the floor holds the wheels."""
@@ -50,34 +52,51 @@ UNTOLD: Final = 0.1
 COORDINATES: Final = ("wander_l", "wander_r")
 
 
-def wandered(alpha: Array, turned: Array, torques: Array, looked_at: Mask, sample_time: float) -> tuple[Array, bool]:
-    """How far d ranges within `WINDOW` (N,) [rad], and whether no gear foretells it.
+@dataclass(frozen=True)
+class Wandering:
+    """How far the units of a side roll apart in a step at standstill.
 
-    It is one value, zero where a window leaves what is looked at.
+    Attributes:
+        across: range of d within `WINDOW` [rad].
+        foretold: whether the torques foretell it, as they do of a gear that gives way.
+    """
+
+    across: float
+    foretold: bool
+
+
+def wandering(
+    alpha: Array, turned: Array, torques: Array, near: Mask, moving: Mask, sample_time: float
+) -> Wandering | None:
+    """How far the units of a side roll apart; None where there is no window to look at.
 
     Args:
-        alpha: steering angle of a side (N,) [rad].
+        alpha: steering angle of the side (N,) [rad].
         turned: angles by which front and rear wheel have turned their units (N, 2) [rad].
         torques: of their motors (N, 2), in whatever unit.
-        looked_at: (N,) where no wheel pushes the chassis aside.
+        near: (N,) where no wheel pushes the chassis aside.
+        moving: (N,) where the side steers.
         sample_time: [s].
     """
     width = 2 * round(WINDOW / 2 / sample_time) + 1
-    inside = ndimage.binary_erosion(looked_at, np.ones(width, dtype=bool))
+    window = np.ones(width, dtype=bool)
+    whole = ndimage.binary_erosion(near, window)
+    inside = whole & ndimage.binary_dilation(moving, window)
     if not inside.any():
-        return np.zeros(len(alpha)), False
+        return None
+    looked_at = ndimage.binary_dilation(whole, window)
     apart = _smooth(turned[:, 1] - turned[:, 0], sample_time)
     run = ndimage.label(looked_at)[0]
     level = run[:, None] == np.arange(1, run.max() + 1)
     shape = np.hstack([level, np.stack([alpha**power for power in SHAPE], axis=1)])
     gears = _smooth(np.hstack([torques, np.sign(_smooth(torques, sample_time))]), sample_time)
     plain, shaped, geared = (
-        _range(apart - design @ np.linalg.lstsq(design[looked_at], apart[looked_at], rcond=None)[0], width)[inside]
-        for design in (level, shape, np.hstack([shape, gears]))
+        _range(apart - design @ least_squares(design[looked_at], apart[looked_at]), width)[inside]
+        for design in (level.astype(float), shape, np.hstack([shape, gears]))
     )
     # A play is no function of the angle; what one takes from it by chance must not make it larger.
     across = float(np.quantile(np.minimum(plain, shaped), REACHED))
-    return np.where(inside, across, 0.0), bool(np.quantile(geared, REACHED) > UNFORETOLD * across)
+    return Wandering(across, bool(np.quantile(geared, REACHED) <= FORETOLD * across))
 
 
 def _smooth(values: Array, sample_time: float) -> Array:
@@ -95,5 +114,5 @@ def wanders(across: float, others: Sequence[float]) -> bool:
 
 
 def wander_rows(side: int, geometry: Geometry) -> OwnRows:
-    """How far the rear wheel of a side rolls across the play."""
+    """How far the rear wheel of a side (0 left, 1 right) rolls across the play [m]."""
     return OwnRows((COORDINATES[side],), (SLICES["wander"].start + side,), geometry.wheel_offset, UNTOLD)

@@ -14,7 +14,7 @@ from ident.gap.derivatives import derivative, second_derivative
 from ident.gap.problem import Channel
 from ident.gap.vehicle.build import build_problem
 from ident.gap.vehicle.ideal import Drive, ideal_record
-from ident.gap.vehicle.rattling import above_band, hammer, rattle_rows, rattling
+from ident.gap.vehicle.rattling import above_band, hammer, rattle_rows, rattling, rattling_at_standstill
 from ident.gap.vehicle.rows import INPUTS, SLICES
 from ident.gap.vehicle.sliding import rolled_with_others, rolling_rates
 from ident.gap.vehicle.sources import processing_of, sources_of
@@ -223,8 +223,18 @@ def test_a_unit_that_jumps_at_standstill_takes_both_of_its_motors_along_and_neit
     jumps = 5e-4 * np.sin(SHAKE * segment.time) * (np.sin(segment.time) > 0.8)
     steering, angles = segment.steering_angles.copy(), segment.wheel_angles.copy()
     steering[:, 0] += read * jumps
-    angles[:, :2] += prototype.geometry.wheel_offset / prototype.geometry.wheel_radius * jumps[:, None] * [-1, 1]
+    angles[:, :2] += prototype.geometry.lever_ratio * jumps[:, None] * [-1, 1]
     jumped = Record([replace(segment, steering_angles=steering, wheel_angles=angles)])
     sources = sources_of(jumped, prototype.geometry, [Step.STEERING_LEFT], processing_of([jumped]))
     assert not any(source.rattles.any() for source in sources)
     assert [source.coordinates for source in sources if source.channel is Channel.KINEMATIC] == [("roll_fl", "roll_rl")]
+
+
+@pytest.mark.parametrize("second", [0.0, 0.5, 1.0])
+def test_at_standstill_motors_rattle_that_move_beside_their_unit_and_each_other(second: float) -> None:
+    time = DT * np.arange(6000)
+    unit, first, other = (1e-3 * np.sin(rate * time) for rate in (300.0, SHAKE, 0.8 * SHAKE))
+    _, rattles = rattling_at_standstill(np.stack([unit, unit], axis=1), FAST, DT)
+    assert not rattles.any()
+    _, rattles = rattling_at_standstill(np.stack([first, second * other], axis=1), FAST, DT)
+    assert rattles.any(axis=0).tolist() == [True, second > 0]

@@ -16,7 +16,7 @@ from ident.gap.problem import Channel, Problem
 from ident.gap.vehicle.build import build_problem
 from ident.gap.vehicle.ideal import Drive, ideal_record
 from ident.gap.vehicle.sources import Source, processing_of, sources_of
-from ident.gap.vehicle.wandering import LEAST, WINDOW, wandered, wanders
+from ident.gap.vehicle.wandering import LEAST, WINDOW, Wandering, wandering, wanders
 from ident.records.record import Record, Segment, Step
 from ident.vehicle.description import VehicleDescription
 
@@ -40,47 +40,58 @@ DRIVEN = np.stack([8.0 * np.sign(np.cos(2.0 * TIME)) + np.cos(2.0 * TIME)] * 2, 
 EVERYWHERE = np.ones(len(TIME), dtype=bool)
 
 
-def ranging(apart: Array, looked_at: NDArray[np.bool_] = EVERYWHERE) -> tuple[Array, bool]:
-    """`wandered` of a rear unit that is `apart` (N,) [rad] from the front one."""
-    return wandered(STEERED, np.stack([STEERED, STEERED + apart], axis=1), DRIVEN, looked_at, DT)
+def ranging(apart: Array, near: NDArray[np.bool_] = EVERYWHERE, moving: NDArray[np.bool_] = EVERYWHERE) -> Wandering:
+    """`wandering` of a rear unit that is `apart` (N,) [rad] from the front one."""
+    found = wandering(STEERED, np.stack([STEERED, STEERED + apart], axis=1), DRIVEN, near, moving, DT)
+    assert found is not None
+    return found
 
 
 @settings(max_examples=20, deadline=None)
 @given(gap=st.floats(1e-4, 5e-3), seed=st.integers(0, 1000))
 def test_a_unit_that_hops_from_flank_to_flank_ranges_over_its_play(gap: float, seed: int) -> None:
-    across, unforetold = ranging(gap / 2 * flank(TIME, seed))
-    assert across.max() == pytest.approx(gap, rel=0.1)
-    assert unforetold
+    found = ranging(gap / 2 * flank(TIME, seed))
+    assert found.across == pytest.approx(gap, rel=0.1)
+    assert not found.foretold
 
 
 @pytest.mark.parametrize("phase", [0.0, 1.0, 2.0])
 def test_wheels_that_are_larger_or_eccentric_do_not_wander(phase: float) -> None:
-    across, _ = ranging(1e-3 * STEERED + 2e-3 / 1.2 * np.cos(1.2 * STEERED + phase))
-    assert across.max() < LEAST / 2
+    assert ranging(1e-3 * STEERED + 2e-3 / 1.2 * np.cos(1.2 * STEERED + phase)).across < LEAST / 2
 
 
 @pytest.mark.parametrize("wheel", [0, 1])
 def test_a_gear_that_gives_way_under_its_load_is_no_play_of_the_coupling(wheel: int) -> None:
     torque = DRIVEN[:, wheel]
     for apart in (1e-4 * torque, 4e-4 * np.tanh(3 * torque)):
-        across, unforetold = ranging(apart)
-        assert across.max() > LEAST
-        assert not unforetold
+        found = ranging(apart)
+        assert found.across > LEAST
+        assert found.foretold
 
 
-def test_nothing_is_said_where_a_window_leaves_what_is_looked_at() -> None:
-    looked_at = (TIME > 2) & (TIME < 5)
-    across, _ = ranging(GAP / 2 * flank(TIME), looked_at)
-    found = TIME[across > 0]
-    assert found.min() == pytest.approx(2 + WINDOW / 2, abs=3 * DT)
-    assert found.max() == pytest.approx(5 - WINDOW / 2, abs=3 * DT)
-    assert not ranging(GAP / 2 * flank(TIME), looked_at & (TIME < 2 + 0.9 * WINDOW))[0].any()
+def test_nothing_is_said_without_a_whole_window() -> None:
+    turned = np.stack([STEERED, STEERED + GAP / 2 * flank(TIME)], axis=1)
+    for width, said in ((0.9 * WINDOW, False), (1.1 * WINDOW, True)):
+        near = (TIME > 2) & (2 + width > TIME)
+        assert (wandering(STEERED, turned, DRIVEN, near, EVERYWHERE, DT) is not None) == said
+
+
+def test_what_happens_far_from_the_middle_is_not_looked_at() -> None:
+    near = TIME > 3
+    pushed = 5e-3 * np.sin(7 * TIME) * ~near
+    assert ranging(pushed, near).across < LEAST / 2
+
+
+def test_time_in_which_nothing_steers_does_not_count() -> None:
+    moving = (TIME > 2) & (TIME < 3)
+    assert ranging(GAP / 2 * flank(TIME) * moving, moving=moving).across == pytest.approx(GAP, rel=0.1)
+    assert wandering(STEERED, np.zeros((len(TIME), 2)), DRIVEN, EVERYWHERE, ~EVERYWHERE, DT) is None
 
 
 def test_a_unit_that_mostly_stays_on_one_flank_tells_its_play_all_the_same() -> None:
-    across, unforetold = ranging(GAP / 2 * np.where(np.abs(TIME - 8.0) < 0.1, 1.0, -1.0), TIME > 3)
-    assert across.max() == pytest.approx(GAP, rel=0.1)
-    assert unforetold
+    found = ranging(GAP / 2 * np.where(np.abs(TIME - 8.0) < 0.1, 1.0, -1.0), TIME > 3)
+    assert found.across == pytest.approx(GAP, rel=0.1)
+    assert not found.foretold
 
 
 def test_what_both_sides_show_is_the_floor() -> None:
@@ -91,21 +102,20 @@ def test_what_both_sides_show_is_the_floor() -> None:
     assert not wanders(much, [])
 
 
-def hopping(segment: Segment, wheels: list[int], prototype: VehicleDescription) -> Segment:
-    """Some wheels of the left side rolled by a unit that hops in a play."""
-    lever = prototype.geometry.wheel_offset / prototype.geometry.wheel_radius
+def hopping(segment: Segment, wheels: list[int], prototype: VehicleDescription, gap: float = GAP) -> Segment:
+    """Some wheels of a side rolled by a unit that hops in a play."""
     angles = segment.wheel_angles.copy()
     for wheel in wheels:
-        angles[:, wheel] += (-1.0, 1.0)[wheel] * lever * GAP / 2 * flank(segment.time)
+        sense = (-1.0, 1.0, 1.0, -1.0)[wheel] * prototype.geometry.lever_ratio
+        angles[:, wheel] += sense * gap / 2 * flank(segment.time, wheel // 2)
     return replace(segment, wheel_angles=angles)
 
 
 def steered_slowly(segment: Segment, side: int, prototype: VehicleDescription) -> Segment:
     """A side that steers within 0.3 rad, its wheels rolling with it."""
-    lever = prototype.geometry.wheel_offset / prototype.geometry.wheel_radius
     alpha, angles = np.zeros((len(segment), 2)), np.zeros((len(segment), 4))
     alpha[:, side] = 0.3 * np.sin(2.0 * (segment.time - segment.time[0]))
-    angles[:, 2 * side : 2 * side + 2] = (-1) ** side * lever * alpha[:, [side]] * [-1, 1]
+    angles[:, 2 * side : 2 * side + 2] = (-1) ** side * prototype.geometry.lever_ratio * alpha[:, [side]] * [-1, 1]
     return replace(segment, steering_angles=alpha, wheel_angles=angles)
 
 
@@ -115,7 +125,7 @@ def still(prototype: VehicleDescription) -> Record:
     return replace(record, segments=[steered_slowly(one, side, prototype) for side, one in enumerate(record.segments)])
 
 
-def wandering(record: Record, prototype: VehicleDescription) -> list[Source]:
+def wandering_units(record: Record, prototype: VehicleDescription) -> list[Source]:
     found = sources_of(record, prototype.geometry, list(Step), processing_of([record]))
     return [source for source in found if source.own is not None]
 
@@ -127,7 +137,7 @@ def play(record: Record, prototype: VehicleDescription) -> tuple[Problem, int]:
 
 
 def test_a_plain_vehicle_has_no_rows_of_units_that_wander(still: Record, prototype: VehicleDescription) -> None:
-    assert wandering(still, prototype) == []
+    assert wandering_units(still, prototype) == []
 
 
 def test_only_a_play_of_that_coupling_explains_how_far_a_rear_unit_wanders(
@@ -153,7 +163,7 @@ def test_only_a_play_of_that_coupling_explains_how_far_a_rear_unit_wanders(
 def test_a_unit_whose_wheels_both_roll_further_does_not_wander(still: Record, prototype: VehicleDescription) -> None:
     """Its encoder is late."""
     left, right = still.segments
-    assert wandering(replace(still, segments=[hopping(left, [0, 1], prototype), right]), prototype) == []
+    assert wandering_units(replace(still, segments=[hopping(left, [0, 1], prototype), right]), prototype) == []
 
 
 def test_a_soft_gear_of_one_side_leaves_both_sides_without_such_rows(
@@ -164,12 +174,55 @@ def test_a_soft_gear_of_one_side_leaves_both_sides_without_such_rows(
     torques[:, 1] = 2.0 * np.cos(2.0 * (left.time - left.time[0]))
     angles[:, 1] += 3e-4 * torques[:, 1]
     soft = replace(left, wheel_angles=angles, motor_torques=torques)
-    assert wandering(replace(still, segments=[soft, right]), prototype) == []
+    assert wandering_units(replace(still, segments=[soft, right]), prototype) == []
+
+
+def test_units_of_both_sides_that_hop_alike_are_the_floor(still: Record, prototype: VehicleDescription) -> None:
+    left, right = still.segments
+    both = [hopping(left, [1], prototype), hopping(right, [3], prototype)]
+    assert wandering_units(replace(still, segments=both), prototype) == []
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.0], ids=["parked", "far from the middle"])
+def test_a_side_is_not_judged_by_one_that_was_not_looked_at(
+    angle: float, still: Record, prototype: VehicleDescription
+) -> None:
+    left, right = still.segments
+    away = replace(
+        right, steering_angles=np.full((len(right), 2), [0.0, angle]), wheel_angles=np.zeros((len(right), 4))
+    )
+    segments = [hopping(left, [1], prototype), away]
+    assert wandering_units(replace(still, segments=segments), prototype) == []
+
+
+def test_of_two_steps_of_a_side_the_one_in_which_its_unit_goes_furthest_tells_the_play(
+    still: Record, prototype: VehicleDescription
+) -> None:
+    left, right = still.segments
+    short = replace(hopping(left, [1], prototype, GAP / 4), step="steering_left_slow")
+    segments = [short, hopping(left, [1], prototype), right]
+    (found,) = wandering_units(replace(still, segments=segments), prototype)
+    assert found.step == Step.STEERING_LEFT
 
 
 def test_a_vehicle_whose_encoders_only_scatter_does_not_move(still: Record, prototype: VehicleDescription) -> None:
-    left = still.segments[0]
-    noise = 1e-6 * np.random.default_rng(3).normal(size=(len(left), 4))
-    standing = replace(left, steering_angles=np.zeros((len(left), 2)), wheel_angles=noise)
+    generator = np.random.default_rng(3)
+    standing = [
+        replace(
+            segment,
+            steering_angles=np.zeros((len(segment), 2)),
+            wheel_angles=size * generator.normal(size=(len(segment), 4)),
+        )
+        for segment, size in zip(still.segments, (1e-6, 1e-7), strict=True)
+    ]
     with pytest.raises(RecordError, match="does not move"):
-        sources_of(Record([standing]), prototype.geometry, list(Step), processing_of([still]))
+        sources_of(Record(standing), prototype.geometry, list(Step), processing_of([still]))
+
+
+@pytest.mark.parametrize(("gap", "told"), [(0.5 * LEAST, False), (3 * LEAST, True)])
+def test_a_range_that_encoders_could_leave_is_none(
+    gap: float, told: bool, still: Record, prototype: VehicleDescription
+) -> None:
+    left, right = still.segments
+    segments = [hopping(left, [1], prototype, gap), right]
+    assert bool(wandering_units(replace(still, segments=segments), prototype)) == told
