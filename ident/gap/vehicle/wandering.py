@@ -36,8 +36,9 @@ REACHED: Final = 0.9
 """Quantile of the ranges of a step that is taken: in some seconds a unit stays on one flank."""
 
 FORETOLD: Final = 0.6
-"""Part of its range that d may keep beside what gears give way by: torques of both wheels, and their signs, times
-whatever fits. On the emulator plays and compliances of a gear keep 0.05 to 0.45, plays of the coupling 0.8 and more.
+"""Part of its range that d may keep beside those functions of the angle and what gears give way by: torques of both
+wheels, and their signs, times whatever fits. On the emulator eccentric wheels keep 0.1 to 0.5 (how they are rolled
+apart depends on more than the angle), plays and compliances of a gear 0.05 to 0.45, plays of the coupling 0.8 and more.
 """
 
 LEAST: Final = 5e-5
@@ -58,7 +59,7 @@ class Wandering:
 
     Attributes:
         across: range of d within `WINDOW` [rad].
-        foretold: whether the torques foretell it, as they do of a gear that gives way.
+        foretold: whether angle and torques foretell it, as they do of other wheels and of a gear that gives way.
     """
 
     across: float
@@ -96,7 +97,7 @@ def wandering(
     )
     # A play is no function of the angle; what one takes from it by chance must not make it larger.
     across = float(np.quantile(np.minimum(plain, shaped), REACHED))
-    return Wandering(across, bool(np.quantile(geared, REACHED) <= FORETOLD * across))
+    return Wandering(across, bool(np.quantile(geared, REACHED) <= FORETOLD * np.quantile(plain, REACHED)))
 
 
 def _smooth(values: Array, sample_time: float) -> Array:

@@ -69,6 +69,12 @@ def test_a_gear_that_gives_way_under_its_load_is_no_play_of_the_coupling(wheel: 
         assert found.foretold
 
 
+def test_a_wheel_that_is_eccentric_and_not_quite_a_function_of_the_angle_is_no_play() -> None:
+    found = ranging(2e-3 * np.cos(1.2 * STEERED + 1.0) + 5e-5 * flank(TIME))
+    assert found.across > LEAST
+    assert found.foretold
+
+
 def test_nothing_is_said_without_a_whole_window() -> None:
     turned = np.stack([STEERED, STEERED + GAP / 2 * flank(TIME)], axis=1)
     for width, said in ((0.9 * WINDOW, False), (1.1 * WINDOW, True)):
