@@ -23,8 +23,11 @@ MOST_STEPS: Final = 15
 HALVINGS: Final = 6
 DIFFERENCE: Final = 1e-4
 """Relative step of numerical derivatives."""
-SETTLED: Final = 1e-5
-"""Relative decrease of the sum of squares at which the refit ends."""
+SETTLED: Final = 0.02
+"""Decrease of the sum of squares, in units of the noise, that is not worth a step: an eighth of a deviation at most.
+
+What no row shows any more, a play that no motor crosses, may go anywhere for as little.
+"""
 
 
 @dataclass(frozen=True)
@@ -117,9 +120,9 @@ def _descended(model: _Model) -> Array:
                 break
         else:
             return found
-        found, residual = tried, left
-        if cost - float(left @ left) < SETTLED * cost:
+        if cost - float(left @ left) < SETTLED:
             return found
+        found, residual = tried, left
     return found
 
 
@@ -152,6 +155,7 @@ class _Model:
             parts.append(start)
             taken += width
         self.start = np.concatenate(parts)
+        self._kept: dict[int, tuple[bytes, Array]] = {}
 
     @property
     def nonlinear(self) -> bool:
@@ -160,16 +164,14 @@ class _Model:
     def residual(self, values: Array) -> Array:
         """Whitened rows that are fitted, then what is known beforehand."""
         model = self.rows.baseline @ values[: self.size]
-        for unknown in self.unknowns:
-            model = model + self.rows.stack(unknown.series(values[unknown.place], values[: self.size]))
+        for number in range(len(self.unknowns)):
+            model = model + self._added(number, values)
         white = self.whitener.apply(self.rows, self.rows.target - model)[self.chosen]
         return np.append(white, self.regression.prior_residual(values[: self.size]))
 
     def jacobian(self, values: Array) -> Array:
         """Derivative of the model of the same rows, (n + prior, all values)."""
-        columns = [self.rows.baseline]
-        for unknown in self.unknowns:
-            columns.append(self._derivative(unknown, values[unknown.place], values[: self.size]))
+        columns = [self.rows.baseline, *(self._derivative(number, values) for number in range(len(self.unknowns)))]
         white = self.whitener.apply(self.rows, np.hstack(columns))[self.chosen]
         prior = self.regression.prior_jacobian(white.shape[1])
         return np.vstack([white, prior])
@@ -199,14 +201,26 @@ class _Model:
         known = self.regression.prior_residual(np.zeros(self.size))
         return least_squares(np.vstack([white[:, :-1], prior]), np.append(white[:, -1], known))
 
-    def _derivative(self, unknown: _Unknown, values: Array, baseline: Array) -> Array:
+    def _added(self, number: int, values: Array) -> Array:
+        """What one effect adds to the rows; the last is kept, for the next derivative is taken there."""
+        unknown, asked = self.unknowns[number], values.tobytes()
+        kept = self._kept.get(number)
+        if kept is None or kept[0] != asked:
+            kept = asked, self.rows.stack(unknown.series(values[unknown.place], values[: self.size]))
+            self._kept[number] = kept
+        return kept[1]
+
+    def _derivative(self, number: int, values: Array) -> Array:
+        unknown = self.unknowns[number]
+        own = values[unknown.place]
         if unknown.exact is None:
-            return self.rows.stack(unknown.columns, len(values))
-
-        def stacked(moved: Array) -> Array:
-            return self.rows.stack(unknown.series(moved, baseline))
-
-        return _gradient(stacked, values)
+            return self.rows.stack(unknown.columns, len(own))
+        here, columns = self._added(number, values), []
+        for index, step in enumerate(_steps(own)):
+            ahead = own.copy()
+            ahead[index] += step
+            columns.append((self.rows.stack(unknown.series(ahead, values[: self.size])) - here) / step)
+        return np.stack(columns, axis=1)
 
     def _covariance(self, values: Array) -> Array:
         """Sandwich over the stretches of the surrogates, nowhere below what white rows would give."""
@@ -250,11 +264,14 @@ def _same(values: Array) -> Array:
     return values
 
 
+def _steps(values: Array) -> list[float]:
+    return [max(DIFFERENCE * abs(float(value)), 1e-9) for value in values]
+
+
 def _gradient(function: Callable[[Array], Array], values: Array) -> Array:
     """Numerical derivative (n, k)."""
     columns = []
-    for index, value in enumerate(values):
-        step = max(DIFFERENCE * abs(float(value)), 1e-9)
+    for index, step in enumerate(_steps(values)):
         ahead, behind = values.copy(), values.copy()
         ahead[index] += step
         behind[index] -= step

@@ -1,4 +1,4 @@
-"""What is loose in a drive: motors that rattle in their gears, a rear unit that wanders in its coupling."""
+"""What is loose in a drive: motors that rattle in their gears or move at rest, a rear unit that wanders."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from scipy.integrate import cumulative_trapezoid
 
 from ident.estimate.equations import RowsOfStep
 from ident.estimate.filters import Processing
-from ident.gap.vehicle.rattling import above_band, hammer, rattle_rows, rattling, rattling_at_standstill
+from ident.gap.vehicle.rattling import above_band, hammer, rattle_rows, rattling, rattling_at_standstill, swing
+from ident.gap.vehicle.resting import moved_at_rest, rest_rows
 from ident.gap.vehicle.rows import SLICES, OwnRows
 from ident.gap.vehicle.signals import Signals
 from ident.gap.vehicle.sliding import rolled_with_others, rolling_rates
@@ -37,14 +38,16 @@ class Loose:
     Attributes:
         inputs: (N, INPUTS) signals with what is loose in columns of its own, wheels rolling in spite of it.
         rattles: (N, 4) where the motor of each wheel rattles in its gear.
-        own: rows of motors that rattle, or of a unit that may wander; None where there are neither.
+        own: rows of motors that rattle or move at rest, or of a unit that may wander; None where there are none.
         moving: (N,) rows to be used, a mask for each of those.
+        rolls: whether rolling rows of the drive tell how the wheels roll.
     """
 
     inputs: Array
     rattles: Mask
     own: OwnRows | None = None
     moving: tuple[Mask, ...] = ()
+    rolls: bool = True
 
 
 def as_it_was(recorded: Array) -> Loose:
@@ -67,7 +70,8 @@ def taken_apart(
     motors = np.flatnonzero(rattles.any(axis=0)).tolist()
     inside = _inside(rattles, processing, dt)
     moving = tuple(inside[:, wheel] for wheel in motors)
-    return Loose(_hammered(recorded, rms, rattles, geometry, dt), rattles, rattle_rows(motors, geometry), moving)
+    inputs = _hammered(recorded, rms, rattles, geometry, dt)
+    return Loose(inputs, rattles, rattle_rows(motors, geometry), moving, rolls=False)
 
 
 def near_middle(signals: Signals) -> Mask:
@@ -82,11 +86,14 @@ def _at_standstill(recorded: Array, signals: Signals, side: int, geometry: Geome
     turned = signals.beta[:, wheels] / _turned_by_steering(geometry)[wheels, side]
     beside = geometry.lever_ratio * (turned - signals.alpha[:, [side]])
     rms[:, wheels], rattles[:, wheels] = rattling_at_standstill(beside, processing, dt)
+    near = near_middle(signals)
+    resting = _at_rest(recorded, signals, 1 - side, near, geometry)
+    if resting is not None:
+        return resting
     if rattles.any():
-        return Loose(_hammered(recorded, rms, rattles, geometry, dt), rattles)
+        return Loose(_hammered(recorded, rms, rattles, geometry, dt), rattles, rolls=False)
     moving = np.abs(signals.alpha_rate[:, side]) > processing.moving
     torques, alpha = signals.torques[:, wheels], signals.alpha[:, side]
-    near = near_middle(signals)
     found = wandering(alpha, turned, torques, near, moving, dt)
     if found is None:
         return Loose(recorded, rattles)
@@ -94,6 +101,20 @@ def _at_standstill(recorded: Array, signals: Signals, side: int, geometry: Geome
     # One number for the whole step: when the unit hops differs from repeat to repeat.
     inputs[near, SLICES["wander"].start + side] = found.across
     return Loose(inputs, rattles, wander_rows(side, geometry), (near & (not found.foretold),))
+
+
+def _at_rest(recorded: Array, signals: Signals, side: int, near: Mask, geometry: Geometry) -> Loose | None:
+    """A motor of the side that rests, if it moves."""
+    wheels = list(_SIDES[side])
+    across = moved_at_rest(signals.beta[:, wheels], near)
+    if not across.any():
+        return None
+    wheel = wheels[int(np.argmax(across))]
+    inputs = recorded.copy()
+    # One number for the whole step: when the motor crosses differs from repeat to repeat.
+    inputs[near, SLICES["rest"].start + wheel] = across.max()
+    none = np.zeros(signals.beta.shape, dtype=np.bool_)
+    return Loose(inputs, none, rest_rows(wheel, geometry), (near,), rolls=False)
 
 
 def _side(spec: RowsOfStep) -> int:
@@ -116,6 +137,7 @@ def _hammered(recorded: Array, rms: Array, rattles: Mask, geometry: Geometry, sa
     moved = above_band(against, sample_time)
     weights = np.where(rattles, hammer(moved, rms), 0.0)
     inputs[:, SLICES["hammer"]], inputs[:, SLICES["rattle"]] = weights, weights * moved
+    inputs[:, SLICES["swing"]] = np.where(rattles, swing(rms), 0.0)
     return inputs
 
 

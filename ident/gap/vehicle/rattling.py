@@ -13,6 +13,7 @@ x_f being x above `BAND`, |β_f| the rms of the motor there, <.> what passes the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -91,6 +92,16 @@ def _often(rattles: Mask) -> Mask:
 def hammer(moved: Array, rms: Array) -> Array:
     """Weights (N, 4) that make a motion above the band slow: that of each motor over its rms."""
     return np.asarray(moved / np.maximum(rms, LEAST))
+
+
+def swing(rms: Array) -> Array:
+    """Amplitude (N, 4) of a sinusoid as strong as the motions above the band [rad]."""
+    return np.asarray(math.sqrt(2) * np.maximum(rms, LEAST))
+
+
+def moved_by(hammer: Array, swing: Array) -> Array:
+    """Motion above the band (N,) of a motor that has these weights and swings."""
+    return np.asarray(hammer * swing / math.sqrt(2))
 
 
 def rattle_rows(wheels: Sequence[int], geometry: Geometry) -> OwnRows:

@@ -55,8 +55,10 @@ _SIZES: Final = {
     "twist": 2,
     "twist_rate": 2,
     "hammer": 4,
+    "swing": 4,
     "rattle": 4,
     "wander": 2,
+    "rest": 4,
 }
 _ENDS: Final = np.cumsum(list(_SIZES.values())).tolist()
 SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS, strict=True)}
@@ -65,8 +67,9 @@ SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZE
 `beta` is what the encoder of a motor reads, at the wheel; its derivatives are those of the wheel once that is made to
 roll as the others say, and `motor_acceleration` stays that of the motor.
 
-`hammer` [-] and `rattle` [rad] are zero but where a motor rattles in its gear (`ident.gap.vehicle.rattling`), `wander`
-[rad] but where it can be told how far a rear unit moves in its coupling (`ident.gap.vehicle.wandering`).
+Zero but where something is loose: `hammer` [-], `swing` and `rattle` [rad] where a motor rattles in its gear
+(`ident.gap.vehicle.rattling`), `wander` [rad] where it can be told how far a rear unit moves in its coupling
+(`ident.gap.vehicle.wandering`), `rest` [rad] where a motor moves whose wheel rests (`ident.gap.vehicle.resting`).
 """
 
 INPUTS: Final = _ENDS[-1]
@@ -100,8 +103,10 @@ class _Inputs:
     twist: Expression
     twist_rate: Expression
     hammer: Expression
+    swing: Expression
     rattle: Expression
     wander: Expression
+    rest: Expression
 
 
 @dataclass(frozen=True)

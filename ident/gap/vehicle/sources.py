@@ -16,6 +16,7 @@ from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
 from ident.gap.vehicle.loose import as_it_was, near_middle, taken_apart
+from ident.gap.vehicle.resting import is_loose, is_rest
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
 from ident.gap.vehicle.wandering import wanders
 from ident.records.record import Record, Step, base_step
@@ -37,9 +38,9 @@ SIGNAL_SHARE: Final = 0.64
 """The same at most, in units of the Nyquist frequency."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Source:
-    """Rows of one channel of one segment before they are evaluated.
+    """Rows of one channel of one segment before they are evaluated; equal to none but itself.
 
     Attributes:
         channel: kinematic or dynamic.
@@ -52,7 +53,7 @@ class Source:
         period: (M,).
         record: for messages.
         rattles: (M, 4) where the motor of each wheel rattles in its gear.
-        own: its rows, if they are those of motors that rattle or a unit that wanders, instead of what rolls.
+        own: its rows, if they are those of what is loose, instead of what rolls.
     """
 
     channel: Channel
@@ -73,6 +74,11 @@ class Source:
         if self.own is not None:
             return self.own.coordinates
         return rows.coordinates(self.channel, self.spec)
+
+    @property
+    def across(self) -> float:
+        """Largest number in its own rows, where they are one of the step [rad]."""
+        return 0.0 if self.own is None else float(self.inputs[:, self.own.columns].max())
 
     @property
     def travels(self) -> bool:
@@ -111,7 +117,7 @@ def sources_of(
             f"{record.source} holds none of the steps of a diagnosis.",
             f"It needs some of {', '.join(steps)} by these names in the channel step.",
         )
-    shown = [source for source in _judged_by_other_side(found) if any(mask.any() for mask in source.moving)]
+    shown = [source for source in _judged_by_others(found) if any(mask.any() for mask in source.moving)]
     if not shown:
         raise RecordError(
             f"{record.source} does not move in any step of a diagnosis.",
@@ -157,7 +163,7 @@ def _sources(
     dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
-    if names and not loose.rattles.any():
+    if names and loose.rolls:
         kinematic = (_rolling(signals, spec, processing)[::stride],) * len(names)
         yield Source(channel=Channel.KINEMATIC, moving=kinematic, **common)  # type: ignore[arg-type]
     if loose.own is not None:
@@ -165,21 +171,24 @@ def _sources(
         yield Source(channel=Channel.KINEMATIC, moving=moving, own=loose.own, **common)  # type: ignore[arg-type]
 
 
-def _judged_by_other_side(sources: Sequence[Source]) -> Iterator[Source]:
-    """The sources of a record; of a unit that may wander, the step in which it goes furthest, if that is a play."""
-    furthest: dict[rows.OwnRows, tuple[float, Source]] = {}
+def _judged_by_others(sources: Sequence[Source]) -> Sequence[Source]:
+    """The sources of a record, without rows at standstill that show what is loose elsewhere."""
+    own = [source for source in sources if source.own is not None and source.spec.mode is Mode.ALIGNMENT]
+    resting = [source for source in own if source.own is not None and is_rest(source.own)]
+    ranges = [source.across for source in resting]
+    shown = [source for source in resting if is_loose(source.across, ranges)]
+    shown += _wandering([source for source in own if source not in resting])
+    return [source for source in sources if source not in own or source in shown]
+
+
+def _wandering(sources: Sequence[Source]) -> Iterator[Source]:
+    """Of a unit that may wander, the step in which it goes furthest, if that is a play."""
+    furthest: dict[rows.OwnRows | None, Source] = {}
     for source in sources:
-        if source.own is not None and source.spec.mode is Mode.ALIGNMENT:
-            across = float(source.inputs[:, source.own.columns].max())
-            if source.own not in furthest or across > furthest[source.own][0]:
-                furthest[source.own] = (across, source)
-    for source in sources:
-        if source.own is None or source.own not in furthest:
-            yield source
-            continue
-        across, best = furthest[source.own]
-        others = [found for own, (found, _) in furthest.items() if own != source.own]
-        if source is best and wanders(across, others):
+        if source.own not in furthest or source.across > furthest[source.own].across:
+            furthest[source.own] = source
+    for source in furthest.values():
+        if wanders(source.across, [other.across for other in furthest.values() if other is not source]):
             yield source
 
 

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from ident.estimate.filters import zero_phase
 from ident.gap.derivatives import derivative, second_derivative
-from ident.gap.vehicle.rattling import above_band
+from ident.gap.vehicle.flights import Shaken, twist_in_flight
+from ident.gap.vehicle.rattling import above_band, moved_by
+from ident.gap.vehicle.resting import range_of
 from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.signals import shifted
 from ident.vehicle.effects import DRIVES, EFFECTS, ENCODERS, STEERING, EffectName
@@ -76,15 +78,30 @@ def _earlier_angle(inputs: Array, place: int, sizes: Array, setting: Setting) ->
 
 def _soft_gear(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
     (compliance,) = sizes
-    return _behind_motor(inputs, place, compliance * _gear_load(inputs, place, setting), setting)
+    load = _gear_load(inputs, place, setting)
+    return _moved_at_rest(
+        _turned_by_load(inputs, place, compliance * load, setting), inputs, place, load, 0.0, compliance
+    )
 
 
 def _gear_with_play(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
     """Play, and the compliance of its flanks: no contact is rigid."""
     gap, compliance = sizes
-    load = _gear_load(inputs, place, setting)
-    flank = np.tanh(load / (CONTACT_SHARE * setting["d_cw"]))
-    return _behind_motor(inputs, place, gap / 2 * flank + compliance * load, setting)
+    load, touching = _gear_load(inputs, place, setting), CONTACT_SHARE * setting["d_cw"]
+    hammer, swing = (inputs[:, SLICES[name].start + place] for name in ("hammer", "swing"))
+    if hammer.any() and compliance > 0:
+        shaken = Shaken(moved_by(hammer, swing), swing, load, touching, setting.sample_time)
+        return _behind_motor(inputs, place, twist_in_flight(shaken, gap, compliance), setting)
+    # The limit of a small play: before a motor flies, its load tells at which flank it lies.
+    changed = _turned_by_load(inputs, place, gap / 2 * np.tanh(load / touching) + compliance * load, setting)
+    return _moved_at_rest(changed, inputs, place, load, gap, compliance)
+
+
+def _moved_at_rest(changed: Array, inputs: Array, wheel: int, load: Array, gap: float, compliance: float) -> Array:
+    """The signals `changed`, of a motor that moves while its wheel rests less what its gear lets it move."""
+    column = SLICES["rest"].start + wheel
+    changed[inputs[:, column] > 0, column] -= gap + compliance * range_of(load, inputs, wheel)
+    return changed
 
 
 def _soft_coupling(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
@@ -153,13 +170,17 @@ def contact_force(inputs: Array, wheel: int, setting: Setting) -> Array:
     return np.asarray((drive - lost) / setting.geometry.wheel_radius)
 
 
+def _turned_by_load(inputs: Array, wheel: int, twist: Array, setting: Setting) -> Array:
+    """The wheel instead of the motor, as far as the wheel has not been made to roll as the others say."""
+    if inputs[:, SLICES["hammer"].start + wheel].any():
+        twist = above_band(twist, setting.sample_time)
+    return _behind_motor(inputs, wheel, twist, setting)
+
+
 def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> Array:
     """The wheel instead of the motor; what the motor's own inertia takes more than at the wheel's pace is lost."""
-    changed, hammer = inputs.copy(), inputs[:, SLICES["hammer"].start + wheel]
-    if hammer.any():
-        # The wheel of a motor that rattles has been made to roll as the others say: what is slow is gone already.
-        twist = above_band(twist, setting.sample_time)
-        changed[:, SLICES["rattle"].start + wheel] -= hammer * twist
+    changed = inputs.copy()
+    changed[:, SLICES["rattle"].start + wheel] -= inputs[:, SLICES["hammer"].start + wheel] * twist
     rate, acceleration = derivative(twist, setting.sample_time), second_derivative(twist, setting.sample_time)
     for name, change in zip(_MOTION, (twist, rate, acceleration, acceleration), strict=True):
         changed[:, SLICES[name].start + wheel] -= change

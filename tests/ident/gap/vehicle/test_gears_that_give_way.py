@@ -104,8 +104,15 @@ def test_the_wheel_is_found_behind_its_motor(
     assert share == pytest.approx(1.0, abs=0.08)
 
 
-@pytest.mark.parametrize("hammered", [False, True])
-@pytest.mark.parametrize(("name", "sizes"), [(EffectName.ELASTICITY, (1.5e-4,)), (EffectName.BACKLASH, (1e-3, 3e-5))])
+@pytest.mark.parametrize(
+    ("name", "sizes", "hammered"),
+    [
+        (EffectName.ELASTICITY, (1.5e-4,), False),
+        (EffectName.ELASTICITY, (1.5e-4,), True),
+        (EffectName.BACKLASH, (1e-3, 3e-5), False),
+        (EffectName.BACKLASH, (1e-3,), True),
+    ],
+)
 def test_half_of_a_gear_taken_out_twice_is_all_of_it(
     name: EffectName, sizes: tuple[float, ...], hammered: bool
 ) -> None:

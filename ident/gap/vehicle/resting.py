@@ -1,0 +1,81 @@
+"""Motors that move in their gears while their wheels rest: the other side steers at standstill.
+
+Nothing loads them there, and the controller lets them drift from flank to flank. How far a motor moves in such a step
+is a row of its own: the play of its gear, and what the flanks, or a gear that gives way, yield to the load that it has
+where it is farthest ahead and farthest behind. What rolls in that step takes its motion for the chassis' own, and is
+left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.gap.vehicle.rows import SLICES, OwnRows
+from ident.vehicle.geometry import WHEELS, Geometry
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LEAST: Final = 2e-4
+"""Range of its motion from which a motor is loose [rad]; in rigid gears it is up to 0.07 mrad on the emulator."""
+
+ABOVE_OTHERS: Final = 5.0
+"""The same over that of any other motor that rests: what moves in a play pushes the chassis, and all with it."""
+
+FARTHEST: Final = 0.005
+"""Part of the time that a motor is taken to be at either end of its range [-]."""
+
+UNTOLD: Final = 0.05
+"""Part of the range that may stay unexplained: noise makes it larger, and not every flank is reached [-]."""
+
+
+def moved_at_rest(beta: Array, near: Mask) -> Array:
+    """How far the motors (2) of a side that rests move [rad], zero for those that are not loose.
+
+    Args:
+        beta: their angles, at the wheels (N, 2) [rad].
+        near: (N,) where no wheel pushes the chassis aside.
+    """
+    if not near.any():
+        return np.zeros(2)
+    across = np.array([_range(angle, *_farthest(angle)) for angle in beta[near].T])
+    return np.where(across > np.maximum(LEAST, ABOVE_OTHERS * across[::-1]), across, 0.0)
+
+
+def is_loose(across: float, others: Sequence[float]) -> bool:
+    """Whether a range [rad] is that of a play, and not of what is looser elsewhere."""
+    return all(across > other / ABOVE_OTHERS for other in others)
+
+
+def range_of(values: Array, inputs: Array, wheel: int) -> float:
+    """What of values (N,) a motor that moves at rest has more where it is farthest ahead than where farthest behind.
+
+    Zero for a motor that does not; `inputs` are the signals (N, INPUTS), `wheel` is its number.
+    """
+    at_rest = inputs[:, SLICES["rest"].start + wheel] > 0
+    if not at_rest.any():
+        return 0.0
+    return _range(values[at_rest], *_farthest(inputs[at_rest, SLICES["beta"].start + wheel]))
+
+
+def _farthest(angle: Array) -> tuple[Mask, Mask]:
+    behind, ahead = np.quantile(angle, [FARTHEST, 1 - FARTHEST])
+    return angle >= ahead, angle <= behind
+
+
+def _range(values: Array, ahead: Mask, behind: Mask) -> float:
+    return float(values[ahead].mean() - values[behind].mean())
+
+
+def rest_rows(wheel: int, geometry: Geometry) -> OwnRows:
+    """How far the motor of a wheel (0 to 3) moves while that rests, beyond what its gear gives way by [m]."""
+    return OwnRows((f"rest_{WHEELS[wheel]}",), (SLICES["rest"].start + wheel,), geometry.wheel_radius, UNTOLD)
+
+
+def is_rest(own: OwnRows) -> bool:
+    """Whether rows are those of a motor that moves at rest."""
+    return own.coordinates[0].startswith("rest_")
