@@ -87,11 +87,11 @@ def _at_standstill(recorded: Array, signals: Signals, side: int, geometry: Geome
     beside = geometry.lever_ratio * (turned - signals.alpha[:, [side]])
     rms[:, wheels], rattles[:, wheels] = rattling_at_standstill(beside, processing, dt)
     near = near_middle(signals)
+    if rattles.any():
+        return Loose(_hammered(recorded, rms, rattles, geometry, dt), rattles, rolls=False)
     resting = _at_rest(recorded, signals, 1 - side, near, geometry)
     if resting is not None:
         return resting
-    if rattles.any():
-        return Loose(_hammered(recorded, rms, rattles, geometry, dt), rattles, rolls=False)
     moving = np.abs(signals.alpha_rate[:, side]) > processing.moving
     torques, alpha = signals.torques[:, wheels], signals.alpha[:, side]
     found = wandering(alpha, turned, torques, near, moving, dt)
@@ -114,7 +114,7 @@ def _at_rest(recorded: Array, signals: Signals, side: int, near: Mask, geometry:
     # One number for the whole step: when the motor crosses differs from repeat to repeat.
     inputs[near, SLICES["rest"].start + wheel] = across.max()
     none = np.zeros(signals.beta.shape, dtype=np.bool_)
-    return Loose(inputs, none, rest_rows(wheel, geometry), (near,), rolls=False)
+    return Loose(inputs, none, rest_rows(wheel, geometry), (near,))
 
 
 def _side(spec: RowsOfStep) -> int:

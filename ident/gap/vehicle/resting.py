@@ -1,9 +1,9 @@
 """Motors that move in their gears while their wheels rest: the other side steers at standstill.
 
-Nothing loads them there, and the controller lets them drift from flank to flank. How far a motor moves in such a step
-is a row of its own: the play of its gear, and what the flanks, or a gear that gives way, yield to the load that it has
-where it is farthest ahead and farthest behind. What rolls in that step takes its motion for the chassis' own, and is
-left out.
+Nothing loads them there, and the controller lets them drift from flank to flank. A motor does so that rattles where the
+vehicle drives; others move with wheels that slide. How far it moves in such a step is a row of its own: the play of its
+gear, and what the flanks, or a gear that gives way, yield to the load that it has where it is farthest ahead and
+farthest behind. What rolls at standstill takes its motion for that of wheels or chassis, and is left out.
 """
 
 from __future__ import annotations
@@ -31,6 +31,9 @@ FARTHEST: Final = 0.005
 
 UNTOLD: Final = 0.05
 """Part of the range that may stay unexplained: noise makes it larger, and not every flank is reached [-]."""
+
+
+COORDINATES: Final = tuple(f"rest_{wheel}" for wheel in WHEELS)
 
 
 def moved_at_rest(beta: Array, near: Mask) -> Array:
@@ -73,9 +76,9 @@ def _range(values: Array, ahead: Mask, behind: Mask) -> float:
 
 def rest_rows(wheel: int, geometry: Geometry) -> OwnRows:
     """How far the motor of a wheel (0 to 3) moves while that rests, beyond what its gear gives way by [m]."""
-    return OwnRows((f"rest_{WHEELS[wheel]}",), (SLICES["rest"].start + wheel,), geometry.wheel_radius, UNTOLD)
+    return OwnRows((COORDINATES[wheel],), (SLICES["rest"].start + wheel,), geometry.wheel_radius, UNTOLD)
 
 
-def is_rest(own: OwnRows) -> bool:
-    """Whether rows are those of a motor that moves at rest."""
-    return own.coordinates[0].startswith("rest_")
+def resting_wheel(own: OwnRows | None) -> int | None:
+    """Number (0 to 3) of the wheel that rows are of, None for those that are not of a motor at rest."""
+    return COORDINATES.index(own.coordinates[0]) if own is not None and own.coordinates[0] in COORDINATES else None

@@ -16,7 +16,7 @@ from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
 from ident.gap.vehicle.loose import as_it_was, near_middle, taken_apart
-from ident.gap.vehicle.resting import is_loose, is_rest
+from ident.gap.vehicle.resting import is_loose, resting_wheel
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
 from ident.gap.vehicle.wandering import wanders
 from ident.records.record import Record, Step, base_step
@@ -84,6 +84,11 @@ class Source:
     def travels(self) -> bool:
         """Whether the vehicle drives in it, wheels steered or not."""
         return self.spec.mode not in (None, Mode.ALIGNMENT)
+
+    @property
+    def rolls_at_standstill(self) -> bool:
+        """Whether its rows are those of wheels that roll while a side steers."""
+        return self.channel is Channel.KINEMATIC and self.spec.mode is Mode.ALIGNMENT and self.own is None
 
     @property
     def rolls(self) -> bool:
@@ -172,13 +177,21 @@ def _sources(
 
 
 def _judged_by_others(sources: Sequence[Source]) -> Sequence[Source]:
-    """The sources of a record, without rows at standstill that show what is loose elsewhere."""
+    """The sources of a record, without rows at standstill that what is loose elsewhere moves."""
     own = [source for source in sources if source.own is not None and source.spec.mode is Mode.ALIGNMENT]
-    resting = [source for source in own if source.own is not None and is_rest(source.own)]
-    ranges = [source.across for source in resting]
-    shown = [source for source in resting if is_loose(source.across, ranges)]
-    shown += _wandering([source for source in own if source not in resting])
-    return [source for source in sources if source not in own or source in shown]
+    loose = list(_resting(sources))
+    shown = [*loose, *_wandering([source for source in own if resting_wheel(source.own) is None])]
+    # A loose motor's motion would pass for that of wheels.
+    left_out = [*own, *(source for source in sources if loose and source.rolls_at_standstill)]
+    return [source for source in sources if source in shown or source not in left_out]
+
+
+def _resting(sources: Sequence[Source]) -> Iterator[Source]:
+    """Steps in which a motor moves at rest that rattles in some drive of the record."""
+    rattles = np.any([source.rattles.any(axis=0) for source in sources], axis=0)
+    shaken = [s for s in sources if (wheel := resting_wheel(s.own)) is not None and rattles[wheel]]
+    ranges = [source.across for source in shaken]
+    return (source for source in shaken if is_loose(source.across, ranges))
 
 
 def _wandering(sources: Sequence[Source]) -> Iterator[Source]:
