@@ -118,6 +118,7 @@ class Candidate:
         excluded: the records speak against it, so that no others can bring it back.
         spread: standard deviations of the parameters that come with the way they are told, beyond the scatter of the
             rows; empty where there are none.
+        part: the same as part of each parameter.
         curve: whose friction over the speed it changes, if it is a friction.
         along: effect at the same place that comes along with it in its widest variant; both at once are that variant.
     """
@@ -132,6 +133,7 @@ class Candidate:
     negligible: float = 0.0
     excluded: bool = False
     spread: tuple[float, ...] = ()
+    part: float = 0.0
     curve: str = ""
     along: str = ""
 

@@ -24,10 +24,7 @@ HALVINGS: Final = 6
 DIFFERENCE: Final = 1e-4
 """Relative step of numerical derivatives."""
 SETTLED: Final = 0.02
-"""Decrease of the sum of squares, in units of the noise, that is not worth a step: an eighth of a deviation at most.
-
-What no row shows any more, a play that no motor crosses, may go anywhere for as little.
-"""
+"""Decrease of the sum of squares, in units of the noise, from which the refit has settled: a seventh of a deviation."""
 
 
 @dataclass(frozen=True)
@@ -68,12 +65,13 @@ class Refit:
 class _Unknown:
     """The numbers of one effect: coefficients of its columns, or its parameters where it has an exact form.
 
-    The first `stated` of them are its parameters, with `spread` as in `Candidate`; what is behind came along with it.
+    The first `stated` of them are its parameters, with `spread` and `part` as in `Candidate`; the others came along.
     """
 
     key: str
     stated: int
     spread: tuple[float, ...]
+    part: float
     place: slice
     exact: Callable[[Array, Array], Series] | None
     columns: tuple[Array | None, ...]
@@ -120,9 +118,10 @@ def _descended(model: _Model) -> Array:
                 break
         else:
             return found
-        if cost - float(left @ left) < SETTLED:
-            return found
         found, residual = tried, left
+        # A step that was cut short says nothing of what is left.
+        if halving == 0 and cost - float(left @ left) < SETTLED:
+            return found
     return found
 
 
@@ -188,8 +187,9 @@ class _Model:
             turn = _gradient(unknown.finish, own)
             spread = turn @ covariance[unknown.place, unknown.place] @ turn.T
             deviations, stated = np.sqrt(np.maximum(np.diag(spread), 0.0)), slice(unknown.stated)
-            total = np.hypot(deviations[stated], unknown.spread or 0.0)
             numbers = unknown.finish(own)
+            beyond = np.hypot(unknown.spread or 0.0, unknown.part * numbers[stated])
+            total = np.hypot(deviations[stated], beyond)
             parts.append(Part(unknown.key, numbers[stated], total, numbers, tuple(series)))
         baseline_std = np.sqrt(np.diag(covariance)[: self.size])
         return Refit(values[: self.size], baseline_std, tuple(parts), tuple(blocks))
@@ -247,17 +247,17 @@ def _unknown(
     variant = candidates[0].variants[column.variant]
     finish = variant.start or _same
     columns = tuple(part for candidate in candidates for part in candidate.variants[column.variant].columns)
-    stated, spread = len(candidates[0].parameters), candidates[0].spread
+    told = len(candidates[0].parameters), candidates[0].spread, candidates[0].part
     if candidates[0].contribution is None or not by_form or not variant.bent:
         place = slice(first, first + len(coefficients))
-        return _Unknown(candidates[0].key, stated, spread, place, None, columns, finish), coefficients
+        return _Unknown(candidates[0].key, *told, place, None, columns, finish), coefficients
 
     def exact(values: Array, baseline: Array) -> Series:
         forms = [candidate.contribution for candidate in candidates]
         return [one for form in forms if form is not None for one in form(values, baseline)]
 
     start = np.asarray(finish(coefficients), dtype=float)
-    return _Unknown(candidates[0].key, stated, spread, slice(first, first + len(start)), exact, columns, _same), start
+    return _Unknown(candidates[0].key, *told, slice(first, first + len(start)), exact, columns, _same), start
 
 
 def _same(values: Array) -> Array:

@@ -67,10 +67,18 @@ The range of a motor at rest holds what pushes the chassis and some noise. On 15
 5 mrad, ranges were wrong by up to 0.02 mrad and a thirtieth.
 """
 
+PLAY_PART: Final = 1 / 30
+"""The same as part of it."""
+
+COUPLING_PLAY_STD: Final = 1e-5
+"""Of the play of a steering coupling, beyond the scatter of the rows [rad]: encoders add to a range, on cases of exams
+for tuning 7 to 20 μrad to plays of 90."""
+
 SPREADS: Final[Mapping[tuple[EffectName, str], float]] = MappingProxyType(
     dict.fromkeys([(EffectName.STEERING_OFFSET, place) for place in STEERING], OFFSET_STD)
     | dict.fromkeys([(EffectName.ELASTICITY, place) for place in DRIVES], COMPLIANCE_STD)
     | dict.fromkeys([(EffectName.BACKLASH, place) for place in DRIVES], PLAY_STD)
+    | dict.fromkeys([(EffectName.BACKLASH, place) for place in STEERING], COUPLING_PLAY_STD)
 )
 """Standard deviations of sizes beyond the scatter of the rows, by effect and place, in their units."""
 
@@ -106,6 +114,7 @@ def candidate_of(
         drift=cause.name in DRIFTS,
         least=0.0 if cause.name in ONE_SIDED else None,
         spread=(SPREADS[cause.name, cause.where],) if (cause.name, cause.where) in SPREADS else (),
+        part=PLAY_PART if cause.name is EffectName.BACKLASH and cause.where in DRIVES else 0.0,
         curve=friction_curve(cause.name, cause.where),
         along=EffectName.ELASTICITY if cause.name is EffectName.BACKLASH else "",
     )

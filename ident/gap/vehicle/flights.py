@@ -9,9 +9,10 @@ x = x_s + x_f has a fast part, which is measured, and a slow one, which is not: 
 carry the slow load, by the describing function of a sinusoid with an offset (Gelb and Vander Velde 1968, chapter 6),
 then in time, harmonics included. What the flanks carry of x_f against what the gear has carried is what the sizes miss:
 
-    x_f - twist = (load_f(x) - load_f) / |N / c|,
+    x_f - twist = (load_f(x) - load_f) / |N / c, l / |x_f||,
 
-N being the part of the flanks' stiffness that the motion meets. So the twist is x_f where both loads agree.
+N being the part of the flanks' stiffness that the motion meets, and l a load of which nothing is said. So the twist is
+x_f where both loads agree.
 """
 
 from __future__ import annotations
@@ -35,6 +36,9 @@ SETTLED: Final = 1e-6
 
 REFINEMENTS: Final = 4
 """The same in time, from there."""
+
+STIFFEST: Final = 1e-6
+"""Compliance of flanks at least [rad/Nm], a fiftieth of the emulator's: a descent may ask for none, or less."""
 
 LEAST_TIME: Final = 0.1
 """Part of the time on a flank that a refinement counts on: with less, harmonics make it go too far [-]."""
@@ -64,24 +68,24 @@ def twist_in_flight(shaken: Shaken, gap: float, compliance: float) -> Array:
 
     Args:
         shaken: how it moves.
-        gap: whole play, at the wheel [rad].
-        compliance: of the flanks, positive [rad/Nm].
+        gap: whole play, at the wheel; zero where it is less [rad].
+        compliance: of the flanks, taken for `STIFFEST` where it is less [rad/Nm].
     """
 
     def fast(values: Array) -> Array:
         return above_band(values, shaken.sample_time)
 
-    half, carried_fast = gap / 2, fast(shaken.load)
+    half, compliance, carried_fast = max(gap, 0.0) / 2, max(compliance, STIFFEST), fast(shaken.load)
     slow, swing = compliance * (shaken.load - carried_fast), np.maximum(shaken.swing, LEAST)
     # The band takes some of the swing itself: what it takes of what is left is nearly that.
     angle = 2 * shaken.moved - fast(shaken.moved)
     offset = _offset(slow, swing, half)
-    touching = np.maximum(_part(offset, swing, half, 2), LEAST_TIME)
+    touching = np.maximum(_both(offset, swing, half).touching, LEAST_TIME)
     for _ in range(REFINEMENTS):
         beyond = _beyond(offset + angle, half)
         offset = offset + (slow - (beyond - fast(beyond))) / touching
     missed = fast(_beyond(offset + angle, half)) / compliance - carried_fast
-    stiffness = np.hypot(_part(offset, swing, half, 1) / compliance, shaken.unsure / swing)
+    stiffness = np.hypot(_both(offset, swing, half).first / compliance, shaken.unsure / swing)
     return np.asarray(shaken.moved - missed / stiffness)
 
 
@@ -99,10 +103,10 @@ def _offset(slow: Array, swing: Array, half: float) -> Array:
     left = np.arange(len(slow))
     for _ in range(NEWTON_STEPS):
         now, wide = found[left], swing[left]
-        ahead, behind = _ramp((half - now) / wide), _ramp((half + now) / wide)
-        missing = wide * (ahead[0] - behind[0]) - slow[left]
+        both = _both(now, wide, half)
+        missing = wide * both.mean - slow[left]
         low[left], high[left] = np.where(missing < 0, now, low[left]), np.where(missing < 0, high[left], now)
-        better = now - missing / np.maximum(ahead[2] + behind[2], np.finfo(float).tiny)
+        better = now - missing / np.maximum(both.touching, np.finfo(float).tiny)
         inside = (better >= low[left]) & (better <= high[left])
         found[left] = np.where(inside, better, (low[left] + high[left]) / 2)
         left = left[np.abs(missing) > SETTLED * wide]
@@ -111,14 +115,29 @@ def _offset(slow: Array, swing: Array, half: float) -> Array:
     return np.asarray(found)
 
 
-def _part(offset: Array, swing: Array, half: float, which: int) -> Array:
-    """Of both flanks together, for a sinusoid around an offset (N,): one of what `_ramp` gives, 1 and 2 of 0 to 1."""
-    return np.asarray(_ramp((half - offset) / swing)[which] + _ramp((half + offset) / swing)[which])
+@dataclass(frozen=True)
+class _Ramp:
+    """What a flank makes of a sinusoid of amplitude one.
+
+    Attributes:
+        mean, first: mean, and first harmonic, of what is beyond it (N,).
+        touching: part of the time that anything is (N,), the derivative of the mean by an offset.
+    """
+
+    mean: Array
+    first: Array
+    touching: Array
 
 
-def _ramp(edge: Array) -> tuple[Array, Array, Array]:
-    """Mean and first harmonic of max(sin φ - edge, 0), and the part of time that it is not zero."""
+def _both(offset: Array, swing: Array, half: float) -> _Ramp:
+    """Of both flanks, around an offset (N,): the load of one is against that of the other, their stiffness adds up."""
+    ahead, behind = _ramp((half - offset) / swing), _ramp((half + offset) / swing)
+    return _Ramp(ahead.mean - behind.mean, ahead.first + behind.first, ahead.touching + behind.touching)
+
+
+def _ramp(edge: Array) -> _Ramp:
+    """Of max(sin φ - edge, 0)."""
     bent = np.clip(edge, -1.0, 1.0)
     angle, height = np.arccos(bent), np.sqrt(1 - bent**2)
     mean = np.where(edge <= -1, -edge, (height - bent * angle) / math.pi)
-    return mean, (angle - bent * height) / math.pi, angle / math.pi
+    return _Ramp(mean, (angle - bent * height) / math.pi, angle / math.pi)

@@ -38,21 +38,20 @@ class Loose:
     Attributes:
         inputs: (N, INPUTS) signals with what is loose in columns of its own, wheels rolling in spite of it.
         rattles: (N, 4) where the motor of each wheel rattles in its gear.
-        own: rows of motors that rattle or move at rest, or of a unit that may wander; None where there are none.
-        moving: (N,) rows to be used, a mask for each of those.
         rolls: whether rolling rows of the drive tell how the wheels roll.
+        own: rows of motors that rattle or move at rest, of a unit that may wander; of each, where they are to be used,
+            a mask (N,) for each of its coordinates.
     """
 
     inputs: Array
     rattles: Mask
-    own: OwnRows | None = None
-    moving: tuple[Mask, ...] = ()
-    rolls: bool = True
+    rolls: bool
+    own: tuple[tuple[OwnRows, tuple[Mask, ...]], ...] = ()
 
 
 def as_it_was(recorded: Array) -> Loose:
     """Signals (N, INPUTS) of a drive in which nothing is taken to be loose."""
-    return Loose(recorded, np.zeros((len(recorded), len(WHEELS)), dtype=np.bool_))
+    return Loose(recorded, _none(recorded), rolls=True)
 
 
 def taken_apart(
@@ -66,12 +65,12 @@ def taken_apart(
     dt = signals.segment.sample_time
     rms, rattles = rattling(signals.beta, processing, dt)
     if not rattles.any():
-        return Loose(recorded, rattles)
+        return Loose(recorded, rattles, rolls=True)
     motors = np.flatnonzero(rattles.any(axis=0)).tolist()
     inside = _inside(rattles, processing, dt)
     moving = tuple(inside[:, wheel] for wheel in motors)
     inputs = _hammered(recorded, rms, rattles, geometry, dt)
-    return Loose(inputs, rattles, rattle_rows(motors, geometry), moving, rolls=False)
+    return Loose(inputs, rattles, rolls=False, own=((rattle_rows(motors, geometry), moving),))
 
 
 def near_middle(signals: Signals) -> Mask:
@@ -82,39 +81,29 @@ def near_middle(signals: Signals) -> Mask:
 def _at_standstill(recorded: Array, signals: Signals, side: int, geometry: Geometry, processing: Processing) -> Loose:
     """A motor that rattles has no rows there: what swings back is the steered unit, which no other wheel shows."""
     dt, wheels = signals.segment.sample_time, list(_SIDES[side])
-    rms, rattles = np.zeros(signals.beta.shape), np.zeros(signals.beta.shape, dtype=np.bool_)
+    rms, rattles = np.zeros(signals.beta.shape), _none(recorded)
     turned = signals.beta[:, wheels] / _turned_by_steering(geometry)[wheels, side]
     beside = geometry.lever_ratio * (turned - signals.alpha[:, [side]])
     rms[:, wheels], rattles[:, wheels] = rattling_at_standstill(beside, processing, dt)
-    near = near_middle(signals)
     if rattles.any():
         return Loose(_hammered(recorded, rms, rattles, geometry, dt), rattles, rolls=False)
-    resting = _at_rest(recorded, signals, 1 - side, near, geometry)
-    if resting is not None:
-        return resting
+    near, inputs, own = near_middle(signals), recorded.copy(), []
+    # One number for the whole step: when a motor or a unit crosses differs from repeat to repeat.
+    for wheel in _SIDES[1 - side]:
+        across = moved_at_rest(signals.beta[:, wheel], near)
+        if across > 0:
+            inputs[near, SLICES["rest"].start + wheel] = across
+            own.append((rest_rows(wheel, geometry), (near,)))
     moving = np.abs(signals.alpha_rate[:, side]) > processing.moving
-    torques, alpha = signals.torques[:, wheels], signals.alpha[:, side]
-    found = wandering(alpha, turned, torques, near, moving, dt)
-    if found is None:
-        return Loose(recorded, rattles)
-    inputs = recorded.copy()
-    # One number for the whole step: when the unit hops differs from repeat to repeat.
-    inputs[near, SLICES["wander"].start + side] = found.across
-    return Loose(inputs, rattles, wander_rows(side, geometry), (near & (not found.foretold),))
+    found = wandering(signals.alpha[:, side], turned, signals.torques[:, wheels], near, moving, dt)
+    if found is not None:
+        inputs[near, SLICES["wander"].start + side] = found.across
+        own.append((wander_rows(side, geometry), (near & (not found.foretold),)))
+    return Loose(inputs, rattles, rolls=True, own=tuple(own))
 
 
-def _at_rest(recorded: Array, signals: Signals, side: int, near: Mask, geometry: Geometry) -> Loose | None:
-    """A motor of the side that rests, if it moves."""
-    wheels = list(_SIDES[side])
-    across = moved_at_rest(signals.beta[:, wheels], near)
-    if not across.any():
-        return None
-    wheel = wheels[int(np.argmax(across))]
-    inputs = recorded.copy()
-    # One number for the whole step: when the motor crosses differs from repeat to repeat.
-    inputs[near, SLICES["rest"].start + wheel] = across.max()
-    none = np.zeros(signals.beta.shape, dtype=np.bool_)
-    return Loose(inputs, none, rest_rows(wheel, geometry), (near,))
+def _none(recorded: Array) -> Mask:
+    return np.zeros((len(recorded), len(WHEELS)), dtype=np.bool_)
 
 
 def _side(spec: RowsOfStep) -> int:

@@ -39,11 +39,14 @@ ABOVE_OTHERS: Final = 5.0
 OFTEN: Final = 0.1
 """Part of a drive that a motor must rattle for; what it has shaken loose then slides on in all of it [-].
 
-On the emulator motors in a play do so for 0.6 to 0.96 of it, those of wheels on a slippery floor for up to 0.05.
+On the emulator motors in a play do so for 0.6 to 0.96 of it, those of wheels on a slippery floor for up to 0.053.
 """
 
+OFTEN_AT_STANDSTILL: Final = 0.05
+"""The same of a step at standstill."""
+
 UNTOLD: Final = 0.03
-"""Part of its motion that may stay unexplained: in flight no load tells where the motor is."""
+"""Part of its motion that may stay unexplained: of a motor in flight the slow part is told by its load alone [-]."""
 
 SHAKEN: Final = 0.01
 """Part of the generalized forces of such a drive that may stay unexplained: wheels that slide push each other [-]."""
@@ -65,7 +68,7 @@ def rattling(beta: Array, processing: Processing, sample_time: float) -> tuple[A
         sample_time: [s].
     """
     rms = _rms_above_band(beta, processing, sample_time)
-    rattles = _often(rms > np.maximum(LEAST, ABOVE_OTHERS * rms.min(axis=1, keepdims=True)))
+    rattles = _often(rms > np.maximum(LEAST, ABOVE_OTHERS * rms.min(axis=1, keepdims=True)), OFTEN)
     return rms, rattles & ~rattles.any(axis=0).all()
 
 
@@ -80,7 +83,7 @@ def rattling_at_standstill(beside: Array, processing: Processing, sample_time: f
         sample_time: [s].
     """
     rms = _rms_above_band(np.column_stack([beside, beside[:, 0] - beside[:, 1]]), processing, sample_time)
-    return rms[:, :2], _often((rms[:, :2] > LEAST) & (rms[:, 2:] > LEAST))
+    return rms[:, :2], _often((rms[:, :2] > LEAST) & (rms[:, 2:] > LEAST), OFTEN_AT_STANDSTILL)
 
 
 def _rms_above_band(values: Array, processing: Processing, sample_time: float) -> Array:
@@ -88,8 +91,8 @@ def _rms_above_band(values: Array, processing: Processing, sample_time: float) -
     return np.asarray(np.sqrt(np.maximum(power, 0.0)))
 
 
-def _often(rattles: Mask) -> Mask:
-    return np.asarray(rattles & (rattles.mean(axis=0) > OFTEN))
+def _often(rattles: Mask, least: float) -> Mask:
+    return np.asarray(rattles & (rattles.mean(axis=0) > least))
 
 
 def hammer(moved: Array, rms: Array) -> Array:
@@ -102,9 +105,9 @@ def swing(rms: Array) -> Array:
     return np.asarray(math.sqrt(2) * np.maximum(rms, LEAST))
 
 
-def moved_by(hammer: Array, swing: Array) -> Array:
-    """Motion above the band (N,) of a motor that has these weights and swings."""
-    return np.asarray(hammer * swing / math.sqrt(2))
+def moved_by(weights: Array, swings: Array) -> Array:
+    """Motion above the band (N,) of a motor that has these weights and swings [rad]."""
+    return np.asarray(weights * swings / math.sqrt(2))
 
 
 def rattle_rows(wheels: Sequence[int], geometry: Geometry) -> OwnRows:

@@ -37,9 +37,9 @@ _ROLLING: Final = {Mode.STEERED: (1, 1, 1, 1), Mode.ROTATION: (-1, -1, 1, 1), Mo
 
 
 def _joint(coordinate: str) -> tuple[str, int]:
-    """Name and index of the joint that a row is about: a wheel in the air, or the steering of a side."""
-    if coordinate.startswith("beta_"):
-        return "beta", WHEELS.index(coordinate.removeprefix("beta_"))
+    """Name and index of the joint that a row is about: a wheel in the air or at rest, or the steering of a side."""
+    if coordinate.startswith(("beta_", "rest_")):
+        return "beta", WHEELS.index(coordinate[-2:])
     return "alpha", 0 if coordinate.endswith("l") else 1
 
 

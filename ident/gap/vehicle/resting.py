@@ -8,7 +8,6 @@ farthest behind. What rolls at standstill takes its motion for that of wheels or
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -21,10 +20,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 LEAST: Final = 2e-4
-"""Range of its motion from which a motor is loose [rad]; in rigid gears it is up to 0.07 mrad on the emulator."""
-
-ABOVE_OTHERS: Final = 5.0
-"""The same over that of any other motor that rests: what moves in a play pushes the chassis, and all with it."""
+"""Range of its motion from which a motor is loose [rad]; in rigid gears it is up to 0.07 mrad on the emulator, up to
+0.25 mrad where another one of 5 mrad pushes the chassis, or a wheel slides: those rattle in no drive."""
 
 FARTHEST: Final = 0.005
 """Part of the time that a motor is taken to be at either end of its range [-]."""
@@ -32,26 +29,20 @@ FARTHEST: Final = 0.005
 UNTOLD: Final = 0.05
 """Part of the range that may stay unexplained: noise makes it larger, and not every flank is reached [-]."""
 
-
 COORDINATES: Final = tuple(f"rest_{wheel}" for wheel in WHEELS)
 
 
-def moved_at_rest(beta: Array, near: Mask) -> Array:
-    """How far the motors (2) of a side that rests move [rad], zero for those that are not loose.
+def moved_at_rest(beta: Array, near: Mask) -> float:
+    """How far a motor whose wheel rests moves [rad], zero where that is no play.
 
     Args:
-        beta: their angles, at the wheels (N, 2) [rad].
+        beta: its angle, at the wheel (N,) [rad].
         near: (N,) where no wheel pushes the chassis aside.
     """
     if not near.any():
-        return np.zeros(2)
-    across = np.array([_range(angle, *_farthest(angle)) for angle in beta[near].T])
-    return np.where(across > np.maximum(LEAST, ABOVE_OTHERS * across[::-1]), across, 0.0)
-
-
-def is_loose(across: float, others: Sequence[float]) -> bool:
-    """Whether a range [rad] is that of a play, and not of what is looser elsewhere."""
-    return all(across > other / ABOVE_OTHERS for other in others)
+        return 0.0
+    across = _range(beta[near], *_farthest(beta[near]))
+    return across if across > LEAST else 0.0
 
 
 def range_of(values: Array, inputs: Array, wheel: int) -> float:
@@ -59,7 +50,7 @@ def range_of(values: Array, inputs: Array, wheel: int) -> float:
 
     Zero for a motor that does not; `inputs` are the signals (N, INPUTS), `wheel` is its number.
     """
-    at_rest = inputs[:, SLICES["rest"].start + wheel] > 0
+    at_rest = inputs[:, SLICES["rest"].start + wheel] != 0
     if not at_rest.any():
         return 0.0
     return _range(values[at_rest], *_farthest(inputs[at_rest, SLICES["beta"].start + wheel]))

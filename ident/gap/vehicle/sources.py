@@ -16,7 +16,7 @@ from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
 from ident.gap.vehicle.loose import as_it_was, near_middle, taken_apart
-from ident.gap.vehicle.resting import is_loose, resting_wheel
+from ident.gap.vehicle.resting import resting_wheel
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
 from ident.gap.vehicle.wandering import wanders
 from ident.records.record import Record, Step, base_step
@@ -77,7 +77,7 @@ class Source:
 
     @property
     def across(self) -> float:
-        """Largest number in its own rows, where they are one of the step [rad]."""
+        """How far a unit goes that wanders: the number that its own rows are of [rad]."""
         return 0.0 if self.own is None else float(self.inputs[:, self.own.columns].max())
 
     @property
@@ -171,9 +171,9 @@ def _sources(
     if names and loose.rolls:
         kinematic = (_rolling(signals, spec, processing)[::stride],) * len(names)
         yield Source(channel=Channel.KINEMATIC, moving=kinematic, **common)  # type: ignore[arg-type]
-    if loose.own is not None:
-        moving = tuple(mask[::stride] for mask in loose.moving)
-        yield Source(channel=Channel.KINEMATIC, moving=moving, own=loose.own, **common)  # type: ignore[arg-type]
+    for own, masks in loose.own:
+        moving = tuple(mask[::stride] for mask in masks)
+        yield Source(channel=Channel.KINEMATIC, moving=moving, own=own, **common)  # type: ignore[arg-type]
 
 
 def _judged_by_others(sources: Sequence[Source]) -> Sequence[Source]:
@@ -181,7 +181,7 @@ def _judged_by_others(sources: Sequence[Source]) -> Sequence[Source]:
     own = [source for source in sources if source.own is not None and source.spec.mode is Mode.ALIGNMENT]
     loose = list(_resting(sources))
     shown = [*loose, *_wandering([source for source in own if resting_wheel(source.own) is None])]
-    # A loose motor's motion would pass for that of wheels.
+    # A loose motor's motion would pass for that of wheels, whichever side steers.
     left_out = [*own, *(source for source in sources if loose and source.rolls_at_standstill)]
     return [source for source in sources if source in shown or source not in left_out]
 
@@ -189,9 +189,7 @@ def _judged_by_others(sources: Sequence[Source]) -> Sequence[Source]:
 def _resting(sources: Sequence[Source]) -> Iterator[Source]:
     """Steps in which a motor moves at rest that rattles in some drive of the record."""
     rattles = np.any([source.rattles.any(axis=0) for source in sources], axis=0)
-    shaken = [s for s in sources if (wheel := resting_wheel(s.own)) is not None and rattles[wheel]]
-    ranges = [source.across for source in shaken]
-    return (source for source in shaken if is_loose(source.across, ranges))
+    return (source for source in sources if (wheel := resting_wheel(source.own)) is not None and rattles[wheel])
 
 
 def _wandering(sources: Sequence[Source]) -> Iterator[Source]:

@@ -37,6 +37,10 @@ CONTACT_SHARE: Final = 0.25
 """Load at which tooth flanks are taken to touch, in units of the joint's Coulomb friction: play is crossed below."""
 
 
+LEAST_LOAD: Final = 0.05
+"""The same at least, for joints without dry friction [Nm]."""
+
+
 @dataclass(frozen=True)
 class Setting:
     """What a transform needs beside the signals.
@@ -79,29 +83,32 @@ def _earlier_angle(inputs: Array, place: int, sizes: Array, setting: Setting) ->
 def _soft_gear(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
     (compliance,) = sizes
     load = _gear_load(inputs, place, setting)
-    return _moved_at_rest(
-        _turned_by_load(inputs, place, compliance * load, setting), inputs, place, load, 0.0, compliance
-    )
+    changed = _turned_by_load(inputs, place, compliance * load, setting)
+    changed[:, SLICES["rest"]] -= _across_at_rest(inputs, place, 0.0, compliance * load)
+    return changed
 
 
 def _gear_with_play(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
     """Play, and the compliance of its flanks: no contact is rigid."""
     gap, compliance = sizes
-    load, touching = _gear_load(inputs, place, setting), CONTACT_SHARE * setting["d_cw"]
+    load = _gear_load(inputs, place, setting)
+    touching = max(CONTACT_SHARE * abs(setting["d_cw"]), LEAST_LOAD)
     hammer, swing = (inputs[:, SLICES[name].start + place] for name in ("hammer", "swing"))
-    if hammer.any() and compliance > 0:
+    if hammer.any() and compliance != 0:
         shaken = Shaken(moved_by(hammer, swing), swing, load, touching, setting.sample_time)
         return _behind_motor(inputs, place, twist_in_flight(shaken, gap, compliance), setting)
-    # The limit of a small play: before a motor flies, its load tells at which flank it lies.
+    # For a first look, and for a play that is given without its flanks: their load tells at which of them a motor lies.
     changed = _turned_by_load(inputs, place, gap / 2 * np.tanh(load / touching) + compliance * load, setting)
-    return _moved_at_rest(changed, inputs, place, load, gap, compliance)
-
-
-def _moved_at_rest(changed: Array, inputs: Array, wheel: int, load: Array, gap: float, compliance: float) -> Array:
-    """The signals `changed`, of a motor that moves while its wheel rests less what its gear lets it move."""
-    column = SLICES["rest"].start + wheel
-    changed[inputs[:, column] > 0, column] -= gap + compliance * range_of(load, inputs, wheel)
+    changed[:, SLICES["rest"]] -= _across_at_rest(inputs, place, gap, compliance * load)
     return changed
+
+
+def _across_at_rest(inputs: Array, wheel: int, gap: float, yielded: Array) -> Array:
+    """How far a play, and what its gear yields (N,), let the motors move at rest (N, 4); zero but for one that does."""
+    found = np.zeros((len(inputs), 4))
+    at_rest = inputs[:, SLICES["rest"].start + wheel] != 0
+    found[at_rest, wheel] = gap + range_of(yielded, inputs, wheel)
+    return found
 
 
 def _soft_coupling(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
@@ -116,7 +123,7 @@ def _coupling_with_play(inputs: Array, place: int, sizes: Array, setting: Settin
     load, friction = _coupling_load(inputs, place, setting), _unit_friction(place, setting)
     twist = gap / 2 * _relay(load, friction) + compliance * _play(load, friction)
     changed, wander = _rear_behind_front(inputs, place, twist, setting), SLICES["wander"].start + place
-    changed[inputs[:, wander] > 0, wander] -= gap
+    changed[inputs[:, wander] != 0, wander] -= gap
     return changed
 
 

@@ -66,7 +66,7 @@ def test_true_sizes_explain_a_motor_that_flies_from_flank_to_flank(
 ) -> None:
     amplitude = swing * gap / 2
     shaken = swinging(amplitude, offset * amplitude, gap, compliance, frequency)
-    assert missed(shaken, gap, compliance) < 0.05
+    assert missed(shaken, gap, compliance) < 0.035
 
 
 @given(
@@ -82,7 +82,7 @@ def test_true_sizes_explain_a_motor_that_bounces_on_one_flank(
 ) -> None:
     amplitude = swing * gap / 2
     shaken = swinging(amplitude, gap / 2 + beyond * amplitude, gap, compliance, frequency)
-    assert missed(shaken, gap, compliance) < 0.05
+    assert missed(shaken, gap, compliance) < 0.025
 
 
 def test_on_one_flank_a_wider_play_is_the_same_and_elsewhere_it_is_not() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,18 +12,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from ident.gap.problem import Channel, Problem
+from ident.gap.problem import Channel
 from ident.gap.vehicle.build import build_problem
 from ident.gap.vehicle.ideal import Drive, ideal_record
-from ident.gap.vehicle.resting import is_loose, moved_at_rest
+from ident.gap.vehicle.resting import moved_at_rest
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effects import EffectName, make_effect
 
 Array = NDArray[np.float64]
 
 GAP, COMPLIANCE, LOAD = 8e-4, 5e-5, 1.5
 """Play [rad] of flanks [rad/Nm] that carry at most that load [Nm]."""
 FARTHEST = GAP / 2 + COMPLIANCE * LOAD
+TIME = np.arange(6000) * 0.002
+EVERYWHERE = np.ones(len(TIME), dtype=np.bool_)
 
 
 def drifting(time: Array) -> tuple[Array, Array]:
@@ -33,45 +37,47 @@ def drifting(time: Array) -> tuple[Array, Array]:
 
 @settings(max_examples=20, deadline=None)
 @given(gap=st.floats(3e-4, 5e-3), noise=st.floats(0.0, 5e-6), seed=st.integers(0, 1000))
-def test_a_loose_motor_ranges_over_its_play_and_the_other_one_over_nothing(gap: float, noise: float, seed: int) -> None:
-    time = np.arange(6000) * 0.002
-    angles = np.stack([gap / 2 * np.sin(9 * time), 1e-5 * np.sin(time)], axis=1)
-    angles += noise * np.random.default_rng(seed).normal(size=angles.shape)
-    across = moved_at_rest(angles, np.ones(len(time), dtype=np.bool_))
-    assert across[0] == pytest.approx(gap, rel=0.02, abs=1e-6 + 6 * noise)
-    assert across[1] == 0.0
+def test_a_loose_motor_ranges_over_its_play(gap: float, noise: float, seed: int) -> None:
+    angle = gap / 2 * np.sin(9 * TIME) + noise * np.random.default_rng(seed).normal(size=len(TIME))
+    assert moved_at_rest(angle, EVERYWHERE) == pytest.approx(gap, rel=0.02, abs=1e-6 + 6 * noise)
 
 
-def test_motors_that_the_chassis_carries_along_are_not_loose() -> None:
-    pushed = 1e-3 * np.sin(np.arange(6000) * 0.01)
-    near = np.ones(len(pushed), dtype=np.bool_)
-    assert not moved_at_rest(np.stack([pushed, 0.8 * pushed], axis=1), near).any()
-    assert not moved_at_rest(np.stack([pushed, 0.1 * pushed], axis=1), ~near).any()
-    assert is_loose(5e-3, [5e-3, 3e-4])
-    assert not is_loose(3e-4, [5e-3, 3e-4])
+def test_what_a_rigid_gear_moves_or_what_moves_far_from_the_middle_is_no_play() -> None:
+    assert moved_at_rest(3e-5 * np.sin(TIME), EVERYWHERE) == 0.0
+    assert moved_at_rest(GAP * np.sin(9 * TIME), ~EVERYWHERE) == 0.0
 
 
-def loose_gear(prototype: VehicleDescription, *, rattles: bool) -> Record:
-    """The motor of the first wheel drifts while the right side steers, and is shaken or not in the drive."""
-    record = ideal_record([Drive(Step.STEERING_RIGHT), Drive(Step.STRAIGHT)], prototype)
-    resting, driving = record.segments
-    angles, torques = resting.wheel_angles.copy(), resting.motor_torques.copy()
-    angle, load = drifting(resting.time)
-    angles[:, 0] += angle
-    torques[:, 0] += load / prototype.geometry.gear_ratio
-    shaken = driving.wheel_angles.copy()
-    shaken[:, 0] += 5e-4 * np.sin(2 * math.pi * 60 * driving.time) * rattles
-    segments = [replace(resting, wheel_angles=angles, motor_torques=torques), replace(driving, wheel_angles=shaken)]
+def loose_gears(
+    prototype: VehicleDescription,
+    wheels: Sequence[int],
+    *,
+    rattles: bool,
+    steps: Sequence[Step] = (Step.STEERING_RIGHT,),
+) -> Record:
+    """Motors of the left wheels that drift while the right side steers, and are shaken or not in the drive."""
+    record = ideal_record([*(Drive(step) for step in steps), Drive(Step.STRAIGHT)], prototype)
+    segments = []
+    for segment in record.segments:
+        angles, torques = segment.wheel_angles.copy(), segment.motor_torques.copy()
+        angle, load = drifting(segment.time)
+        for wheel in wheels:
+            if segment.step == Step.STEERING_RIGHT:
+                angles[:, wheel] += angle
+                torques[:, wheel] += load / prototype.geometry.gear_ratio
+            elif segment.step == Step.STRAIGHT:
+                angles[:, wheel] += 5e-4 * np.sin(2 * math.pi * 60 * segment.time) * rattles
+        segments.append(replace(segment, wheel_angles=angles, motor_torques=torques))
     return replace(record, segments=segments)
 
 
-def coordinates(problem: Problem) -> set[str]:
-    """Of the rows of the step at standstill."""
-    return {block.coordinate for block in problem.blocks if block.step == Step.STEERING_RIGHT}
+def at_standstill(record: Record, prototype: VehicleDescription) -> set[str]:
+    """Coordinates of the rows of the steps at standstill."""
+    blocks = build_problem([record], prototype).blocks
+    return {block.coordinate for block in blocks if block.step != Step.STRAIGHT}
 
 
 def test_its_range_is_a_row_that_only_its_gear_explains(prototype: VehicleDescription) -> None:
-    problem = build_problem([loose_gear(prototype, rattles=True)], prototype)
+    problem = build_problem([loose_gears(prototype, [0], rattles=True)], prototype)
     place = [block.coordinate for block in problem.blocks].index("rest_fl")
     block = problem.blocks[place]
     explained = {
@@ -89,10 +95,28 @@ def test_its_range_is_a_row_that_only_its_gear_explains(prototype: VehicleDescri
     assert np.abs(left).max() < 0.03 * np.abs(block.target[inner]).max()
 
 
-def test_what_rolls_at_standstill_is_left_out_beside_it(prototype: VehicleDescription) -> None:
-    assert coordinates(build_problem([loose_gear(prototype, rattles=True)], prototype)) == {"alpha_r", "rest_fl"}
+def test_what_rolls_at_standstill_is_left_out_beside_it_whichever_side_steers(prototype: VehicleDescription) -> None:
+    steps = [Step.STEERING_LEFT, Step.STEERING_RIGHT]
+    found = at_standstill(loose_gears(prototype, [0], rattles=True, steps=steps), prototype)
+    assert found == {"alpha_l", "alpha_r", "rest_fl"}
+
+
+def test_two_loose_motors_of_a_side_have_a_row_each(prototype: VehicleDescription) -> None:
+    found = at_standstill(loose_gears(prototype, [0, 1], rattles=True), prototype)
+    assert found == {"alpha_r", "rest_fl", "rest_rl"}
 
 
 def test_a_motor_that_rattles_nowhere_is_not_taken_to_be_loose(prototype: VehicleDescription) -> None:
-    found = coordinates(build_problem([loose_gear(prototype, rattles=False)], prototype))
+    found = at_standstill(loose_gears(prototype, [0], rattles=False), prototype)
     assert found == {"alpha_r", "roll_fr", "roll_rr"}
+
+
+def test_a_given_play_that_is_too_large_leaves_a_row_that_its_gear_can_still_explain(
+    prototype: VehicleDescription,
+) -> None:
+    given = make_effect(EffectName.BACKLASH, "drive_fl", {"gap": 2 * GAP})
+    problem = build_problem([loose_gears(prototype, [0], rattles=True)], prototype, given=[given])
+    place = [block.coordinate for block in problem.blocks].index("rest_fl")
+    column = problem.candidate("elasticity@drive_fl").variants[0].columns[place]
+    assert column is not None
+    assert np.any(column != 0)

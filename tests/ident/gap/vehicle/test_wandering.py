@@ -146,6 +146,18 @@ def test_a_plain_vehicle_has_no_rows_of_units_that_wander(still: Record, prototy
     assert wandering_units(still, prototype) == []
 
 
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_motor_that_is_pushed_while_its_wheel_rests_hides_no_unit(
+    side: int, still: Record, prototype: VehicleDescription
+) -> None:
+    segments = [hopping(still.segments[0], [1], prototype), still.segments[1]]
+    angles = segments[side].wheel_angles.copy()
+    angles[:, 2 - 2 * side] += 3e-4 * np.sin(5 * segments[side].time)
+    segments[side] = replace(segments[side], wheel_angles=angles)
+    (found,) = wandering_units(replace(still, segments=segments), prototype)
+    assert found.coordinates == ("wander_l",)
+
+
 def test_only_a_play_of_that_coupling_explains_how_far_a_rear_unit_wanders(
     still: Record, prototype: VehicleDescription
 ) -> None:
