@@ -89,8 +89,8 @@ def _at_standstill(recorded: Array, signals: Signals, side: int, geometry: Geome
         return Loose(_hammered(recorded, rms, rattles, geometry, dt), rattles, rolls=False)
     near, inputs, own = near_middle(signals), recorded.copy(), []
     # One number for the whole step: when a motor or a unit crosses differs from repeat to repeat.
-    for wheel in _SIDES[1 - side]:
-        across = moved_at_rest(signals.beta[:, wheel], near)
+    resting = list(_SIDES[1 - side])
+    for wheel, across in zip(resting, moved_at_rest(signals.beta[:, resting], near).tolist(), strict=True):
         if across > 0:
             inputs[near, SLICES["rest"].start + wheel] = across
             own.append((rest_rows(wheel, geometry), (near,)))

@@ -3,7 +3,7 @@
 Nothing loads them there, and the controller lets them drift from flank to flank. A motor does so that rattles where the
 vehicle drives; others move with wheels that slide. How far it moves in such a step is a row of its own: the play of its
 gear, and what the flanks, or a gear that gives way, yield to the load that it has where it is farthest ahead and
-farthest behind. What rolls at standstill takes its motion for that of wheels or chassis, and is left out.
+farthest behind. What rolls at standstill takes its motion for that of wheels or chassis; a wide one has it left out.
 """
 
 from __future__ import annotations
@@ -23,6 +23,13 @@ LEAST: Final = 2e-4
 """Range of its motion from which a motor is loose [rad]; in rigid gears it is up to 0.07 mrad on the emulator, up to
 0.25 mrad where another one of 5 mrad pushes the chassis, or a wheel slides: those rattle in no drive."""
 
+ABOVE_OTHER: Final = 5.0
+"""The same over that of the other motor of its side, unless that is loose as well: what both show is no gear's."""
+
+WIDE: Final = 7e-4
+"""Range from which what rolls at standstill is left out of a record [rad]: gears that give way move their motors by up
+to 0.5 mrad on the emulator, and their load foretells it."""
+
 FARTHEST: Final = 0.005
 """Part of the time that a motor is taken to be at either end of its range [-]."""
 
@@ -32,17 +39,18 @@ UNTOLD: Final = 0.05
 COORDINATES: Final = tuple(f"rest_{wheel}" for wheel in WHEELS)
 
 
-def moved_at_rest(beta: Array, near: Mask) -> float:
-    """How far a motor whose wheel rests moves [rad], zero where that is no play.
+def moved_at_rest(beta: Array, near: Mask) -> Array:
+    """How far the motors (2) of a side that rests move [rad], zero where that is no play.
 
     Args:
-        beta: its angle, at the wheel (N,) [rad].
+        beta: their angles, at the wheels (N, 2) [rad].
         near: (N,) where no wheel pushes the chassis aside.
     """
     if not near.any():
-        return 0.0
-    across = _range(beta[near], *_farthest(beta[near]))
-    return across if across > LEAST else 0.0
+        return np.zeros(2)
+    across = np.array([_range(angle, *_farthest(angle)) for angle in beta[near].T])
+    other = across[::-1]
+    return np.where((across > LEAST) & ((across > ABOVE_OTHER * other) | (other > LEAST)), across, 0.0)
 
 
 def range_of(values: Array, inputs: Array, wheel: int) -> float:

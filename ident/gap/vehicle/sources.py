@@ -16,7 +16,7 @@ from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.gap.problem import Channel
 from ident.gap.vehicle import rows
 from ident.gap.vehicle.loose import as_it_was, near_middle, taken_apart
-from ident.gap.vehicle.resting import resting_wheel
+from ident.gap.vehicle.resting import WIDE, resting_wheel
 from ident.gap.vehicle.signals import Signals, decimation, signals_of
 from ident.gap.vehicle.wandering import wanders
 from ident.records.record import Record, Step, base_step
@@ -77,7 +77,7 @@ class Source:
 
     @property
     def across(self) -> float:
-        """How far a unit goes that wanders: the number that its own rows are of [rad]."""
+        """How far a unit wanders, or a motor moves at rest: the number that its own rows are of [rad]."""
         return 0.0 if self.own is None else float(self.inputs[:, self.own.columns].max())
 
     @property
@@ -181,8 +181,9 @@ def _judged_by_others(sources: Sequence[Source]) -> Sequence[Source]:
     own = [source for source in sources if source.own is not None and source.spec.mode is Mode.ALIGNMENT]
     loose = list(_resting(sources))
     shown = [*loose, *_wandering([source for source in own if resting_wheel(source.own) is None])]
-    # A loose motor's motion would pass for that of wheels, whichever side steers.
-    left_out = [*own, *(source for source in sources if loose and source.rolls_at_standstill)]
+    # The motion of a motor in a wide play would pass for that of wheels, whichever side steers.
+    wide = any(source.across > WIDE for source in loose)
+    left_out = [*own, *(source for source in sources if wide and source.rolls_at_standstill)]
     return [source for source in sources if source in shown or source not in left_out]
 
 

@@ -38,13 +38,22 @@ def drifting(time: Array) -> tuple[Array, Array]:
 @settings(max_examples=20, deadline=None)
 @given(gap=st.floats(3e-4, 5e-3), noise=st.floats(0.0, 5e-6), seed=st.integers(0, 1000))
 def test_a_loose_motor_ranges_over_its_play(gap: float, noise: float, seed: int) -> None:
-    angle = gap / 2 * np.sin(9 * TIME) + noise * np.random.default_rng(seed).normal(size=len(TIME))
-    assert moved_at_rest(angle, EVERYWHERE) == pytest.approx(gap, rel=0.02, abs=1e-6 + 6 * noise)
+    angles = np.stack([gap / 2 * np.sin(9 * TIME), 1e-5 * np.sin(TIME)], axis=1)
+    angles += noise * np.random.default_rng(seed).normal(size=angles.shape)
+    assert moved_at_rest(angles, EVERYWHERE) == pytest.approx([gap, 0.0], rel=0.02, abs=1e-6 + 6 * noise)
 
 
 def test_what_a_rigid_gear_moves_or_what_moves_far_from_the_middle_is_no_play() -> None:
-    assert moved_at_rest(3e-5 * np.sin(TIME), EVERYWHERE) == 0.0
-    assert moved_at_rest(GAP * np.sin(9 * TIME), ~EVERYWHERE) == 0.0
+    drift = np.sin(9 * TIME)
+    assert not moved_at_rest(np.stack([3e-5 * drift, 0 * drift], axis=1), EVERYWHERE).any()
+    assert not moved_at_rest(np.stack([GAP * drift, 0 * drift], axis=1), ~EVERYWHERE).any()
+
+
+def test_what_both_motors_of_a_side_show_is_a_play_only_if_both_are_loose() -> None:
+    drift = np.sin(9 * TIME)
+    for other, loose in ((2e-5, [True, False]), (8e-5, [False, False]), (3e-4, [True, True])):
+        moved = moved_at_rest(np.stack([2e-4 * drift, other / 2 * drift], axis=1), EVERYWHERE)
+        assert (moved > 0).tolist() == loose
 
 
 def loose_gears(
@@ -52,6 +61,7 @@ def loose_gears(
     wheels: Sequence[int],
     *,
     rattles: bool,
+    share: float = 1.0,
     steps: Sequence[Step] = (Step.STEERING_RIGHT,),
 ) -> Record:
     """Motors of the left wheels that drift while the right side steers, and are shaken or not in the drive."""
@@ -62,7 +72,7 @@ def loose_gears(
         angle, load = drifting(segment.time)
         for wheel in wheels:
             if segment.step == Step.STEERING_RIGHT:
-                angles[:, wheel] += angle
+                angles[:, wheel] += share * angle
                 torques[:, wheel] += load / prototype.geometry.gear_ratio
             elif segment.step == Step.STRAIGHT:
                 angles[:, wheel] += 5e-4 * np.sin(2 * math.pi * 60 * segment.time) * rattles
@@ -99,6 +109,11 @@ def test_what_rolls_at_standstill_is_left_out_beside_it_whichever_side_steers(pr
     steps = [Step.STEERING_LEFT, Step.STEERING_RIGHT]
     found = at_standstill(loose_gears(prototype, [0], rattles=True, steps=steps), prototype)
     assert found == {"alpha_l", "alpha_r", "rest_fl"}
+
+
+def test_beside_a_narrow_range_wheels_tell_how_they_roll(prototype: VehicleDescription) -> None:
+    found = at_standstill(loose_gears(prototype, [0], rattles=True, share=0.5), prototype)
+    assert found == {"alpha_r", "rest_fl", "roll_fr", "roll_rr"}
 
 
 def test_two_loose_motors_of_a_side_have_a_row_each(prototype: VehicleDescription) -> None:
