@@ -119,8 +119,8 @@ def _descended(model: _Model) -> Array:
         else:
             return found
         found, residual = tried, left
-        # A step that was cut short says nothing of what is left.
-        if halving == 0 and cost - float(left @ left) < SETTLED:
+        # A step that was cut very short says nothing of what is left.
+        if 2 * halving < HALVINGS and cost - float(left @ left) < SETTLED:
             return found
     return found
 
