@@ -82,25 +82,24 @@ def _earlier_angle(inputs: Array, place: int, sizes: Array, setting: Setting) ->
 
 def _soft_gear(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
     (compliance,) = sizes
-    load = _gear_load(inputs, place, setting)
-    changed = _turned_by_load(inputs, place, compliance * load, setting)
-    changed[:, SLICES["rest"]] -= _across_at_rest(inputs, place, 0.0, compliance * load)
-    return changed
+    return _turned_by_load(inputs, place, 0.0, compliance, setting)
 
 
 def _gear_with_play(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
     """Play, and the compliance of its flanks: no contact is rigid."""
     gap, compliance = sizes
-    load = _gear_load(inputs, place, setting)
-    touching = max(CONTACT_SHARE * abs(setting["d_cw"]), LEAST_LOAD)
     hammer, swing = (inputs[:, SLICES[name].start + place] for name in ("hammer", "swing"))
     if hammer.any() and compliance != 0:
-        shaken = Shaken(moved_by(hammer, swing), swing, load, touching, setting.sample_time)
+        load = _gear_load(inputs, place, setting)
+        shaken = Shaken(moved_by(hammer, swing), swing, load, _touching(setting), setting.sample_time)
         return _behind_motor(inputs, place, twist_in_flight(shaken, gap, compliance), setting)
     # For a first look, and for a play that is given without its flanks: their load tells at which of them a motor lies.
-    changed = _turned_by_load(inputs, place, gap / 2 * np.tanh(load / touching) + compliance * load, setting)
-    changed[:, SLICES["rest"]] -= _across_at_rest(inputs, place, gap, compliance * load)
-    return changed
+    return _turned_by_load(inputs, place, gap, compliance, setting)
+
+
+def _touching(setting: Setting) -> float:
+    """Load of a wheel's gear from which its flanks surely touch [Nm]."""
+    return max(CONTACT_SHARE * abs(setting["d_cw"]), LEAST_LOAD)
 
 
 def _across_at_rest(inputs: Array, wheel: int, gap: float, yielded: Array) -> Array:
@@ -177,11 +176,16 @@ def contact_force(inputs: Array, wheel: int, setting: Setting) -> Array:
     return np.asarray((drive - lost) / setting.geometry.wheel_radius)
 
 
-def _turned_by_load(inputs: Array, wheel: int, twist: Array, setting: Setting) -> Array:
+def _turned_by_load(inputs: Array, wheel: int, gap: float, compliance: float, setting: Setting) -> Array:
     """The wheel instead of the motor, as far as the wheel has not been made to roll as the others say."""
+    load = _gear_load(inputs, wheel, setting)
+    yielded = compliance * load
+    twist = gap / 2 * np.tanh(load / _touching(setting)) + yielded
     if inputs[:, SLICES["hammer"].start + wheel].any():
         twist = above_band(twist, setting.sample_time)
-    return _behind_motor(inputs, wheel, twist, setting)
+    changed = _behind_motor(inputs, wheel, twist, setting)
+    changed[:, SLICES["rest"]] -= _across_at_rest(inputs, wheel, gap, yielded)
+    return changed
 
 
 def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> Array:

@@ -88,8 +88,8 @@ def test_play_and_flanks_are_told_from_the_motion_above_the_band(prototype: Vehi
     gap, compliance = least_squares(slow, [0.4, 3.0]).x * [1e-3, 1e-5]
     assert rattles[:, 0].mean() > 0.9
     assert not rattles[:, 1:].any()
-    assert gap == pytest.approx(true, rel=0.05)
-    assert compliance == pytest.approx(COMPLIANCE, rel=0.05)
+    assert gap == pytest.approx(true, rel=0.03)
+    assert compliance == pytest.approx(COMPLIANCE, rel=0.03)
     left, bare = slow(np.array([gap, compliance]) / [1e-3, 1e-5]), slow(np.zeros(2))
     assert np.std(left) < 0.03 * np.sqrt(np.mean(bare**2))
 
