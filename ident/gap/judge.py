@@ -179,6 +179,7 @@ class _Judgement:
             return Verdict.UNKNOWN if self._predictable() or self._repeating() > 1 else Verdict.NONE
         unexplained = self._predictable() and self._explained() < self.limits.explained
         strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
+        strange = strange or self._sizeless()
         return Verdict.UNKNOWN if strange else Verdict.EFFECT
 
     def _foreign(self) -> bool:
@@ -200,6 +201,12 @@ class _Judgement:
         owners = {self.regression.owners[variant] for variant in self.found.variants}
         curves = Counter(self.problems[0].candidates[owner].curve for owner in owners)
         return any(count >= self.limits.curve for curve, count in curves.items() if curve)
+
+    def _sizeless(self) -> bool:
+        """Whether what comes along with the effect that closes most explains all, and it may itself be of no size."""
+        part = self.after.parts[int(np.argmax(self._closed))]
+        accompanied = len(part.numbers) > len(part.values)
+        return bool(accompanied and np.all(np.abs(part.values) < self.limits.sized * part.std))
 
     def _named(self) -> float:
         """What the effect that closes most closes, alone or beside the others, in that and what all of them leave."""

@@ -29,6 +29,7 @@ class Limits:
         trifle: power, over the noise's, by which it must lower the held-out gap in any case.
         unsteady: log evidence, for other sizes of the effects in some steps, from which they are not what they seem.
         bent: the same as a share of the evidence for the effects: columns are not quite what a large effect does.
+        sized: standard deviations that an effect must have in size where something else comes along with it.
         curve: names for the friction of one kind of joint from which its law is one that the library does not have.
     """
 
@@ -51,4 +52,5 @@ class Limits:
     trifle: float = 5e-3
     unsteady: float = 5.0
     bent: float = 1e-3
+    sized: float = 2.0
     curve: int = 3

@@ -49,6 +49,7 @@ class Settings:
         level: largest probability by chance, over all candidates at once, at which an effect is believed.
         pair_level: the same over all pairs.
         least: smallest log evidence, its price paid: noise is never quite what surrogates make of it.
+        beside: the same beside other effects, for what their columns miss is no noise at all.
         fitted: smallest log likelihood ratio of the fitted rows alone: what they do not show, nothing can confirm.
         confirmation: smallest log Bayes factor of the confirming rows.
         part: of what a cause does, that the fitted rows must show, and the confirming ones.
@@ -63,7 +64,8 @@ class Settings:
 
     level: float = 0.02
     pair_level: float = 0.01
-    least: float = 2.5
+    least: float = 1.5
+    beside: float = 2.5
     fitted: float = 1.0
     confirmation: float = 0.5
     part: float = 0.01

@@ -56,7 +56,7 @@ def _grown(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     if not slot.variants:
         return taken
     best, evidence = slot.variants[0], slot.evidence
-    if _believed(slot, best, settings):
+    if _believed(slot, best, settings, alone=not taken):
         return (*taken, best)
     if len(taken) + 2 > settings.most:
         return taken
@@ -66,10 +66,10 @@ def _grown(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     return (*taken, pair.first, pair.second)
 
 
-def _believed(slot: Slot, variant: int, settings: Settings) -> bool:
+def _believed(slot: Slot, variant: int, settings: Settings, *, alone: bool) -> bool:
     """Larger than chance over all candidates, seen in the fit, and confirmed."""
-    evidence = slot.evidence
-    large = evidence.log_evidence[variant] > settings.least and evidence.significance <= settings.level
+    evidence, least = slot.evidence, settings.least if alone else settings.beside
+    large = evidence.log_evidence[variant] > least and evidence.significance <= settings.level
     return bool(large and in_both(evidence, settings)[variant])
 
 
@@ -91,7 +91,7 @@ def _revised(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
         log_evidence = slot.evidence.log_evidence
         if log_evidence[best] > log_evidence[variant] + regression.settings.lead:
             return (*taken[:index], best, *taken[index + 1 :])
-        if not _believed(slot, variant, regression.settings):
+        if not _believed(slot, variant, regression.settings, alone=len(taken) == 1):
             return _without(taken, index)
     return taken
 
