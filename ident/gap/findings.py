@@ -31,6 +31,7 @@ class Cause:
         closed: share of the removable held-out gap that it closes, the other effects given.
         biased: how much each parameter of the model shifts when the effect is left out, by name, in standard
             deviations.
+        sizeless: it may be of no size itself, and what comes along with it is the explanation.
     """
 
     candidate: Candidate
@@ -41,6 +42,7 @@ class Cause:
     log_predictive: float
     closed: float
     biased: Mapping[str, float]
+    sizeless: bool
 
 
 @dataclass(frozen=True)

@@ -179,8 +179,8 @@ class _Judgement:
             return Verdict.UNKNOWN if self._predictable() or self._repeating() > 1 else Verdict.NONE
         unexplained = self._predictable() and self._explained() < self.limits.explained
         strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
-        strange = strange or self._sizeless()
-        return Verdict.UNKNOWN if strange else Verdict.EFFECT
+        another = self._sizeless(int(np.argmax(self._closed)))
+        return Verdict.UNKNOWN if strange or another else Verdict.EFFECT
 
     def _foreign(self) -> bool:
         """Whether something lasts in rows that the model itself says nothing of: what shows there is all of a cause."""
@@ -202,9 +202,9 @@ class _Judgement:
         curves = Counter(self.problems[0].candidates[owner].curve for owner in owners)
         return any(count >= self.limits.curve for curve, count in curves.items() if curve)
 
-    def _sizeless(self) -> bool:
-        """Whether what comes along with the effect that closes most explains all, and it may itself be of no size."""
-        part = self.after.parts[int(np.argmax(self._closed))]
+    def _sizeless(self, index: int) -> bool:
+        """Whether an effect may be of no size itself: then what comes along with it is the explanation."""
+        part = self.after.parts[index]
         accompanied = len(part.numbers) > len(part.values)
         return bool(accompanied and np.all(np.abs(part.values) < self.limits.sized * part.std))
 
@@ -258,6 +258,7 @@ class _Judgement:
             log_predictive=self._log_predictive(index),
             closed=self._closed[index],
             biased=self._biased(self._others(index)),
+            sizeless=self._sizeless(index),
         )
 
     def _biased(self, others: Sequence[int]) -> Mapping[str, float]:

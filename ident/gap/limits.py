@@ -52,5 +52,5 @@ class Limits:
     trifle: float = 5e-3
     unsteady: float = 5.0
     bent: float = 1e-3
-    sized: float = 2.0
+    sized: float = 1.0
     curve: int = 3

@@ -64,10 +64,10 @@ class Settings:
 
     level: float = 0.02
     pair_level: float = 0.01
-    least: float = 1.5
+    least: float = 2.0
     beside: float = 2.5
     fitted: float = 1.0
-    confirmation: float = 0.5
+    confirmation: float = 0.0
     part: float = 0.01
     plain: float = 100.0
     clear: float = 8.0

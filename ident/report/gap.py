@@ -93,6 +93,7 @@ def render_gap_report(content: GapReport) -> str:
         next=next_text(diagnosis),
         rows=[_row(cause, content) for cause in findings.causes],
         believed=diagnosis.verdict is Verdict.EFFECT,
+        sizeless=[cause.candidate.key for cause in findings.causes if cause.sizeless],
         doubtful=_doubtful(findings),
         events=findings.events,
         residuals=[(key, title) for key, title, _ in residuals],

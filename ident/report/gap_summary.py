@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from ident.gap.diagnosis import Diagnosis, NamedEffect, Share, Verdict
-from ident.gap.findings import Findings
+from ident.gap.findings import Cause, Findings
 from ident.report.digits import percent, significant, unit_text, with_std
 
 MOST_CAUSES: Final = 4
@@ -26,8 +26,7 @@ def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
     if place is not None and diagnosis.verdict is not Verdict.NONE:
         lines.append(f"Where: {percent(place.share)} of it in {place_text(place)}.")
     if diagnosis.verdict is Verdict.UNKNOWN and findings.causes:
-        named = ", ".join(cause.candidate.key for cause in findings.causes)
-        lines.append(f"Nearest, but not enough of it: {named}.")
+        lines.append(f"Nearest, but not it: {', '.join(nearest_text(cause) for cause in findings.causes)}.")
     if findings.events:
         lines.append(f"Only one of the two drives shows, so no cause: {', '.join(findings.events[:MOST_EVENTS])}.")
     if diagnosis.invisible:
@@ -74,6 +73,11 @@ def largest_share(diagnosis: Diagnosis) -> Share | None:
 def place_text(share: Share) -> str:
     """Step and coordinate in words."""
     return f"{share.step}, {share.coordinate} ({share.channel})"
+
+
+def nearest_text(cause: Cause) -> str:
+    """An effect that is not the answer."""
+    return f"what comes along with {cause.candidate.key}" if cause.sizeless else cause.candidate.key
 
 
 def next_text(diagnosis: Diagnosis) -> str:

@@ -18,6 +18,7 @@ from ident.gap.findings import Findings
 from ident.gap.judge import judge
 from ident.gap.probability import calibration
 from ident.gap.problem import Nominal, Problem, Variant
+from ident.gap.regression import Settings
 from ident.gap.split import split_problem
 from ident.report.gap_summary import summary_lines
 
@@ -158,6 +159,45 @@ def test_a_play_is_not_named_for_what_only_comes_along_with_it(world: type[Any])
         play, _, *others = _with_play(world(seed=21, true={"b": 0.4}).problem(part)).candidates
         problems.append(replace(world(seed=21, true={"b": 0.4}).problem(part), candidates=(play, *others)))
     assert "a" not in _names(judge(*problems, seed=1))
+
+
+def _with_sliding(problem: Problem) -> Problem:
+    """`a` with what comes along with it, which is what `b` does: as a wheel that stands askew slides."""
+    askew, slid, *others = problem.candidates
+    both = zip(askew.variants[0].columns, slid.variants[0].columns, strict=True)
+    columns = tuple(np.hstack([one, other]) for one, other in both if one is not None and other is not None)
+    askew = replace(askew, variants=(*askew.variants, Variant(columns, beside=1, itself=False)))
+    return replace(problem, candidates=(askew, *others))
+
+
+@pytest.mark.parametrize(("own", "verdict"), [(0.2, Verdict.EFFECT), (0.0, Verdict.UNKNOWN)])
+def test_what_only_comes_along_with_an_effect_of_no_size_has_another_cause(
+    world: type[Any], own: float, verdict: Verdict
+) -> None:
+    problems = [_with_sliding(world(seed=22, true={"a": own, "b": 0.4}).problem(part)) for part in (0, 1)]
+    findings = judge(*problems, seed=1)
+    assert _names(findings) == ["a"]
+    assert findings.verdict is verdict
+    (cause,) = findings.causes
+    assert (abs(cause.part.values[0]) < cause.part.std[0]) == (own == 0)
+    assert cause.sizeless == (own == 0)
+
+
+@pytest.mark.parametrize(
+    ("true", "asked", "names"),
+    [
+        ({"b": 0.25}, {"least": 1e3}, 0),
+        ({"b": 0.25}, {"beside": 1e3}, 1),
+        ({"b": 0.25, "e": -0.25}, {"beside": 1e3}, 1),
+        ({"b": 0.25, "e": -0.25}, {}, 2),
+    ],
+)
+def test_evidence_asked_of_a_cause_alone_and_of_one_beside_another_are_two_numbers(
+    world: type[Any], true: dict[str, float], asked: dict[str, float], names: int
+) -> None:
+    drawn = world(seed=8, true=true)
+    found = judge(drawn.problem(0), drawn.problem(1), seed=1, settings=Settings(**asked))
+    assert len(found.causes) == names
 
 
 def _in_two_steps(problem: Problem, more: float) -> Problem:

@@ -165,3 +165,13 @@ def test_ten_lines_say_it_all(findings: Findings, verdict: Verdict, count: int) 
     assert sum("might as well be slope" in line for line in lines) == count
     assert any("2.00 times the noise" in line for line in lines)
     assert any("80 % of it in straight, x" in line for line in lines) is (verdict is not Verdict.NONE)
+
+
+def test_a_cause_of_no_size_is_said_to_be_what_comes_along_with_it(findings: Findings) -> None:
+    sizeless = tuple(replace(cause, sizeless=True) for cause in findings.causes)
+    unknown = replace(findings, verdict=Verdict.UNKNOWN, causes=sizeless)
+    along = "what comes along with scrub@chassis"
+    assert f"Nearest, but not it: {along}." in summary_lines(unknown, unknown.diagnosis())
+    assert along in render_gap_report(GapReport(unknown, unknown.diagnosis(), ("one",), (), None)).lower()
+    plain = replace(unknown, causes=findings.causes)
+    assert "Nearest, but not it: scrub@chassis." in summary_lines(plain, plain.diagnosis())

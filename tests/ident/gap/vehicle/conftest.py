@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,44 @@ from ident.vehicle.description import VehicleDescription, load_vehicle
 
 Array = NDArray[np.float64]
 Flaw = Callable[[Segment], Segment]
+
+
+@dataclass(frozen=True)
+class LooseMotor:
+    """A motor in the play of its gear beside a wheel that stands, integrated; flanks are springs that only push.
+
+    Attributes:
+        gap, compliance: of the gear [rad, rad/Nm].
+        inertia: at the wheel [kg m²].
+        damping: of its contact, twice the damping ratio.
+        sample_time: of what is recorded; a fortieth of it is the step [s].
+    """
+
+    gap: float
+    compliance: float
+    inertia: float
+    damping: float
+    sample_time: float = 0.002
+
+    def thrown(self, torque: Callable[[Array], Array], seconds: float) -> tuple[Array, Array]:
+        """Angle (N,) [rad] under a torque over time, and that torque (N,) [Nm]."""
+        inner = self.sample_time / 40
+        time = np.arange(round(seconds / inner)) * inner
+        torques, angles = torque(time), np.zeros(len(time))
+        damping = self.damping * math.sqrt(self.inertia / self.compliance)
+        angle, rate = 0.0, 0.0
+        for number, now in enumerate(torques.tolist()):
+            beyond = angle - math.copysign(min(abs(angle), self.gap / 2), angle)
+            load = beyond / self.compliance + (damping * rate if beyond else 0.0)
+            rate += inner * (now - (load if load * beyond > 0 else 0.0)) / self.inertia
+            angle += inner * rate
+            angles[number] = angle
+        return angles[::40], torques[::40]
+
+
+@pytest.fixture(scope="session")
+def loose_motor() -> type[LooseMotor]:
+    return LooseMotor
 
 
 @pytest.fixture(scope="session")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -101,30 +103,27 @@ def test_a_motor_afloat_without_load_says_nothing_of_its_flanks() -> None:
     assert missed(afloat, 5e-4, 5e-5) > 0.5
 
 
-def thrown(gap: float, compliance: float, inertia: float) -> Shaken:
-    """A motor that torques shake against its wheel, integrated; its load by Newton's law, as measured."""
-    inner, seconds = DT / 40, 16.0
-    time = np.arange(round(seconds / inner)) * inner
-    torques = 14 * np.sin(2 * math.pi * 62 * time) * (1 + 0.3 * np.sin(2 * time)) + 6 * np.sin(1.5 * time)
-    damping = 0.1 * math.sqrt(inertia / compliance)
-    angle, rate, angles = 0.0, 0.0, np.zeros(len(time))
-    for number, torque in enumerate(torques.tolist()):
-        beyond = angle - math.copysign(min(abs(angle), gap / 2), angle)
-        load = beyond / compliance + (damping * rate if beyond else 0.0)
-        rate += inner * (torque - (load if load * beyond > 0 else 0.0)) / inertia
-        angle += inner * rate
-        angles[number] = angle
-    smooth, torque = (zero_phase(values[::40], 1000.0, DT) for values in (angles, torques))
+def shaking(time: Array) -> Array:
+    """Torque on a motor [Nm] that throws it about."""
+    return np.asarray(14 * np.sin(2 * math.pi * 62 * time) * (1 + 0.3 * np.sin(2 * time)) + 6 * np.sin(1.5 * time))
+
+
+def measured(angle: Array, torque: Array, inertia: float) -> Shaken:
+    """A motor as its signals show it; its load by Newton's law."""
+    smooth, pushed = (zero_phase(values, 1000.0, DT) for values in (angle, torque))
     moved = above_band(smooth, DT)
     swing = np.sqrt(2 * np.maximum(zero_phase(moved**2, 40.0, DT), 0.0))
-    return Shaken(moved, swing, torque - inertia * second_derivative(smooth, DT), UNSURE, DT)
+    return Shaken(moved, swing, pushed - inertia * second_derivative(smooth, DT), UNSURE, DT)
 
 
 @pytest.mark.parametrize(("gap", "within"), [(4e-4, 0.06), (8e-4, 0.06), (2e-3, 0.1)])
-def test_play_and_flanks_of_a_motor_thrown_to_and_fro_are_told(gap: float, within: float) -> None:
+def test_play_and_flanks_of_a_motor_thrown_to_and_fro_are_told(
+    loose_motor: Callable[..., Any], gap: float, within: float
+) -> None:
     """The filter of the signals takes 5 to 7 % of such a swing, and of a wide play that much; flanks damp it, too."""
     compliance, inertia = 5.5e-5, 0.06
-    shaken = thrown(gap, compliance, inertia)
+    motor = loose_motor(gap, compliance, inertia, damping=0.1)
+    shaken = measured(*motor.thrown(shaking, 16.0), inertia)
 
     def left(sizes: Array) -> Array:
         found = shaken.moved - twist_in_flight(shaken, 1e-3 * sizes[0], 1e-5 * sizes[1])

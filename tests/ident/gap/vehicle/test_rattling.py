@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,26 +35,22 @@ GAP, COMPLIANCE = 6e-4, 5e-5
 SHAKE = 2 * math.pi * 70.0
 
 
-def thrown(seconds: float, inertia: float, frequency: float = SHAKE, gap: float = GAP) -> tuple[Array, Array]:
-    """Angle against a wheel that stands (N,) [rad] and torque (N,) [Nm] of a motor shaken within its play."""
-    inner = DT / 40
-    time = np.arange(round(seconds / inner)) * inner
-    torques = 12 * np.sin(frequency * time) * (1 + 0.4 * np.sin(2 * time)) + 3 * np.sin(1.5 * time)
-    damping = 0.5 * math.sqrt(inertia / COMPLIANCE)
-    angle, rate, angles = 0.0, 0.0, np.zeros(len(time))
-    for number, torque in enumerate(torques.tolist()):
-        beyond = angle - math.copysign(min(abs(angle), gap / 2), angle)
-        load = beyond / COMPLIANCE + (damping * rate if beyond else 0.0)
-        rate += inner * (torque - (load if load * beyond > 0 else 0.0)) / inertia
-        angle += inner * rate
-        angles[number] = angle
-    return angles[::40], torques[::40]
+LooseMotor = Callable[..., Any]
 
 
-def shaken(prototype: VehicleDescription, gap: float = GAP) -> tuple[Array, NDArray[np.bool_], Setting]:
+def shaking(frequency: float) -> Callable[[Array], Array]:
+    """Torque on a motor over time [Nm] that throws it about."""
+    return lambda time: np.asarray(
+        12 * np.sin(frequency * time) * (1 + 0.4 * np.sin(2 * time)) + 3 * np.sin(1.5 * time)
+    )
+
+
+def shaken(
+    prototype: VehicleDescription, loose_motor: LooseMotor, gap: float = GAP
+) -> tuple[Array, NDArray[np.bool_], Setting]:
     """Signals of four wheels that stand, the first motor thrown about; where it rattles; and what else is needed."""
     setting = Setting(prototype.geometry, prototype.prior.values, DT)
-    angle, torque = thrown(12.0, setting["B_w"] / 2, gap=gap)
+    angle, torque = loose_motor(gap, COMPLIANCE, setting["B_w"] / 2, damping=0.5).thrown(shaking(SHAKE), 12.0)
     fast = zero_phase(angle, FAST.signal_cutoff, DT)
     inputs = np.zeros((len(fast), INPUTS))
     columns = [
@@ -75,9 +73,11 @@ def shaken(prototype: VehicleDescription, gap: float = GAP) -> tuple[Array, NDAr
 
 
 @pytest.mark.parametrize("true", [GAP, 2e-3])
-def test_play_and_flanks_are_told_from_the_motion_above_the_band(prototype: VehicleDescription, true: float) -> None:
+def test_play_and_flanks_are_told_from_the_motion_above_the_band(
+    prototype: VehicleDescription, loose_motor: LooseMotor, true: float
+) -> None:
     """Of the wider one the load tells no more than a half: the motor is mostly in flight."""
-    inputs, rattles, setting = shaken(prototype, true)
+    inputs, rattles, setting = shaken(prototype, loose_motor, true)
     cause = transform_cause(EffectName.BACKLASH, "drive_fl")
 
     def slow(sizes: Array) -> Array:
@@ -94,8 +94,10 @@ def test_play_and_flanks_are_told_from_the_motion_above_the_band(prototype: Vehi
     assert np.std(left) < 0.03 * np.sqrt(np.mean(bare**2))
 
 
-def test_a_motor_without_dry_friction_at_its_wheel_flies_as_well(prototype: VehicleDescription) -> None:
-    inputs, _, setting = shaken(prototype, 2e-3)
+def test_a_motor_without_dry_friction_at_its_wheel_flies_as_well(
+    prototype: VehicleDescription, loose_motor: LooseMotor
+) -> None:
+    inputs, _, setting = shaken(prototype, loose_motor, 2e-3)
     parameters = setting.parameters.copy()
     parameters[PARAMETER_NAMES.index("d_cw")] = 0.0
     cause = transform_cause(EffectName.BACKLASH, "drive_fl")
@@ -150,10 +152,11 @@ def straight_and_turn(prototype: VehicleDescription, angle: Array, torque: Array
 
 
 @pytest.fixture(scope="module")
-def hammered(prototype: VehicleDescription) -> Record:
+def hammered(prototype: VehicleDescription, loose_motor: LooseMotor) -> Record:
     """The motor is thrown about in its play."""
     seconds = ideal_record([Drive(Step.STRAIGHT)], prototype).segments[0].time[-1] + 1.0
-    return straight_and_turn(prototype, *thrown(seconds, prototype.prior.values[-1] / 2, frequency=2 * math.pi * 35))
+    motor = loose_motor(GAP, COMPLIANCE, prototype.prior.values[-1] / 2, damping=0.5)
+    return straight_and_turn(prototype, *motor.thrown(shaking(SHAKE / 2), seconds))
 
 
 def test_rolling_says_nothing_in_a_drive_that_rattles(hammered: Record, prototype: VehicleDescription) -> None:
