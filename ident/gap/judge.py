@@ -17,7 +17,7 @@ from ident.gap.generic import SmoothFunction
 from ident.gap.limits import Limits
 from ident.gap.linear import least_squares, rms
 from ident.gap.probability import calibration, rank
-from ident.gap.problem import Problem
+from ident.gap.problem import Candidate, Problem
 from ident.gap.refit import refit
 from ident.gap.regression import Regression, Settings
 from ident.gap.remainder import held_out_gap, lasting, noise_floors, repeated, shares
@@ -93,7 +93,7 @@ class _Judgement:
         )
 
     def worthwhile(self) -> tuple[int, ...]:
-        """The effects without one that widens the held-out gap, or without the least one if that closes a trifle."""
+        """The effects without one that widens the held-out gap, is of no size itself, or is the least and a trifle."""
         variants = self.found.variants
         closed = self._closed
         widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
@@ -102,6 +102,9 @@ class _Judgement:
             return self._others(min(refuted, key=lambda index: closed[index]))
         if len(variants) < 2:
             return variants
+        for index in range(len(variants)):
+            if index != self._strongest and self._sizeless(index):
+                return self._others(index)
         evidence = [self._log_evidence(index) for index in range(len(variants))]
         least = int(np.argmin(evidence))
         minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
@@ -162,6 +165,14 @@ class _Judgement:
         without = [self._gap(self._others(index)).after for index in range(len(self.found.variants))]
         return [(after**2 - whole.after**2) / removable if removable > 0 else 0.0 for after in without]
 
+    @property
+    def _strongest(self) -> int:
+        """The effect that closes most."""
+        return int(np.argmax(self._closed))
+
+    def _candidate(self, index: int) -> Candidate:
+        return self.problems[0].candidates[self.regression.owners[self.found.variants[index]]]
+
     def _others(self, index: int) -> tuple[int, ...]:
         return tuple(other for place, other in enumerate(self.found.variants) if place != index)
 
@@ -179,7 +190,7 @@ class _Judgement:
             return Verdict.UNKNOWN if self._predictable() or self._repeating() > 1 else Verdict.NONE
         unexplained = self._predictable() and self._explained() < self.limits.explained
         strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
-        another = self._sizeless(int(np.argmax(self._closed)))
+        another = self._sizeless(self._strongest)
         return Verdict.UNKNOWN if strange or another else Verdict.EFFECT
 
     def _foreign(self) -> bool:
@@ -203,10 +214,12 @@ class _Judgement:
         return any(count >= self.limits.curve for curve, count in curves.items() if curve)
 
     def _sizeless(self, index: int) -> bool:
-        """Whether an effect may be of no size itself: then what comes along with it is the explanation."""
-        part = self.after.parts[index]
-        accompanied = len(part.numbers) > len(part.values)
-        return bool(accompanied and np.all(np.abs(part.values) < self.limits.sized * part.std))
+        """Whether an effect may be of no size itself, and what comes along with it is the explanation."""
+        part, least = self.after.parts[index], self._candidate(index).least
+        along = slice(len(part.values), None)
+        accompanied = np.abs(part.numbers[along]) > self.limits.sure_of * part.scatter[along]
+        size = np.abs(part.values) if least is None else part.values - least
+        return bool(np.any(accompanied) and np.all(size < self.limits.sized * part.std))
 
     def _named(self) -> float:
         """What the effect that closes most closes, alone or beside the others, in that and what all of them leave."""
@@ -248,9 +261,8 @@ class _Judgement:
     def _cause(self, index: int, variant: int) -> Cause:
         settings = calibration()
         ranked = rank(self.regression, self.found.slots[index], variant, settings)
-        candidate = self.problems[0].candidates[self.regression.owners[variant]]
         return Cause(
-            candidate=candidate,
+            candidate=self._candidate(index),
             part=self.after.parts[index],
             ranked=ranked,
             probability=min(ranked.probability, settings.ceiling),

@@ -30,6 +30,7 @@ class Limits:
         unsteady: log evidence, for other sizes of the effects in some steps, from which they are not what they seem.
         bent: the same as a share of the evidence for the effects: columns are not quite what a large effect does.
         sized: standard deviations that an effect must have in size where something else comes along with it.
+        sure_of: standard deviations from which that is there.
         curve: names for the friction of one kind of joint from which its law is one that the library does not have.
     """
 
@@ -53,4 +54,5 @@ class Limits:
     unsteady: float = 5.0
     bent: float = 1e-3
     sized: float = 1.0
+    sure_of: float = 2.0
     curve: int = 3

@@ -35,6 +35,7 @@ class Part:
         key: of its candidate.
         values, std: of its parameters (k,).
         numbers: all of them (m,), those that come along with the parameters behind.
+        scatter: standard deviations (m,) of those by the scatter of the rows alone.
         added: what it adds to every block, (N,), None where that is nothing.
     """
 
@@ -42,6 +43,7 @@ class Part:
     values: Array
     std: Array
     numbers: Array
+    scatter: Array
     added: Series
 
 
@@ -190,7 +192,7 @@ class _Model:
             numbers = unknown.finish(own)
             beyond = np.hypot(unknown.spread or 0.0, unknown.part * numbers[stated])
             total = np.hypot(deviations[stated], beyond)
-            parts.append(Part(unknown.key, numbers[stated], total, numbers, tuple(series)))
+            parts.append(Part(unknown.key, numbers[stated], total, numbers, deviations, tuple(series)))
         baseline_std = np.sqrt(np.diag(covariance)[: self.size])
         return Refit(values[: self.size], baseline_std, tuple(parts), tuple(blocks))
 

@@ -48,8 +48,8 @@ class Settings:
     Attributes:
         level: largest probability by chance, over all candidates at once, at which an effect is believed.
         pair_level: the same over all pairs.
-        least: smallest log evidence, its price paid: noise is never quite what surrogates make of it.
-        beside: the same beside other effects, for what their columns miss is no noise at all.
+        least: smallest log evidence of an effect alone, its price paid: noise is never quite what surrogates make of it.
+        beside: the same of one of several, for what their columns miss is no noise at all.
         fitted: smallest log likelihood ratio of the fitted rows alone: what they do not show, nothing can confirm.
         confirmation: smallest log Bayes factor of the confirming rows.
         part: of what a cause does, that the fitted rows must show, and the confirming ones.
