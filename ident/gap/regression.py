@@ -48,7 +48,7 @@ class Settings:
     Attributes:
         level: largest probability by chance, over all candidates at once, at which an effect is believed.
         pair_level: the same over all pairs.
-        least: smallest log evidence of an effect alone, its price paid: noise is never quite what surrogates make of it.
+        least: smallest log evidence of an effect alone, price paid: noise is never quite what surrogates make of it.
         beside: the same of one of several, for what their columns miss is no noise at all.
         fitted: smallest log likelihood ratio of the fitted rows alone: what they do not show, nothing can confirm.
         confirmation: smallest log Bayes factor of the confirming rows.
