@@ -247,6 +247,15 @@ def test_a_removed_cause_asks_for_unknown_or_a_set(
     assert rates[names.WITHOUT_MODEST].value == modest
 
 
+def test_small_removed_causes_are_counted_apart() -> None:
+    small, large = (
+        answer(identity=apart(), verdict=said, noise_units=size) for said, size in (("none", 0.2), ("unknown", 0.5))
+    )
+    rates = removal_rates([small, large])
+    assert rates[names.WITHOUT_OPEN].value == 0.5
+    assert (rates[names.WITHOUT_OPEN_LARGE].value, rates[names.WITHOUT_OPEN_LARGE].cases) == (1.0, 1)
+
+
 def test_unknown_is_the_answer_to_a_removed_cause() -> None:
     rates = removal_rates([answer(identity=apart(), verdict="unknown")])
     assert rates[names.WITHOUT_OPEN].value == 1.0
