@@ -119,6 +119,8 @@ class Candidate:
         spread: standard deviations of the parameters that come with the way they are told, beyond the scatter of the
             rows; empty where there are none.
         part: the same as part of each parameter.
+        yielding: the same over what comes along but the last `others` numbers: a load, of what flanks yield under it.
+        others: how many of the numbers that come along, the last ones, are no part of the effect itself.
         curve: whose friction over the speed it changes, if it is a friction.
         along: effect at the same place that comes along with it in its widest variant; both at once are that variant.
     """
@@ -134,6 +136,8 @@ class Candidate:
     excluded: bool = False
     spread: tuple[float, ...] = ()
     part: float = 0.0
+    yielding: float = 0.0
+    others: int = 0
     curve: str = ""
     along: str = ""
 

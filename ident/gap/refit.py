@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.gap.linear import least_squares
-from ident.gap.problem import Problem
+from ident.gap.problem import Candidate, Problem
 from ident.gap.regression import Regression
 from ident.gap.rows import Column, Rows
 from ident.gap.whitening import Whitener
@@ -67,13 +67,10 @@ class Refit:
 class _Unknown:
     """The numbers of one effect: coefficients of its columns, or its parameters where it has an exact form.
 
-    The first `stated` of them are its parameters, with `spread` and `part` as in `Candidate`; the others came along.
+    The first of them are the parameters of the candidate, the others came along.
     """
 
-    key: str
-    stated: int
-    spread: tuple[float, ...]
-    part: float
+    candidate: Candidate
     place: slice
     exact: Callable[[Array, Array], Series] | None
     columns: tuple[Array | None, ...]
@@ -188,11 +185,10 @@ class _Model:
             blocks = [model if one is None else model + one for model, one in zip(blocks, series, strict=True)]
             turn = _gradient(unknown.finish, own)
             spread = turn @ covariance[unknown.place, unknown.place] @ turn.T
-            deviations, stated = np.sqrt(np.maximum(np.diag(spread), 0.0)), slice(unknown.stated)
-            numbers = unknown.finish(own)
-            beyond = np.hypot(unknown.spread or 0.0, unknown.part * numbers[stated])
-            total = np.hypot(deviations[stated], beyond)
-            parts.append(Part(unknown.key, numbers[stated], total, numbers, deviations, tuple(series)))
+            deviations, numbers = np.sqrt(np.maximum(np.diag(spread), 0.0)), unknown.finish(own)
+            stated = slice(len(unknown.candidate.parameters))
+            total = np.hypot(deviations[stated], _beyond(unknown.candidate, numbers))
+            parts.append(Part(unknown.candidate.key, numbers[stated], total, numbers, deviations, tuple(series)))
         baseline_std = np.sqrt(np.diag(covariance)[: self.size])
         return Refit(values[: self.size], baseline_std, tuple(parts), tuple(blocks))
 
@@ -249,17 +245,24 @@ def _unknown(
     variant = candidates[0].variants[column.variant]
     finish = variant.start or _same
     columns = tuple(part for candidate in candidates for part in candidate.variants[column.variant].columns)
-    told = len(candidates[0].parameters), candidates[0].spread, candidates[0].part
     if candidates[0].contribution is None or not by_form or not variant.bent:
         place = slice(first, first + len(coefficients))
-        return _Unknown(candidates[0].key, *told, place, None, columns, finish), coefficients
+        return _Unknown(candidates[0], place, None, columns, finish), coefficients
 
     def exact(values: Array, baseline: Array) -> Series:
         forms = [candidate.contribution for candidate in candidates]
         return [one for form in forms if form is not None for one in form(values, baseline)]
 
     start = np.asarray(finish(coefficients), dtype=float)
-    return _Unknown(candidates[0].key, *told, slice(first, first + len(start)), exact, columns, _same), start
+    return _Unknown(candidates[0], slice(first, first + len(start)), exact, columns, _same), start
+
+
+def _beyond(candidate: Candidate, numbers: Array) -> Array:
+    """Standard deviations of the parameters (k,) beyond the scatter of the rows, from all numbers (m,)."""
+    count = len(candidate.parameters)
+    along = numbers[count : len(numbers) - candidate.others]
+    alone = np.hypot(candidate.spread or 0.0, candidate.part * numbers[:count])
+    return np.asarray(np.hypot(alone, candidate.yielding * np.linalg.norm(along)))
 
 
 def _same(values: Array) -> Array:

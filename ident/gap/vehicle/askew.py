@@ -46,14 +46,14 @@ def beside_sliding(candidate: Candidate, slid: Sequence[Array | None], rolling: 
         for variant in candidate.variants
     )
     if candidate.contribution is None:
-        return replace(candidate, variants=variants)
+        return replace(candidate, variants=variants, others=1)
     exact = candidate.contribution
 
     def contribution(values: Array, parameters: Array) -> list[Array | None]:
         own = exact(values[:-1], parameters)
         return [_sum(*parts, float(values[-1])) for parts in zip(own, rolling, slid, strict=True)]
 
-    return replace(candidate, variants=variants, contribution=contribution)
+    return replace(candidate, variants=variants, contribution=contribution, others=1)
 
 
 def _width(variant: Variant) -> int:

@@ -198,6 +198,24 @@ def test_where_nothing_came_along_a_small_size_is_as_good_as_its_rows(world: typ
     assert findings.causes[0].part.std[0] > 0.2
 
 
+@pytest.mark.parametrize(("own", "named"), [(0.3, ["a"]), (0.12, ["b"])])
+def test_a_play_within_what_its_flanks_may_yield_is_their_compliance(
+    world: type[Any], own: float, named: list[str]
+) -> None:
+    """The load of the flanks is known to 0.4: 0.12 of play beside 0.5 of compliance may as well be that."""
+    problems = []
+    for part in (0, 1):
+        play, soft, *others = _with_play(world(seed=21, true={"a": own, "b": 0.5}).problem(part)).candidates
+        play = replace(play, effect="a", along="b", yielding=0.4)
+        problem = world(seed=21, true={"a": own, "b": 0.5}).problem(part)
+        problems.append(replace(problem, candidates=(play, soft, *others)))
+    findings = judge(*problems, seed=1)
+    assert _names(findings) == named
+    if named == ["a"]:
+        (cause,) = findings.causes
+        assert cause.part.std[0] == pytest.approx(0.4 * cause.part.numbers[1], rel=0.02)
+
+
 def test_what_is_of_no_size_is_not_named_beside_another(world: type[Any]) -> None:
     problems = [_with_sliding(world(seed=22, true={"b": 0.3, "c": 0.8}).problem(part)) for part in (0, 1)]
     assert _names(judge(*problems, seed=1)) == ["c"]

@@ -1,0 +1,295 @@
+"""What is computed once the search has ended: how much is closed, what is left, and which verdict that makes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.gap.diagnosis import Gap, Verdict
+from ident.gap.findings import Cause, Findings
+from ident.gap.generic import SmoothFunction
+from ident.gap.limits import Limits
+from ident.gap.linear import least_squares, rms
+from ident.gap.probability import calibration, rank
+from ident.gap.problem import Candidate, Problem
+from ident.gap.refit import refit
+from ident.gap.regression import Regression
+from ident.gap.remainder import held_out_gap, lasting, noise_floors, repeated, shares
+from ident.gap.search import Found
+from ident.gap.steady import log_unsteady
+from ident.gap.whitening import Predictor, Whitener
+
+Array = NDArray[np.float64]
+
+
+class Judgement:
+    """What is computed once the search has ended."""
+
+    def __init__(
+        self, problems: Sequence[Problem], regression: Regression, found: Found, limits: Limits, seed: int
+    ) -> None:
+        self.problems, self.regression, self.found, self.limits = problems, regression, found, limits
+        self.rows = regression.rows
+        self.weights = _weights(regression, found)
+        smooth = SmoothFunction(regression, found.whitener, seed)
+        self.bare = smooth.beside(())
+        self.rest = smooth.beside(found.variants) if found.variants else self.bare
+        everything = np.ones(len(self.rows), dtype=bool)
+        self.after = refit(problems, regression, found.variants, found.whitener, everything)
+        self.before = refit(problems, regression, (), found.whitener, everything)
+        self.floors = self._floors()
+        self.untouched = self._held_out_models(())
+
+    def findings(self) -> Findings:
+        """The answer, with all that reports show of it."""
+        gap, causes = self._gap(self.found.variants, exact=True), self._causes()
+        verdict = self._verdict()
+        return Findings(
+            verdict=verdict,
+            causes=causes,
+            doubtful=self._doubtful(),
+            events=tuple(self.problems[0].candidates[owner].key for owner in self.found.rest.events),
+            gap=gap,
+            where=shares(self.rows, self.floors, self._judged()),
+            invisible=invisible_names(self.regression),
+            before=self.before,
+            after=self.after,
+            significance=min(slot.evidence.significance for slot in (self.found.rest, *self.found.slots)),
+            remainder=self.rest,
+            repeated_before=self._sizes(self._judged()),
+            repeated_after=self._sizes(self.after.blocks),
+            problem=self.problems[0],
+        )
+
+    def refuted(self) -> frozenset[str]:
+        """Effects of no size of which another candidate is what comes along with them, not refuted before."""
+        keys = {candidate.key for candidate in self.problems[0].candidates if not candidate.excluded}
+        taken = [self._candidate(index) for index in range(len(self.found.variants)) if self._sizeless(index)]
+        return frozenset(one.key for one in taken if f"{one.along}@{one.where}" in keys)
+
+    def worthwhile(self) -> tuple[int, ...]:
+        """The effects without one that widens the held-out gap, is of no size itself, or is the least and a trifle."""
+        variants = self.found.variants
+        closed = self._closed
+        widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
+        refuted = [index for index in widened if self._measurable() or self._log_predictive(index) < self.limits.sure]
+        if refuted:
+            return self._others(min(refuted, key=lambda index: closed[index]))
+        if len(variants) < 2:
+            return variants
+        for index in range(len(variants)):
+            if index != self._strongest and self._sizeless(index):
+                return self._others(index)
+        evidence = [self._log_evidence(index) for index in range(len(variants))]
+        least = int(np.argmin(evidence))
+        minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
+        trifle = self.limits.trifle * self._whole.floor**2 / max(self._removable, np.finfo(float).tiny)
+        needed = max(trifle, self.limits.share * self._left)
+        return self._others(least) if minor and closed[least] < needed else variants
+
+    @cached_property
+    def _whole(self) -> Gap:
+        """With all effects, as their columns."""
+        return self._gap(self.found.variants)
+
+    @property
+    def _removable(self) -> float:
+        """Power of the held-out gap above the noise."""
+        return self._whole.before**2 - self._whole.floor**2
+
+    @property
+    def _left(self) -> float:
+        """Share of the removable held-out gap that all effects leave."""
+        return max(1 - self._whole.closed, 0.0)
+
+    def _log_evidence(self, index: int) -> float:
+        return float(self.found.slots[index].evidence.log_evidence[self.found.variants[index]])
+
+    def _log_predictive(self, index: int) -> float:
+        return float(self.found.slots[index].evidence.log_predictive[self.found.variants[index]])
+
+    def _measurable(self) -> bool:
+        """Whether the held-out gap that effects could close is more than an accident of the noise."""
+        return self._removable > self.limits.measurable * self._whole.floor**2
+
+    def _doubtful(self) -> Mapping[str, float]:
+        rest = self.found.rest
+        return rank(self.regression, rest, rest.variants[0], calibration()).probabilities if rest.variants else {}
+
+    def _judged(self) -> Sequence[Array]:
+        """The model that is judged: as given, or refitted to all records."""
+        nominal = self.problems[0].nominal
+        if nominal is None:
+            return self.before.blocks
+        return [block.baseline @ nominal.values for block, _ in self.rows.blocks]
+
+    def _held_out_models(self, variants: Sequence[int], *, exact: bool = False) -> Sequence[Array]:
+        """Models of all blocks, fitted without the confirming rows, every coordinate in units of its residual."""
+        if not variants and self.problems[0].nominal is not None:
+            return self._judged()
+        held_out = ~self.rows.confirming
+        return refit(self.problems, self.regression, variants, self.weights, held_out, exact=exact).blocks
+
+    def _gap(self, variants: Sequence[int], *, exact: bool = False) -> Gap:
+        return held_out_gap(self.rows, self.floors, self.untouched, self._held_out_models(variants, exact=exact))
+
+    @cached_property
+    def _closed(self) -> list[float]:
+        """Share of the removable held-out gap that each effect closes, the others given; all as their columns."""
+        whole, removable = self._whole, self._removable
+        without = [self._gap(self._others(index)).after for index in range(len(self.found.variants))]
+        return [(after**2 - whole.after**2) / removable if removable > 0 else 0.0 for after in without]
+
+    @property
+    def _strongest(self) -> int:
+        """The effect that closes most."""
+        return int(np.argmax(self._closed))
+
+    def _candidate(self, index: int) -> Candidate:
+        return self.problems[0].candidates[self.regression.owners[self.found.variants[index]]]
+
+    def _others(self, index: int) -> tuple[int, ...]:
+        return tuple(other for place, other in enumerate(self.found.variants) if place != index)
+
+    def _floors(self) -> Array:
+        stacked = self.rows.stack(list(self.after.blocks))
+        return noise_floors(self.rows, self.after.blocks, self.rows.target - stacked - self.rest.prediction)
+
+    def _explained(self) -> float:
+        """Share of what can be predicted of the confirming rows that the effects taken explain."""
+        named = max(self.bare.before - self.rest.before, 0.0)
+        return named / max(named + self.rest.gain, np.finfo(float).tiny)
+
+    def _verdict(self) -> Verdict:
+        if not self.found.variants:
+            return Verdict.UNKNOWN if self._predictable() or self._repeating() > 1 else Verdict.NONE
+        unexplained = self._predictable() and self._explained() < self.limits.explained
+        strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
+        another = self._sizeless(self._strongest)
+        return Verdict.UNKNOWN if strange or another else Verdict.EFFECT
+
+    def _foreign(self) -> bool:
+        """Whether something lasts in rows that the model itself says nothing of: what shows there is all of a cause."""
+        foreign = {block.label for block, _ in self.rows.blocks if not block.baseline.any()}
+        return any(size > self.limits.foreign for label, size in self._lasts.items() if label in foreign)
+
+    def _unsteady(self) -> bool:
+        """Whether the effects would rather have other sizes in some steps, where their columns are all there is."""
+        columns = [self.rows.layout[variant] for variant in self.found.variants]
+        candidates = [self.problems[0].candidates[column.candidate] for column in columns]
+        exact = all(one.contribution is None for one in candidates) and not any(column.beside for column in columns)
+        evidence = max(self._log_evidence(index) for index in range(len(self.found.variants)))
+        limit = max(self.limits.unsteady, self.limits.bent * evidence)
+        return exact and log_unsteady(self.regression, self.found) > limit
+
+    def _tangled(self) -> bool:
+        """Whether many names share the friction of one kind of joint: so many changes of a curve are another curve."""
+        owners = {self.regression.owners[variant] for variant in self.found.variants}
+        curves = Counter(self.problems[0].candidates[owner].curve for owner in owners)
+        return any(count >= self.limits.curve for curve, count in curves.items() if curve)
+
+    def _sizeless(self, index: int) -> bool:
+        """Whether an effect may be of no size itself, and what comes along with it is the explanation."""
+        part, least = self.after.parts[index], self._candidate(index).least
+        along = slice(len(part.values), None)
+        accompanied = np.abs(part.numbers[along]) > self.limits.sure_of * part.scatter[along]
+        size = np.abs(part.values) if least is None else part.values - least
+        return bool(np.any(accompanied) and np.all(size < self.limits.sized * part.std))
+
+    def _named(self) -> float:
+        """What the effect that closes most closes, alone or beside the others, in that and what all of them leave."""
+        most = max(*self._closed, *(self._gap((variant,)).closed for variant in self.found.variants))
+        return max(most, 0.0) / max(most + self._left, np.finfo(float).tiny)
+
+    def _predictable(self) -> bool:
+        """Whether a smooth function of the states predicts what the effects leave, and it is no trifle."""
+        sizes = self._sizes(self.after.blocks)
+        large = not sizes or max(sizes.values()) > self.limits.size
+        return large and self.rest.deviations > self.limits.deviations and self.rest.gain > 0
+
+    def _lasting(self) -> bool:
+        """Whether what repeats is above its limit, and the effects close too little to have that pardoned."""
+        excess = self._repeating()
+        needed = self.limits.named if excess <= self.limits.far else self.limits.nearly
+        return excess > 1 and self._named() < needed
+
+    def _repeating(self) -> float:
+        """What the model leaves and repeats in every record, over the noise, in units of what may."""
+        creeping = {block.label for block, _ in self.rows.blocks if block.tolerance > 0}
+        stricter = self.found.variants and self._measurable()
+        usual = self.limits.beside if stricter else self.limits.repeating
+        limits = {label: self.limits.creeping if label in creeping else usual for label in self._lasts}
+        return max((size / limits[label] for label, size in self._lasts.items()), default=0.0)
+
+    @cached_property
+    def _lasts(self) -> Mapping[str, float]:
+        """What the model leaves and repeats in every record, over the noise, by coordinate."""
+        return lasting(self.rows, self.floors, self.after.blocks)
+
+    def _sizes(self, models: Sequence[Array]) -> Mapping[str, float]:
+        return repeated(self.rows, self.floors, models)
+
+    def _causes(self) -> tuple[Cause, ...]:
+        made = [self._cause(index, variant) for index, variant in enumerate(self.found.variants)]
+        return _ordered(made)
+
+    def _cause(self, index: int, variant: int) -> Cause:
+        settings = calibration()
+        ranked = rank(self.regression, self.found.slots[index], variant, settings)
+        return Cause(
+            candidate=self._candidate(index),
+            part=self.after.parts[index],
+            ranked=ranked,
+            probability=min(ranked.probability, settings.ceiling),
+            log_evidence=self._log_evidence(index),
+            log_predictive=self._log_predictive(index),
+            closed=self._closed[index],
+            biased=self._biased(self._others(index)),
+            sizeless=self._sizeless(index),
+        )
+
+    def _biased(self, others: Sequence[int]) -> Mapping[str, float]:
+        everything, whitener = np.ones(len(self.rows), dtype=bool), self.found.whitener
+        without, whole = (
+            refit(self.problems, self.regression, variants, whitener, everything, exact=False)
+            for variants in (others, self.found.variants)
+        )
+        shift = (without.baseline - whole.baseline) / np.maximum(whole.baseline_std, np.finfo(float).tiny)
+        return dict(zip(self.problems[0].names, shift.tolist(), strict=True))
+
+
+def _ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
+    """By the share of the held-out gap that they close, to a half, then by evidence; none surer than those before it.
+
+    What is found beside another cause is right only as far as that one is.
+    """
+    found: list[Cause] = []
+    for cause in sorted(causes, key=lambda cause: (-round(2 * cause.closed), -cause.log_evidence)):
+        surest = min([cause.probability, *(other.probability for other in found[-1:])])
+        found.append(replace(cause, probability=surest))
+    return tuple(found)
+
+
+def invisible_names(regression: Regression) -> tuple[str, ...]:
+    """Names of effects of which no place and no variant leaves anything beside the baseline."""
+    sizes = regression.evidence(regression.whitener(()), ()).directions.sizes
+    candidates = regression.problem.candidates
+    visible = {candidates[owner].effect for owner, size in zip(regression.owners, sizes, strict=True) if size}
+    names = dict.fromkeys(candidate.effect for candidate in candidates)
+    return tuple(str(name) for name in names if name not in visible)
+
+
+def _weights(regression: Regression, found: Found) -> Whitener:
+    """Every group of rows in units of the rms of what the search leaves of it, no colour."""
+    rows = regression.rows
+    design = np.hstack([rows.baseline, regression.columns_of(found.variants)])
+    white = found.whitener.apply(rows, np.column_stack([design, rows.target]))
+    residual = rows.target - design @ least_squares(white[:, :-1], white[:, -1])
+    deviations = [rms(residual[rows.group == group]) for group in np.unique(rows.group)]
+    tiny = np.finfo(float).tiny
+    return Whitener(tuple(Predictor((np.zeros(0),), np.array([max(one, tiny)])) for one in deviations))
