@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -110,7 +111,8 @@ def _tolerance(source: Source, row: int, target: Array, context: Context) -> flo
     """What a row may lack for reasons that no cause has, rms in its unit."""
     used = source.moving[row][:: source.factor]
     if source.own is not None:
-        return source.own.untold * rms(context.filtered(source.own.of(source.inputs)[:, row], source)[used])
+        size = rms(context.filtered(source.own.of(source.inputs)[:, row], source)[used])
+        return math.hypot(source.own.untold * size, source.own.lever * source.own.other)
     if source.channel is Channel.DYNAMIC:
         return SHAKEN * rms(target[used]) if source.travels and source.rattles.any() else 0.0
     return tolerated_creep(source, source.coordinates[row], context.geometry)

@@ -3,7 +3,8 @@
 Nothing loads them there, and the controller lets them drift from flank to flank. A motor does so that rattles where the
 vehicle drives; others move with wheels that slide. How far it moves in such a step is a row of its own: the play of its
 gear, and what the flanks, or a gear that gives way, yield to the load that it has where it is farthest ahead and
-farthest behind. What rolls at standstill takes its motion for that of wheels or chassis; a wide one has it left out.
+farthest behind. The side that steers drags the chassis along, and with it the wheel, by some hundredths of a milliradian a
+second: so that is looked at within seconds, where it moves farthest. What rolls at standstill takes its motion for that of wheels or chassis; a wide one has it left out.
 """
 
 from __future__ import annotations
@@ -36,6 +37,12 @@ FARTHEST: Final = 0.005
 UNTOLD: Final = 0.05
 """Part of the range that may stay unexplained: noise makes it larger, and not every flank is reached [-]."""
 
+TOGETHER: Final = 1000
+"""Samples within which a motor reaches both of its flanks, and no wheel is dragged far."""
+
+DRAGGED: Final = 5e-5
+"""Motion of the wheel itself, which may be in such a range [rad]: in rigid gears that is up to 0.07 mrad."""
+
 COORDINATES: Final = tuple(f"rest_{wheel}" for wheel in WHEELS)
 
 
@@ -48,7 +55,7 @@ def moved_at_rest(beta: Array, near: Mask) -> Array:
     """
     if not near.any():
         return np.zeros(2)
-    across = np.array([_range(angle, *_farthest(angle)) for angle in beta[near].T])
+    across = np.array([max(_range(angle, *_farthest(angle)) for angle in _parts(angle)) for angle in beta[near].T])
     other = across[::-1]
     return np.where((across > LEAST) & ((across > ABOVE_OTHER * other) | (other > LEAST)), across, 0.0)
 
@@ -61,7 +68,14 @@ def range_of(values: Array, inputs: Array, wheel: int) -> float:
     at_rest = inputs[:, SLICES["rest"].start + wheel] != 0
     if not at_rest.any():
         return 0.0
-    return _range(values[at_rest], *_farthest(inputs[at_rest, SLICES["beta"].start + wheel]))
+    angles, behind = _parts(inputs[at_rest, SLICES["beta"].start + wheel]), _parts(values[at_rest])
+    widest = int(np.argmax([_range(angle, *_farthest(angle)) for angle in angles]))
+    return _range(behind[widest], *_farthest(angles[widest]))
+
+
+def _parts(values: Array) -> list[Array]:
+    """Values (N,) in pieces of about `TOGETHER`."""
+    return np.array_split(values, max(len(values) // TOGETHER, 1))
 
 
 def _farthest(angle: Array) -> tuple[Mask, Mask]:
@@ -75,7 +89,7 @@ def _range(values: Array, ahead: Mask, behind: Mask) -> float:
 
 def rest_rows(wheel: int, geometry: Geometry) -> OwnRows:
     """How far the motor of a wheel (0 to 3) moves while that rests, beyond what its gear gives way by [m]."""
-    return OwnRows((COORDINATES[wheel],), (SLICES["rest"].start + wheel,), geometry.wheel_radius, UNTOLD)
+    return OwnRows((COORDINATES[wheel],), (SLICES["rest"].start + wheel,), geometry.wheel_radius, UNTOLD, DRAGGED)
 
 
 def resting_wheel(own: OwnRows | None) -> int | None:

@@ -118,12 +118,14 @@ class OwnRows:
         columns: of the signals.
         lever: what they are multiplied with [m].
         untold: part that may stay unexplained [-].
+        other: what may be no motion of theirs in any case, in the unit of the signals.
     """
 
     coordinates: tuple[str, ...]
     columns: tuple[int, ...]
     lever: float
     untold: float
+    other: float = 0.0
 
     def of(self, inputs: Array) -> Array:
         """The rows (N, rows) [m] of signals (N, INPUTS)."""
