@@ -3,8 +3,9 @@
 Nothing loads them there, and the controller lets them drift from flank to flank. A motor does so that rattles where the
 vehicle drives; others move with wheels that slide. How far it moves in such a step is a row of its own: the play of its
 gear, and what the flanks, or a gear that gives way, yield to the load that it has where it is farthest ahead and
-farthest behind. The side that steers drags the chassis along, and with it the wheel, by some hundredths of a milliradian a
-second: so that is looked at within seconds, where it moves farthest. What rolls at standstill takes its motion for that of wheels or chassis; a wide one has it left out.
+farthest behind. The side that steers drags the chassis along, and the wheel with it, some hundredths of a milliradian a
+second: so that is looked at within seconds, where the motor moves farthest. What rolls at standstill takes its motion
+for that of wheels or chassis; a wide one has it left out.
 """
 
 from __future__ import annotations
@@ -55,9 +56,10 @@ def moved_at_rest(beta: Array, near: Mask) -> Array:
     """
     if not near.any():
         return np.zeros(2)
-    across = np.array([max(_range(angle, *_farthest(angle)) for angle in _parts(angle)) for angle in beta[near].T])
-    other = across[::-1]
-    return np.where((across > LEAST) & ((across > ABOVE_OTHER * other) | (other > LEAST)), across, 0.0)
+    whole = np.array([_range(angle, *_farthest(angle)) for angle in beta[near].T])
+    other = whole[::-1]
+    across = np.array([max(_range(part, *_farthest(part)) for part in _parts(angle)) for angle in beta[near].T])
+    return np.where((whole > LEAST) & ((whole > ABOVE_OTHER * other) | (other > LEAST)), across, 0.0)
 
 
 def range_of(values: Array, inputs: Array, wheel: int) -> float:
