@@ -28,12 +28,13 @@ def judge(
         seed: of the surrogates and of the smooth function.
         settings, limits: thresholds.
     """
+    settings, limits = settings or Settings(), limits or Limits()
     # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        judgement = _judged_once((fit, confirm), seed, settings or Settings(), limits or Limits())
+        judgement = _judged_once((fit, confirm), seed, settings, limits)
         while refuted := judgement.refuted():
             fit, confirm = (_without(problem, refuted) for problem in (fit, confirm))
-            judgement = _judged_once((fit, confirm), seed, settings or Settings(), limits or Limits())
+            judgement = _judged_once((fit, confirm), seed, settings, limits)
         return judgement.findings()
 
 

@@ -56,9 +56,9 @@ def moved_at_rest(beta: Array, near: Mask) -> Array:
     """
     if not near.any():
         return np.zeros(2)
-    whole = np.array([_range(angle, *_farthest(angle)) for angle in beta[near].T])
+    whole = np.array([_extent(angle) for angle in beta[near].T])
     other = whole[::-1]
-    across = np.array([max(_range(part, *_farthest(part)) for part in _parts(angle)) for angle in beta[near].T])
+    across = np.array([max(map(_extent, _parts(angle))) for angle in beta[near].T])
     return np.where((whole > LEAST) & ((whole > ABOVE_OTHER * other) | (other > LEAST)), across, 0.0)
 
 
@@ -71,13 +71,18 @@ def range_of(values: Array, inputs: Array, wheel: int) -> float:
     if not at_rest.any():
         return 0.0
     angles, behind = _parts(inputs[at_rest, SLICES["beta"].start + wheel]), _parts(values[at_rest])
-    widest = int(np.argmax([_range(angle, *_farthest(angle)) for angle in angles]))
+    widest = int(np.argmax([_extent(angle) for angle in angles]))
     return _range(behind[widest], *_farthest(angles[widest]))
 
 
 def _parts(values: Array) -> list[Array]:
     """Values (N,) in pieces of about `TOGETHER`."""
     return np.array_split(values, max(len(values) // TOGETHER, 1))
+
+
+def _extent(angle: Array) -> float:
+    """How far an angle (N,) goes."""
+    return _range(angle, *_farthest(angle))
 
 
 def _farthest(angle: Array) -> tuple[Mask, Mask]:
