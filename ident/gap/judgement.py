@@ -47,14 +47,13 @@ class Judgement:
 
     def findings(self) -> Findings:
         """The answer, with all that reports show of it."""
-        gap, causes = self._gap(self.found.variants, exact=True), self._causes()
-        verdict = self._verdict()
+        causes, verdict = self._causes(), self._verdict()
         return Findings(
             verdict=verdict,
             causes=causes,
             doubtful=self._doubtful(),
             events=tuple(self.problems[0].candidates[owner].key for owner in self.found.rest.events),
-            gap=gap,
+            gap=self._exactly,
             where=shares(self.rows, self.floors, self._judged()),
             invisible=invisible_names(self.regression),
             before=self.before,
@@ -96,6 +95,11 @@ class Judgement:
     def _whole(self) -> Gap:
         """With all effects, as their columns."""
         return self._gap(self.found.variants)
+
+    @cached_property
+    def _exactly(self) -> Gap:
+        """With all effects, as their exact forms."""
+        return self._gap(self.found.variants, exact=True)
 
     @property
     def _removable(self) -> float:
@@ -171,7 +175,11 @@ class Judgement:
         unexplained = self._predictable() and self._explained() < self.limits.explained
         strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
         another = self._sizeless(self._strongest)
-        return Verdict.UNKNOWN if strange or another else Verdict.EFFECT
+        return Verdict.UNKNOWN if strange or another or self._worse() else Verdict.EFFECT
+
+    def _worse(self) -> bool:
+        """Whether the model with all effects, refitted exactly, is further from the held-out rows than without any."""
+        return self._measurable() and self._exactly.closed < -self.limits.widening
 
     def _foreign(self) -> bool:
         """Whether something lasts in rows that the model itself says nothing of: what shows there is all of a cause."""

@@ -28,7 +28,8 @@ class Channels:
 
     Attributes:
         values: (N,) by channel name, `time` among them where the file has one.
-        units: of the channels whose unit the file states; CSV states none and implies SI.
+        units: of the channels whose unit the file states; a CSV file may state one in brackets behind the name, as in
+            `position [rad]`, and implies SI where it does not.
     """
 
     values: Values
@@ -80,7 +81,8 @@ def _read_csv(path: Path) -> Channels:
                 f"{path} has no header line: it is empty or no CSV file.",
                 "Its first line names the channels, each further line is a sample.",
             ) from error
-    names = [name.strip() for name in header]
+    named = [_name_and_unit(cell) for cell in header]
+    names = [name for name, _ in named]
     _refuse_twins(path, names)
     for number, row in enumerate(rows):
         if len(row) != len(names):
@@ -89,7 +91,14 @@ def _read_csv(path: Path) -> Channels:
                 "The file may be cut off; remove the line or record again.",
             )
     columns = zip(*rows, strict=True) if rows else ([] for _ in names)
-    return Channels({name: _csv_column(path, name, list(cells)) for name, cells in zip(names, columns, strict=True)})
+    values = {name: _csv_column(path, name, list(cells)) for name, cells in zip(names, columns, strict=True)}
+    return Channels(values, {name: unit for name, unit in named if unit is not None})
+
+
+def _name_and_unit(cell: str) -> tuple[str, str | None]:
+    """`position [rad]` is a name and a unit; what has no brackets behind it is a name."""
+    name, bracket, unit = cell.strip().removesuffix("]").rpartition("[")
+    return (name.strip(), unit.strip()) if bracket and cell.rstrip().endswith("]") else (cell.strip(), None)
 
 
 def _refuse_twins(path: Path, names: list[str]) -> None:

@@ -21,6 +21,7 @@ from ident.gap.problem import Nominal, Problem, Variant
 from ident.gap.regression import Settings
 from ident.gap.split import split_problem
 from ident.report.gap_summary import summary_lines
+from ident.vehicle.effects import EffectParameter
 
 
 def _judged(world: Any) -> Findings:
@@ -46,6 +47,37 @@ def test_an_effect_is_named_with_its_size_and_closes_the_gap(world: type[Any]) -
 def test_two_effects_are_both_named(world: type[Any]) -> None:
     findings = _judged(world(seed=8, true={"b": 0.25, "e": -0.25}))
     assert sorted(_names(findings)) == ["b", "e"]
+
+
+def _curved(problem: Problem, bend: float) -> Problem:
+    """`c` as a curve: its column, and `bend` times that of `d` as far as a second number is not 1; it starts at 0."""
+    c, d = (next(one for one in problem.candidates if one.effect == name) for name in ("c", "d"))
+    pairs = [
+        (first, second)
+        for first, second in zip(c.variants[0].columns, d.variants[0].columns, strict=True)
+        if first is not None and second is not None
+    ]
+
+    def contribution(values: Any, _baseline: Any) -> tuple[Any, ...]:
+        return tuple((values[0] * first + bend * (values[1] - 1) * second)[:, 0] for first, second in pairs)
+
+    straight = replace(c.variants[0], start=lambda found: np.append(found, 0.0))
+    parameters = (*c.parameters, EffectParameter("bend", "1", ""))
+    curve = replace(c, parameters=parameters, variants=(straight,), contribution=contribution)
+    return replace(problem, candidates=tuple(curve if other is c else other for other in problem.candidates))
+
+
+@pytest.mark.parametrize(("bend", "verdict"), [(0.0, Verdict.EFFECT), (0.9, Verdict.UNKNOWN)])
+def test_an_effect_with_which_the_model_predicts_worse_than_without_is_not_named(
+    world: type[Any], bend: float, verdict: Verdict
+) -> None:
+    """All records together show where the curve goes; those that are fitted do not, and it goes astray in the other."""
+    drawn = world(seed=30, true={"c": 0.6})
+    findings = judge(_curved(drawn.problem(0), 0.0), _curved(drawn.problem(1), bend), seed=1)
+    assert _names(findings) == ["c"]
+    assert (findings.gap.closed < 0) == (bend > 0)
+    assert findings.verdict is verdict
+    assert bool(findings.diagnosis().effects) == (verdict is Verdict.EFFECT)
 
 
 def test_noise_alone_is_no_effect(world: type[Any]) -> None:

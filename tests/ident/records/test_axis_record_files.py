@@ -59,6 +59,22 @@ def test_a_csv_file_states_no_units_and_is_what_the_reader_says(tmp_path: Path) 
         assert {axis.kind for axis in read_axis_record(tmp_path / "axes.csv", kind).axes} == {kind}
 
 
+def test_a_csv_file_may_state_units_in_brackets_behind_the_names(tmp_path: Path) -> None:
+    rows = "\n".join(f"{0.001 * number},{number},{number},{number},{number}" for number in range(SAMPLES))
+    header = "time [s],position_1[rad], effort_1 [Nm] ,position_2 [m],effort_2"
+    (tmp_path / "axes.csv").write_text(f"{header}\n{rows}\n")
+    first, second = read_axis_record(tmp_path / "axes.csv").axes
+    assert (first.name, first.kind) == ("1", AxisKind.ROTARY)
+    assert (second.name, second.kind) == ("2", AxisKind.LINEAR)
+
+
+def test_a_csv_file_in_degrees_is_refused_with_the_unit_wanted(tmp_path: Path) -> None:
+    (tmp_path / "axis.csv").write_text("time,position [deg],effort [Nm]\n" + "0,0,0\n" * SAMPLES)
+    with pytest.raises(RecordError, match=r"'deg'") as raised:
+        read_axis_record(tmp_path / "axis.csv")
+    assert "'rad'" in raised.value.remedy
+
+
 def test_a_single_axis_has_no_name_and_need_not_be_named() -> None:
     record = axis_record_from_channels(Channels(single()), "record")
     assert record.axis() is record.axis("") is record.axes[0]
