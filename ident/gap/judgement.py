@@ -175,11 +175,15 @@ class Judgement:
         unexplained = self._predictable() and self._explained() < self.limits.explained
         strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
         another = self._sizeless(self._strongest)
-        return Verdict.UNKNOWN if strange or another or self._worse() else Verdict.EFFECT
+        return Verdict.UNKNOWN if strange or another or self._short() else Verdict.EFFECT
 
-    def _worse(self) -> bool:
-        """Whether the model with all effects, refitted exactly, is further from the held-out rows than without any."""
-        return self._measurable() and self._exactly.closed < -self.limits.widening
+    def _short(self) -> bool:
+        """Whether the model with all effects, refitted exactly, is further from the held-out rows than without any.
+
+        Or hardly nearer, where nothing repeats that would tell noise from what is left.
+        """
+        least = -self.limits.widening if self._lasts else self.limits.most
+        return self._measurable() and self._exactly.closed < least
 
     def _foreign(self) -> bool:
         """Whether something lasts in rows that the model itself says nothing of: what shows there is all of a cause."""

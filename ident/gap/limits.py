@@ -22,6 +22,7 @@ class Limits:
         far: what repeats, in units of its limit, above which `nearly` is asked instead of `named`.
         improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
         widening: share of the held-out gap by which an effect may seem to widen it.
+        most: share of the held-out gap that all effects must close where nothing repeats.
         measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.
         sure: log Bayes factor of the confirming rows from which an effect stands although it seems to, by accident.
         minor: log evidence over that of the strongest effect above which one counts that closes less.
@@ -46,6 +47,7 @@ class Limits:
     far: float = 2.5
     improvement: float = 0.01
     widening: float = 0.1
+    most: float = 0.5
     measurable: float = 0.05
     sure: float = 2.5
     minor: float = 0.05
