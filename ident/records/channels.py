@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import csv
+import gc
 import importlib
 import struct
+import sys
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +23,8 @@ Handler = TypeVar("Handler")
 
 TEXT_CHANNELS: Final = ("step",)
 """Channels of a CSV file that hold words; all others hold numbers."""
+OTHER_SEPARATORS: Final = ";\t"
+"""What spreadsheets of other countries write between channels."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ def _require_extra(module: str, path: Path) -> None:
 
 
 def _read_csv(path: Path) -> Channels:
-    with path.open(newline="", encoding="utf-8") as file:
+    with path.open(newline="", encoding="utf-8-sig") as file:
         try:
             header, *rows = csv.reader(file)
         except (ValueError, csv.Error) as error:
@@ -83,6 +88,11 @@ def _read_csv(path: Path) -> Channels:
             ) from error
     named = [_name_and_unit(cell) for cell in header]
     names = [name for name, _ in named]
+    if len(names) == 1 and any(mark in names[0] for mark in OTHER_SEPARATORS):
+        raise RecordError(
+            f"{path}: the channels in its first line are not separated by commas.",
+            "Separate them by commas, and write numbers with a decimal point.",
+        )
     _refuse_twins(path, names)
     for number, row in enumerate(rows):
         if len(row) != len(names):
@@ -130,7 +140,7 @@ def _read_parquet(path: Path) -> Channels:
 
     try:
         table = pq.read_table(path)
-    except pa.ArrowException as error:
+    except (pa.ArrowException, OSError) as error:
         raise RecordError(f"{path} is not a readable Parquet file: {error}.", "Record again.") from error
     stated = {entry.name: (entry.metadata or {}).get(b"unit", b"").decode() for entry in table.schema}
     return Channels(
@@ -161,6 +171,7 @@ def _read_mf4(path: Path) -> Channels:
         with MDF(path) as mdf:
             signals = list(mdf.iter_channels(skip_master=True))
     except (MdfException, OSError, ValueError, struct.error) as error:
+        _discard(error)
         raise RecordError(f"{path} is not a readable MF4 file: {error}.", "Record again.") from error
     if not signals:
         raise RecordError(f"{path} holds no channels.", "Record again.")
@@ -172,6 +183,17 @@ def _read_mf4(path: Path) -> Channels:
         {"time": time, **{signal.name: _numbers_or_text(np.asarray(signal.samples)) for signal in signals}},
         {signal.name: signal.unit for signal in signals if signal.unit},
     )
+
+
+def _discard(error: BaseException) -> None:
+    """Delete what a reader left half-made, silently: the destructor of asammdf fails where its constructor has."""
+    hook = sys.unraisablehook
+    sys.unraisablehook = lambda _: None
+    try:
+        traceback.clear_frames(error.__traceback__)
+        gc.collect()
+    finally:
+        sys.unraisablehook = hook
 
 
 def _numbers_or_text(samples: NDArray[Any]) -> NDArray[Any]:

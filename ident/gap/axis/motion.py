@@ -94,12 +94,16 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth:
     of the rows' filter around them.
 
     Raises:
-        EstimationError: the record is too short for the filter, or the axis does not move.
+        EstimationError: the record is too short for the filter, the axis does not move, or its effort never changes.
     """
     dt = record.sample_time
     memory = 4 / bandwidth
     if np.ptp(axis.position) < SMALLEST_MOTION:
         raise EstimationError(f"{record.source}: {axis.label} does not move.", "Record it while it is driven.")
+    if not np.ptp(axis.effort):
+        raise EstimationError(
+            f"{record.source}: the effort of {axis.label} never changes.", "Record the force or torque of its drive."
+        )
     if len(record) * dt * bandwidth / (2 * math.pi) < FEWEST_ROWS / ROWS_PER_CUTOFF:
         raise EstimationError(
             f"{record.source} lasts {len(record) * dt:.3g} s, too short for its bandwidth of "

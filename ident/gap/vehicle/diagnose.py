@@ -67,8 +67,8 @@ def diagnose_vehicle(
         effects: that are looked for.
 
     Raises:
-        RecordError: a record is of another vehicle, does not move or holds none of the steps of a diagnosis, or the
-            confirming records hold none of those fitted.
+        RecordError: a record is of another vehicle, does not move, has no torques or holds none of the steps of a
+            diagnosis, or the confirming records hold none of those fitted.
         DataFileError: a parameter of the model is zero.
     """
     if isinstance(model, Parameters):
@@ -76,6 +76,7 @@ def diagnose_vehicle(
     if model is not None:
         _refuse_zero(model.parameters)
     refuse_other_vehicle((*fit, *confirm), vehicle.geometry)
+    _refuse_silent((*fit, *confirm))
     hidden = hidden_effects(segment.step for record in fit for segment in record.segments)
     shown = [name for name in effects if name not in hidden]
     fitted = _problem(fit, vehicle, model, shown)
@@ -110,6 +111,12 @@ def _refuse_zero(parameters: Parameters) -> None:
                 f"{name} of the model is zero: a change of it, stated relative to it, would have no size.",
                 "Give the least value that makes sense, with its std, or leave --model out to have all refitted.",
             )
+
+
+def _refuse_silent(records: Sequence[Record]) -> None:
+    for record in records:
+        if not any(np.ptp(segment.motor_torques, axis=0).any() for segment in record.segments):
+            raise RecordError(f"{record.source}: no motor torque ever changes.", "Record the torques of the drives.")
 
 
 def _refuse_strangers(fitted: Problem, confirming: Problem) -> None:

@@ -115,6 +115,12 @@ def test_an_axis_at_rest_is_refused(machine: Make) -> None:
         diagnose_axis([still], [], seed=1)
 
 
+def test_an_axis_without_any_effort_is_refused(machine: Make) -> None:
+    record = machine().drive(1)
+    with pytest.raises(EstimationError, match=r"effort of .* never changes"):
+        diagnose_axis([_changed(record, effort=np.zeros(len(record)))], [], seed=1)
+
+
 def test_records_of_different_axes_are_refused(machine: Make) -> None:
     with pytest.raises(RecordError, match="does not have the axes"):
         diagnose_axis([machine().drive(1)], [machine(follower=(1.0, 1.0)).drive(2)], seed=1)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import gc
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -73,6 +75,46 @@ def test_a_csv_file_in_degrees_is_refused_with_the_unit_wanted(tmp_path: Path) -
     with pytest.raises(RecordError, match=r"'deg'") as raised:
         read_axis_record(tmp_path / "axis.csv")
     assert "'rad'" in raised.value.remedy
+
+
+def test_a_csv_file_of_a_spreadsheet_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    write_axis_record(two_axes(), tmp_path / "axes.csv")
+    (tmp_path / "axes.csv").write_text((tmp_path / "axes.csv").read_text(), encoding="utf-8-sig")
+    assert len(read_axis_record(tmp_path / "axes.csv").axes) == 2
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_channels_that_are_not_separated_by_commas_are_refused_with_the_remedy(tmp_path: Path, mark: str) -> None:
+    write_axis_record(two_axes(), tmp_path / "axes.csv")
+    (tmp_path / "axes.csv").write_text((tmp_path / "axes.csv").read_text().replace(",", mark))
+    with pytest.raises(RecordError, match="not separated by commas"):
+        read_axis_record(tmp_path / "axes.csv")
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".mf4"])
+def test_a_file_that_was_cut_off_is_refused_and_nothing_else_is_said(
+    tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The destructor of a reader that fails as well must not add its own story."""
+    said: list[object] = []
+    monkeypatch.setattr(sys, "unraisablehook", said.append)
+    path = tmp_path / f"axes{suffix}"
+    write_axis_record(two_axes(), path)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(RecordError, match="not a readable"):
+        read_axis_record(path)
+    gc.collect()
+    assert not said
+
+
+def test_a_parquet_file_with_a_hole_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "axis.parquet"
+    write_axis_record(two_axes(), path)
+    content = bytearray(path.read_bytes())
+    content[4:200] = b"\xff" * 196
+    path.write_bytes(content)
+    with pytest.raises(RecordError, match="not a readable Parquet file"):
+        read_axis_record(path)
 
 
 def test_a_single_axis_has_no_name_and_need_not_be_named() -> None:

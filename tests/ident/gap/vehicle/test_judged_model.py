@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ident.errors import DataFileError
+from ident.errors import DataFileError, RecordError
 from ident.gap.vehicle.closing import extended_model, plain_model
 from ident.gap.vehicle.diagnose import VehicleDiagnosis, diagnose_vehicle
 from ident.gap.vehicle.ideal import FOUR, ideal_record
@@ -53,6 +53,13 @@ def test_a_value_of_zero_has_no_relative_change_and_is_refused(vehicle: VehicleD
 
 
 @pytest.mark.slow
+def test_a_record_without_torques_is_refused(vehicle: VehicleDescription) -> None:
+    record = ideal_record(FOUR, vehicle)
+    segments = [replace(one, motor_torques=np.zeros_like(one.motor_torques)) for one in record.segments]
+    with pytest.raises(RecordError, match="no motor torque ever changes"):
+        diagnose_vehicle([record], [Record(segments, "silent")], vehicle)
+
+
 def test_a_changed_value_is_named_with_its_size(found: VehicleDiagnosis) -> None:
     (effect,) = found.diagnosis.effects
     assert (effect.name, effect.where) == ("parameter_change", "d_cw")
