@@ -107,8 +107,11 @@ def _read_csv(path: Path) -> Channels:
 
 def _name_and_unit(cell: str) -> tuple[str, str | None]:
     """`position [rad]` is a name and a unit; what has no brackets behind it is a name."""
-    name, bracket, unit = cell.strip().removesuffix("]").rpartition("[")
-    return (name.strip(), unit.strip()) if bracket and cell.rstrip().endswith("]") else (cell.strip(), None)
+    text = cell.strip()
+    if not (text.endswith("]") and "[" in text):
+        return text, None
+    name, _, unit = text.removesuffix("]").rpartition("[")
+    return name.strip(), unit.strip()
 
 
 def _refuse_twins(path: Path, names: list[str]) -> None:

@@ -52,7 +52,6 @@ def test_a_value_of_zero_has_no_relative_change_and_is_refused(vehicle: VehicleD
         diagnose_vehicle([record], [], vehicle, vehicle.prior.replaced(d_vl=0.0))
 
 
-@pytest.mark.slow
 def test_a_record_without_torques_is_refused(vehicle: VehicleDescription) -> None:
     record = ideal_record(FOUR, vehicle)
     segments = [replace(one, motor_torques=np.zeros_like(one.motor_torques)) for one in record.segments]
@@ -60,6 +59,7 @@ def test_a_record_without_torques_is_refused(vehicle: VehicleDescription) -> Non
         diagnose_vehicle([record], [Record(segments, "silent")], vehicle)
 
 
+@pytest.mark.slow
 def test_a_changed_value_is_named_with_its_size(found: VehicleDiagnosis) -> None:
     (effect,) = found.diagnosis.effects
     assert (effect.name, effect.where) == ("parameter_change", "d_cw")
