@@ -16,10 +16,10 @@ from hil.campaign.reading import read_any
 from hil.network import load_network
 from ident.errors import RecordError, UserError
 from ident.gap.axis.diagnose import diagnose_axis
-from ident.gap.diagnosis import Diagnosis, write_diagnosis
+from ident.gap.diagnosis import Diagnosis, refuse_folder, write_diagnosis
 from ident.gap.findings import Findings
 from ident.gap.vehicle.diagnose import diagnose_vehicle
-from ident.records.axis_record import AxisRecord, read_axis_record
+from ident.records.axis_record import AxisKind, AxisRecord, read_axis_record
 from ident.records.record import Record
 from ident.report.gap import GapReport, write_gap_report
 from ident.report.gap_summary import summary_lines
@@ -32,6 +32,12 @@ SAME: Final = 1e-6
 """Largest difference of two series over their range at which they are the same recording, written twice."""
 SAME_RATE: Final = 0.01
 """Largest relative difference of two sample times."""
+
+ASSUMED: Final = {
+    AxisKind.LINEAR: "No units are stated, m and N are taken; name a channel `position [rad]` if its axis turns.",
+    AxisKind.ROTARY: "No units are stated, rad and Nm are taken; name a channel `position [m]` if its axis slides.",
+}
+"""What is said where the kind of an axis is assumed."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +63,17 @@ class DiagnosisOrder:
     json: Path | None
     report: Path | None
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What is to be written."""
+        return tuple(path for path in (self.json, self.report) if path is not None)
+
 
 @dataclass(frozen=True)
 class _Answer:
     findings: Findings
     diagnosis: Diagnosis
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -92,9 +104,11 @@ def diagnose_records(order: DiagnosisOrder, console: Console) -> Diagnosis:
     Raises:
         UserError: a record, the model or the vehicle cannot be used, or a record is to confirm itself.
     """
+    for path in order.files:
+        refuse_folder(path)
     with console.status("diagnosing"):
         answer = _axis_answer(order) if order.axis else _vehicle_answer(order)
-    for line in summary_lines(answer.findings, answer.diagnosis):
+    for line in (*summary_lines(answer.findings, answer.diagnosis), *answer.notes):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     if order.report is not None:
         fitted, confirmed = ([str(path) for path in paths] for paths in (order.records, order.confirm))
@@ -102,9 +116,10 @@ def diagnose_records(order: DiagnosisOrder, console: Console) -> Diagnosis:
         write_gap_report(GapReport(answer.findings, answer.diagnosis, fitted, confirmed, model), order.report)
     if order.json is not None:
         write_diagnosis(answer.diagnosis, order.json)
-    written = [str(path) for path in (order.json, order.report) if path is not None]
-    if written:
-        console.print(f"Written: {', '.join(written)}", highlight=False, markup=False, soft_wrap=True)
+    if order.files:
+        console.print(
+            f"Written: {', '.join(str(path) for path in order.files)}", highlight=False, markup=False, soft_wrap=True
+        )
     return answer.diagnosis
 
 
@@ -117,7 +132,8 @@ def _axis_answer(order: DiagnosisOrder) -> _Answer:
     records, confirming = ([read_axis_record(path) for path in paths] for paths in (order.records, order.confirm))
     _refuse_repeated([_of_axes(record) for record in (*records, *confirming)])
     findings = diagnose_axis(records, confirming, seed=order.seed)
-    return _Answer(findings, findings.diagnosis())
+    assumed = [axis.kind for record in records for axis in record.axes if axis.assumed]
+    return _Answer(findings, findings.diagnosis(), (ASSUMED[assumed[0]],) if assumed else ())
 
 
 def _vehicle_answer(order: DiagnosisOrder) -> _Answer:

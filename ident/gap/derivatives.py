@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import fft, ndimage
 
 from ident.estimate.filters import differentiate
 from ident.estimate.filters import second_derivative as coarse_second_derivative
@@ -21,6 +21,8 @@ FIRST: Final = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60
 SECOND: Final = np.array([2, -27, 270, -490, 270, -27, 2]) / 180
 """Weights of seven neighbours."""
 
+LED_BACK: Final = 1000
+"""Samples at least over which a series is led back to its start before its spectrum is turned."""
 _ENDS: Final = len(FIRST) // 2
 
 
@@ -38,3 +40,11 @@ def second_derivative(values: Array, sample_time: float) -> Array:
     inner = slice(_ENDS, len(found) - _ENDS)
     found[inner] = ndimage.correlate1d(values, SECOND, axis=0)[inner] / sample_time**2
     return found
+
+
+def delayed(series: Array, delay: float, sample_time: float) -> Array:
+    """A series (N,) as it was `delay` seconds before, by its spectrum; its end is led back to its start."""
+    length = fft.next_fast_len(len(series) + LED_BACK, real=True)
+    closed = np.pad(series, (0, length - len(series)), mode="linear_ramp", end_values=series[0])
+    turn = np.exp(-2j * np.pi * fft.rfftfreq(length, sample_time) * delay)
+    return np.asarray(fft.irfft(fft.rfft(closed) * turn, length)[: len(series)])

@@ -124,12 +124,23 @@ def write_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
     write_whole(json.dumps(diagnosis.as_json(), indent=2, allow_nan=False) + "\n", path)
 
 
+def refuse_folder(path: Path) -> None:
+    """Refuse the name of a folder for a file that is to be written.
+
+    Raises:
+        UserError: it is one.
+    """
+    if path.is_dir():
+        raise UserError(f"{path} is a folder.", "Name the file to write, in it or elsewhere.")
+
+
 def write_whole(text: str, path: Path) -> None:
     """Write a text; a reader of `path` sees the old file or the new one, never half of it.
 
     Raises:
-        UserError: it cannot be written.
+        UserError: it cannot be written, or is a folder.
     """
+    refuse_folder(path)
     part = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

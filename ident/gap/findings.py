@@ -60,6 +60,7 @@ class Findings:
         before, after: of all rows without and with the causes; before is the model that was given, or a refit.
         significance: that the best candidate is there by chance.
         remainder: what a smooth function still predicts.
+        lasting: whether something repeats in every record, above its limit, that the effects leave.
         repeated_before, repeated_after: rms over noise of what repeats, by step and coordinate.
         problem: that was fitted.
     """
@@ -75,6 +76,7 @@ class Findings:
     after: Refit
     significance: float
     remainder: Generic
+    lasting: bool
     repeated_before: Mapping[str, float]
     repeated_after: Mapping[str, float]
     problem: Problem

@@ -60,6 +60,7 @@ class Judgement:
             after=self.after,
             significance=min(slot.evidence.significance for slot in (self.found.rest, *self.found.slots)),
             remainder=self.rest,
+            lasting=self._repeating() > 1,
             repeated_before=self._sizes(self._judged()),
             repeated_after=self._sizes(self.after.blocks),
             problem=self.problems[0],
@@ -82,7 +83,7 @@ class Judgement:
         if len(variants) < 2:
             return variants
         for index in range(len(variants)):
-            if index != self._strongest and self._sizeless(index):
+            if index != self._strongest and (self._sizeless(index) or self._outside(index)):
                 return self._others(index)
         evidence = [self._log_evidence(index) for index in range(len(variants))]
         least = int(np.argmin(evidence))
@@ -174,7 +175,7 @@ class Judgement:
             return Verdict.UNKNOWN if self._predictable() or self._repeating() > 1 else Verdict.NONE
         unexplained = self._predictable() and self._explained() < self.limits.explained
         strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
-        another = self._sizeless(self._strongest)
+        another = self._sizeless(self._strongest) or self._outside(self._strongest)
         return Verdict.UNKNOWN if strange or another or self._short() else Verdict.EFFECT
 
     def _short(self) -> bool:
@@ -213,10 +214,19 @@ class Judgement:
         size = np.abs(part.values) if least is None else part.values - least
         return bool(np.any(accompanied) and np.all(size < self.limits.sized * part.std))
 
+    def _outside(self, index: int) -> bool:
+        """Whether the refit has made something else of an effect: parameters that it does not have."""
+        lowest = self._candidate(index).lowest
+        return bool(lowest) and bool(np.any(np.abs(self.after.parts[index].values) < lowest))
+
     def _named(self) -> float:
         """What the effect that closes most closes, alone or beside the others, in that and what all of them leave."""
         most = max(*self._closed, *(self._gap((variant,)).closed for variant in self.found.variants))
         return max(most, 0.0) / max(most + self._left, np.finfo(float).tiny)
+
+    def _surest(self) -> float:
+        """Where something repeats that all effects leave, the name of the strongest may be part of another cause."""
+        return self._named() if self.limits.humble and self._repeating() > 1 else 1.0
 
     def _predictable(self) -> bool:
         """Whether a smooth function of the states predicts what the effects leave, and it is no trifle."""
@@ -257,7 +267,7 @@ class Judgement:
             candidate=self._candidate(index),
             part=self.after.parts[index],
             ranked=ranked,
-            probability=min(ranked.probability, settings.ceiling),
+            probability=min(ranked.probability, settings.ceiling, self._surest()),
             log_evidence=self._log_evidence(index),
             log_predictive=self._log_predictive(index),
             closed=self._closed[index],

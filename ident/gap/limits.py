@@ -19,6 +19,7 @@ class Limits:
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
         named: what one effect must close, over that and what all leave, where a remainder repeats.
         nearly: the same where what repeats exceeds its limit by more than `far`.
+        humble: whether no name is surer than that share, where a remainder repeats that is pardoned.
         far: what repeats, in units of its limit, above which `nearly` is asked instead of `named`.
         improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
         widening: share of the held-out gap by which an effect may seem to widen it.
@@ -44,6 +45,7 @@ class Limits:
     explained: float = 0.5
     named: float = 0.75
     nearly: float = 0.95
+    humble: bool = False
     far: float = 2.5
     improvement: float = 0.01
     widening: float = 0.1

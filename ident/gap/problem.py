@@ -115,6 +115,7 @@ class Candidate:
         least: what the coefficients of a variant must reach, 0 for a play or a mass; if the data want one smaller,
             this is not the cause. None: anything is possible.
         negligible: size of the coefficient of a single column up to which it means nothing, in its unit.
+        lowest: what the parameters must reach in size after the refit to be this effect; empty: anything.
         excluded: the records speak against it, so that no others can bring it back.
         spread: standard deviations of the parameters that come with the way they are told, beyond the scatter of the
             rows; empty where there are none.
@@ -133,6 +134,7 @@ class Candidate:
     drift: bool = False
     least: float | None = None
     negligible: float = 0.0
+    lowest: tuple[float, ...] = ()
     excluded: bool = False
     spread: tuple[float, ...] = ()
     part: float = 0.0

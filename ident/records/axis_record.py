@@ -23,9 +23,12 @@ from scipy import io
 
 from ident.errors import RecordError
 from ident.records.channels import Channels, read_channels, write_channels
-from ident.records.checks import period_numbers, refuse_nonfinite, refuse_short, uniform_sample_time
+from ident.records.checks import numbers, period_numbers, refuse_nonfinite, refuse_short, uniform_sample_time
 
 Array = NDArray[np.float64]
+
+_PARTS: Final = ("position", "effort")
+"""Channels of an axis."""
 
 
 class AxisKind(enum.Enum):
@@ -53,12 +56,14 @@ class AxisSignals:
         name: what follows `position_` in the file, empty for a single axis.
         kind: linear or rotary.
         position, effort: (N,) [m, N or rad, Nm].
+        assumed: the file states no unit; the kind is what its reader was told, or linear.
     """
 
     name: str
     kind: AxisKind
     position: Array
     effort: Array
+    assumed: bool = False
 
     @property
     def label(self) -> str:
@@ -138,10 +143,13 @@ def axis_record_from_channels(channels: Channels, source: str, kind: AxisKind = 
             is no SI unit of an axis.
     """
     _refuse_incomplete(channels.values, source)
-    values = {name: np.asarray(channel, dtype=float) for name, channel in channels.values.items() if name != "step"}
+    needed = ["time", *(_channel(part, axis) for axis in _axis_names(channels.values) for part in _PARTS)]
+    values = {name: numbers(name, channels.values[name], source) for name in needed}
+    if "period" in channels.values:
+        values["period"] = numbers("period", channels.values["period"], source)
     _refuse_unequal(values, source)
     refuse_short(len(values["time"]), source)
-    for name in ("time", *(name for name in values if name.startswith(("position", "effort")))):
+    for name in needed:
         refuse_nonfinite(name, values[name], source)
     time_unit = channels.units.get("time", "s")
     if time_unit != "s":
@@ -152,6 +160,7 @@ def axis_record_from_channels(channels: Channels, source: str, kind: AxisKind = 
             kind=_kind_of(name, channels.units, source, kind),
             position=values[_channel("position", name)],
             effort=values[_channel("effort", name)],
+            assumed=not any(_channel(part, name) in channels.units for part in _PARTS),
         )
         for name in _axis_names(values)
     )

@@ -22,7 +22,7 @@ Values = Mapping[str, NDArray[Any]]
 Handler = TypeVar("Handler")
 
 TEXT_CHANNELS: Final = ("step",)
-"""Channels of a CSV file that hold words; all others hold numbers."""
+"""Channels of a CSV file that hold words even where they look like numbers."""
 OTHER_SEPARATORS: Final = ";\t"
 """What spreadsheets of other countries write between channels."""
 
@@ -94,6 +94,8 @@ def _read_csv(path: Path) -> Channels:
             "Separate them by commas, and write numbers with a decimal point.",
         )
     _refuse_twins(path, names)
+    while rows and not any(cell.strip() for cell in rows[-1]):
+        rows.pop()
     for number, row in enumerate(rows):
         if len(row) != len(names):
             raise RecordError(
@@ -101,7 +103,7 @@ def _read_csv(path: Path) -> Channels:
                 "The file may be cut off; remove the line or record again.",
             )
     columns = zip(*rows, strict=True) if rows else ([] for _ in names)
-    values = {name: _csv_column(path, name, list(cells)) for name, cells in zip(names, columns, strict=True)}
+    values = {name: _csv_column(name, list(cells)) for name, cells in zip(names, columns, strict=True)}
     return Channels(values, {name: unit for name, unit in named if unit is not None})
 
 
@@ -120,13 +122,14 @@ def _refuse_twins(path: Path, names: list[str]) -> None:
         raise RecordError(f"{path} has several channels named {', '.join(twins)}.", "Give every channel its own name.")
 
 
-def _csv_column(path: Path, name: str, cells: list[str]) -> NDArray[Any]:
+def _csv_column(name: str, cells: list[str]) -> NDArray[Any]:
+    """Numbers, or words where one is none; whoever needs numbers refuses those."""
     if name in TEXT_CHANNELS:
         return np.array(cells, dtype=str)
     try:
         return np.array(cells, dtype=float)
-    except ValueError as error:
-        raise RecordError(f"{path}: channel {name}: {error}.", "Write numbers with a decimal point.") from error
+    except ValueError:
+        return np.array(cells, dtype=str)
 
 
 def _write_csv(channels: Channels, path: Path) -> None:

@@ -28,6 +28,35 @@ def refuse_short(samples: int, where: str) -> None:
         raise RecordError(f"{where} holds {samples} samples.", f"It needs at least {SHORTEST}.")
 
 
+def numbers(name: str, channel: NDArray[Any], where: str) -> Array:
+    """A channel (N,) as numbers.
+
+    Raises:
+        RecordError: it holds something else; with the first such sample.
+    """
+    try:
+        return np.asarray(channel, dtype=float)
+    except (TypeError, ValueError) as error:
+        first = next(index for index, value in enumerate(channel) if not _is_number(value))
+        raise RecordError(
+            f"{where}: channel {name} holds {str(channel[first])!r} at sample {first}, which is no number.",
+            "Write numbers with a decimal point.",
+        ) from error
+
+
+def holds_numbers(channel: NDArray[Any]) -> bool:
+    """Whether a channel that nobody needs could be carried along as numbers."""
+    try:
+        np.asarray(channel, dtype=float)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+def _is_number(value: Any) -> bool:
+    return holds_numbers(np.array([value]))
+
+
 def refuse_nonfinite(name: str, values: Array, where: str) -> None:
     """Refuse NaN and infinity in one channel (N,).
 
@@ -46,9 +75,9 @@ def period_numbers(channel: NDArray[Any] | None, samples: int, where: str) -> ND
     """The optional channel `period` as whole numbers (samples,), -1 throughout where there is none.
 
     Raises:
-        RecordError: a value is no whole number.
+        RecordError: a value is no whole number, or no number at all.
     """
-    period = np.full(samples, -1.0) if channel is None else np.asarray(channel, dtype=float)
+    period = np.full(samples, -1.0) if channel is None else numbers("period", channel, where)
     if not np.all(np.isfinite(period) & (period == np.round(period))):
         raise RecordError(
             f"{where}: channel period holds values that are no whole numbers.",

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.errors import RecordError
-from ident.records.checks import period_numbers
+from ident.records.checks import holds_numbers, numbers, period_numbers
 from ident.records.record import Record, Segment, make_segment
 from ident.vehicle.geometry import WHEELS
 
@@ -42,15 +42,23 @@ def record_from_table(table: Table, source: str) -> Record:
         RecordError: a channel is missing, lengths differ, or a segment breaks the contract.
     """
     _check_channels(table, source)
+    table = _in_numbers(table, source)
     period = period_numbers(table.get("period"), len(table["time"]), source)
     steps = np.asarray(table["step"]).astype(str)
-    starts = _starts(steps, np.asarray(table["time"], dtype=float))
+    starts = _starts(steps, table["time"])
     ends = [*starts[1:], len(steps)]
     segments = [
         make_segment(_slice(table, slice(int(start), int(end)), str(steps[start]), period), source)
         for start, end in zip(starts, ends, strict=True)
     ]
     return Record(segments, source)
+
+
+def _in_numbers(table: Table, source: str) -> Table:
+    """The channels as numbers, but `step`; of others than those of the contract only what numbers are."""
+    contract = {*CHANNEL_UNITS} - {"step"}
+    kept = {name: channel for name, channel in table.items() if name in contract or holds_numbers(channel)}
+    return {name: numbers(name, channel, source) for name, channel in kept.items()} | {"step": table["step"]}
 
 
 def _starts(steps: NDArray[Any], time: NDArray[np.float64]) -> list[int]:
@@ -85,22 +93,21 @@ def _check_channels(table: Table, source: str) -> None:
 
 
 def _stack(table: Table, names: tuple[str, ...], rows: slice) -> NDArray[np.float64]:
-    return np.stack([np.asarray(table[name][rows], dtype=float) for name in names], axis=1)
+    return np.stack([table[name][rows] for name in names], axis=1)
 
 
 def _slice(table: Table, rows: slice, step: str, period: NDArray[np.int64]) -> Segment:
-    time = np.asarray(table["time"][rows], dtype=float)
     known = {*REQUIRED, *COMMANDS, "period"}
     return Segment(
         step=step,
         sample_time=0.0,
-        time=time,
+        time=table["time"][rows],
         motor_torques=_stack(table, TORQUES, rows),
         wheel_angles=_stack(table, WHEEL_ANGLES, rows),
         steering_angles=_stack(table, STEERING_ANGLES, rows),
         period=period[rows],
         command_torques=_stack(table, COMMANDS, rows) if all(name in table for name in COMMANDS) else None,
-        extra={name: np.asarray(table[name][rows], dtype=float) for name in table if name not in known},
+        extra={name: table[name][rows] for name in table if name not in known},
     )
 
 

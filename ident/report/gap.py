@@ -89,7 +89,7 @@ def render_gap_report(content: GapReport) -> str:
         verdict=str(diagnosis.verdict),
         headline=verdict_line(diagnosis, findings),
         gap=diagnosis.gap,
-        gap_text=gap_line(diagnosis),
+        gap_text=gap_line(findings, diagnosis),
         next=next_text(diagnosis),
         rows=[_row(cause, content) for cause in findings.causes],
         believed=diagnosis.verdict is Verdict.EFFECT,

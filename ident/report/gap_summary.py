@@ -21,7 +21,7 @@ _VERDICTS: Final = {
 def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
     """At most ten lines: verdict, causes, gap, where, what cannot be seen, what to do."""
     lines = [verdict_line(diagnosis, findings), *(cause_line(effect) for effect in diagnosis.effects[:MOST_CAUSES])]
-    lines.append(gap_line(diagnosis))
+    lines.append(gap_line(findings, diagnosis))
     place = largest_share(diagnosis)
     if place is not None and diagnosis.verdict is not Verdict.NONE:
         lines.append(f"Where: {percent(place.share)} of it in {place_text(place)}.")
@@ -55,13 +55,14 @@ def cause_line(effect: NamedEffect) -> str:
     return f"  {effect.probability:.0%} {effect.name}@{effect.where}: {numbers}; closes {closes} of the gap{rival}"
 
 
-def gap_line(diagnosis: Diagnosis) -> str:
+def gap_line(findings: Findings, diagnosis: Diagnosis) -> str:
     """The held-out gap in units of the noise."""
     gap = diagnosis.gap
     before = f"Gap on held-out data: {significant(gap.before)} times the noise"
     if diagnosis.verdict is Verdict.NONE:
         return f"{before}."
-    return f"{before}, {significant(gap.after)} with the causes in the model: {percent(gap.closed)} of it closed."
+    rest = "; the rest repeats, and has no name" if findings.lasting and diagnosis.verdict is Verdict.EFFECT else ""
+    return f"{before}, {significant(gap.after)} with the causes in the model: {percent(gap.closed)} of it closed{rest}."
 
 
 def largest_share(diagnosis: Diagnosis) -> Share | None:

@@ -124,3 +124,16 @@ def test_a_model_of_the_platform_is_no_model_of_an_axis(
     quasi: Quasi, record: Callable[..., Path], tmp_path: Path
 ) -> None:
     assert "--model" in _refused(quasi, tmp_path, record(1), "--axis", "--model", tmp_path / "parameters.toml")
+
+
+def test_it_is_said_when_the_kind_of_an_axis_is_assumed(quasi: Quasi, record: Callable[..., Path]) -> None:
+    assert "position [rad]" in quasi("diagnose", record(3), "--axis").out
+    stated = record(3, "stated.csv")
+    stated.write_text(stated.read_text().replace("position", "position [m]", 1))
+    assert "position [rad]" not in quasi("diagnose", stated, "--axis").out
+
+
+def test_a_folder_cannot_be_written_over(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
+    answer = quasi("diagnose", record(3), "--axis", "--json", tmp_path)
+    assert answer.code == 2
+    assert "is a folder" in answer.error

@@ -14,10 +14,9 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from ident.gap.axis.motion import AxisMotion
-from ident.gap.derivatives import derivative
+from ident.gap.derivatives import delayed, derivative
 from ident.gap.problem import Candidate, Variant
 from ident.records.axis_record import AxisKind
 from ident.vehicle.effects import EffectName, EffectParameter
@@ -25,16 +24,16 @@ from ident.vehicle.effects import EffectName, EffectParameter
 Array = NDArray[np.float64]
 Filter = Callable[[Array], Array]
 
-LED_BACK: Final = 1000
-"""Samples at least over which a series is led back to its start before its spectrum is turned."""
 STRIBECK_SPEEDS: Final = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Tried first, over the 95th percentile of the speed."""
 BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
 """Tried first, over the range of the position."""
 LEAST_SHARE: Final = 0.1
 """Of the effort that must lie behind a play for it to be one."""
-SHORTEST_DELAY: Final = 0.55
-"""Of a sample interval. Half of one is what holding the effort over the interval does."""
+LONGEST_HOLD: Final = 0.55
+"""Sample intervals up to which a lag is no delay: half of one is what holding the effort over the interval does."""
+FEWEST_RIPPLES: Final = 2.0
+"""Periods over the range of the position below which a force that follows the position is no ripple."""
 RIPPLE_STEP: Final = 0.7
 MOST_RIPPLES: Final = 90.0
 """Periods over the range of the position that are tried, and their step."""
@@ -94,14 +93,6 @@ def axis_candidates(axis: AxisModel) -> list[Candidate]:
     """Every cause that the library has for an axis."""
     made = [make(axis) for make in _LIBRARY]
     return [*made, *_coupled_friction(axis)] if axis.others else made
-
-
-def delayed(series: Array, delay: float, sample_time: float) -> Array:
-    """A series (N,) as it was `delay` seconds before, by its spectrum; its end is led back to its start."""
-    length = fft.next_fast_len(len(series) + LED_BACK, real=True)
-    closed = np.pad(series, (0, length - len(series)), mode="linear_ramp", end_values=series[0])
-    turn = np.exp(-2j * np.pi * fft.rfftfreq(length, sample_time) * delay)
-    return np.asarray(fft.irfft(fft.rfft(closed) * turn, length)[: len(series)])
 
 
 def _linear(
@@ -184,7 +175,7 @@ def _time_delay(axis: AxisModel) -> Candidate:
     parameters = (EffectParameter("delay", "s", "of the motion behind the effort, as reported"),)
     slope = derivative(axis.effort, axis.sample_time)
     variants = (Variant(axis.alone(slope[:, None])),)
-    shortest = SHORTEST_DELAY * axis.sample_time
+    shortest = LONGEST_HOLD * axis.sample_time
     return Candidate(EffectName.TIME_DELAY, axis.place, parameters, variants, contribution, negligible=shortest)
 
 
@@ -244,7 +235,8 @@ def _torque_ripple(axis: AxisModel) -> Candidate:
     )
     periods = np.arange(1.0, MOST_RIPPLES + RIPPLE_STEP, RIPPLE_STEP)
     variants = tuple(variant(float(count) * turn / axis.reach) for count in periods)
-    return Candidate(EffectName.TORQUE_RIPPLE, axis.place, parameters, variants, contribution)
+    lowest = (0.0, FEWEST_RIPPLES * turn / axis.reach, 0.0)
+    return Candidate(EffectName.TORQUE_RIPPLE, axis.place, parameters, variants, contribution, lowest=lowest)
 
 
 def _polar(found: Array, order: float) -> Array:

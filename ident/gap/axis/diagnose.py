@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
 
-from ident.gap.axis.problem import axis_problem, axis_reference, refuse_other_axes
+from ident.gap.axis.problem import axis_problem, delayed_axes
+from ident.gap.axis.reference import Reference, axis_reference, refuse_other_axes
 from ident.gap.findings import Findings
 from ident.gap.judge import judge
+from ident.gap.limits import Limits
 from ident.gap.split import split_problem
 from ident.records.axis_record import AxisRecord
+
+LIMITS: Final = Limits(named=0.6, nearly=0.6, humble=True)
+"""Of an axis. Its effort has little noise, beside which cogging and errors of its pitch always repeat, without a name:
+what they leave does not take the name from a cause that closes one and a half times as much, but makes it less sure."""
 
 
 def diagnose_axis(
@@ -28,7 +36,16 @@ def diagnose_axis(
     """
     refuse_other_axes([*fit, *confirm])
     reference = axis_reference(fit, cutoff)
+    findings = _judged(fit, confirm, reference, seed)
+    late = delayed_axes(findings.after, findings.problem, fit[0].axes, reference.scales)
+    if not any(late):
+        return findings
+    pairs = zip(reference.scales, late, strict=True)
+    scales = tuple(replace(scale, hold=None) if delayed else scale for scale, delayed in pairs)
+    return _judged(fit, confirm, replace(reference, scales=scales), seed)
+
+
+def _judged(fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord], reference: Reference, seed: int) -> Findings:
     fitted = axis_problem(fit, reference)
-    if confirm:
-        return judge(fitted, axis_problem(confirm, reference), seed=seed)
-    return judge(*split_problem(fitted), seed=seed)
+    pair = (fitted, axis_problem(confirm, reference)) if confirm else split_problem(fitted)
+    return judge(*pair, seed=seed, limits=LIMITS)

@@ -42,6 +42,9 @@ REPEAT_MISMATCH: Final = 0.03
 ALMOST_WHOLE: Final = 0.95
 """Part of a repeat that must be there for it to count."""
 SMALLEST_MOTION: Final = 1e-9
+REST: Final = 12.0
+"""Range of a position over its noise, as its second differences show it, below which it does not move: a million
+samples of white noise have a range of 10."""
 FEWEST_ROWS: Final = 60
 """Independent rows that a diagnosis needs."""
 
@@ -98,7 +101,8 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth:
     """
     dt = record.sample_time
     memory = 4 / bandwidth
-    if np.ptp(axis.position) < SMALLEST_MOTION:
+    noise = float(np.std(np.diff(axis.position, 2))) / math.sqrt(6)
+    if np.ptp(axis.position) < max(SMALLEST_MOTION, REST * noise):
         raise EstimationError(f"{record.source}: {axis.label} does not move.", "Record it while it is driven.")
     if not np.ptp(axis.effort):
         raise EstimationError(

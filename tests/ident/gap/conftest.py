@@ -101,6 +101,8 @@ class Machine:
         breakaway: friction at rest beyond Coulomb's [N], gone at `stribeck` [m/s]; with bristles only.
         compliance: of a spring with `share` of the mass behind it [m/N].
         follower: friction that follows the speed of another carriage, which moves by itself [N s/m, N].
+        read: part of a sample interval, of the effort being held, after which the position is read.
+        spring: between carriage and frame [N/m].
         noise, encoder: rms of the noise of the measured effort [N] and of the positions [m].
     """
 
@@ -116,6 +118,8 @@ class Machine:
     compliance: float = 0.0
     share: float = 0.6
     follower: tuple[float, float] = (0.0, 0.0)
+    read: float = 0.5
+    spring: float = 0.0
     noise: float = 0.2
     encoder: float = 2e-7
     rate: float = 1000.0
@@ -169,10 +173,10 @@ class Machine:
             wanted = feed[index] + stiffness * (command - x) + damping * (velocity_reference[index] - v)
             efforts[index] = wanted
             for sub in range(self.substeps):
-                if sub == self.substeps // 2:
+                if sub == int(self.read * self.substeps):
                     positions[index] = x
                 late = [*late[1:], wanted]
-                force = late[0] - self.viscous * v - self.asymmetry * abs(v) - self.offset
+                force = late[0] - self.viscous * v - self.asymmetry * abs(v) - self.offset - self.spring * x
                 if any(self.follower):
                     force -= self.follower[0] * other[index] + self.follower[1] * np.sign(v + other[index])
                 if self.compliance:

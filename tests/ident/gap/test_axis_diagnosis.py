@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from ident.errors import EstimationError, RecordError
-from ident.gap.axis.candidates import delayed, in_gap
+from ident.gap.axis.candidates import in_gap
 from ident.gap.axis.diagnose import diagnose_axis
 from ident.gap.axis.motion import derivative, with_repeats
+from ident.gap.derivatives import delayed
 from ident.gap.diagnosis import Verdict
 from ident.gap.findings import Findings
 from ident.records.axis_record import AxisRecord, read_axis_record
@@ -34,7 +35,33 @@ def _value(findings: Findings, name: str, parameter: int = 0) -> tuple[float, fl
 def test_a_machine_that_is_the_model_lacks_nothing(machine: Make) -> None:
     findings = _diagnosed(machine())
     assert findings.verdict is Verdict.NONE
-    assert findings.after.baseline == pytest.approx([20.0, 60.0, 8.0, -1.0], rel=0.01)
+    found = dict(zip(findings.problem.names, findings.after.baseline.tolist(), strict=True))
+    assert found.pop("lag") == pytest.approx(0.0, abs=0.05)
+    assert found == pytest.approx({"M": 20.0, "Fv": 60.0, "Fc": 8.0, "offset": -1.0}, rel=0.01)
+
+
+@pytest.mark.parametrize("read", [0.0, 0.75])
+def test_an_effort_that_is_held_over_its_sample_is_no_gap(machine: Make, read: float) -> None:
+    """Drives hold the effort while the position is read at the start of the interval, or late in it."""
+    assert _diagnosed(machine(read=read)).verdict is Verdict.NONE
+
+
+def test_beside_a_held_effort_a_cause_is_found_with_its_size(machine: Make) -> None:
+    findings = _diagnosed(machine(read=0.0, asymmetry=8.0))
+    assert [str(cause.candidate.effect) for cause in findings.causes] == ["asymmetric_viscous"]
+    value, std = _value(findings, "asymmetric_viscous")
+    assert value == pytest.approx(8.0, abs=max(3 * std, 0.1))
+
+
+def test_a_delay_is_named_with_all_of_its_length_beside_a_held_effort(machine: Make) -> None:
+    findings = _diagnosed(machine(read=0.0, delay=0.001))
+    assert [str(cause.candidate.effect) for cause in findings.causes] == ["time_delay"]
+    assert _value(findings, "time_delay")[0] == pytest.approx(0.0015, rel=0.02)
+
+
+def test_a_spring_that_the_library_does_not_have_is_no_ripple(machine: Make) -> None:
+    """Half a period of a sine of the position looks like it."""
+    assert _diagnosed(machine(spring=100.0)).verdict is Verdict.UNKNOWN
 
 
 def test_friction_that_depends_on_direction_is_named_with_its_size(machine: Make) -> None:
@@ -115,6 +142,13 @@ def test_an_axis_at_rest_is_refused(machine: Make) -> None:
         diagnose_axis([still], [], seed=1)
 
 
+def test_an_axis_at_rest_under_a_noisy_encoder_is_refused_as_one_at_rest(machine: Make) -> None:
+    record = machine().drive(1)
+    still = _changed(record, position=1e-6 * np.random.default_rng(5).normal(size=len(record)))
+    with pytest.raises(EstimationError, match="does not move"):
+        diagnose_axis([still], [], seed=1)
+
+
 def test_an_axis_without_any_effort_is_refused(machine: Make) -> None:
     record = machine().drive(1)
     with pytest.raises(EstimationError, match=r"effort of .* never changes"):
@@ -164,6 +198,16 @@ def test_on_the_real_axis_direction_dependent_viscous_friction_is_first_and_a_de
     assert [str(cause.candidate.effect) for cause in emps.causes[:2]] == ["asymmetric_viscous", "time_delay"]
     assert 0.0002 < _value(emps, "time_delay")[0] < 0.001
     assert emps.causes[0].closed > 0.4
+    assert emps.verdict is Verdict.EFFECT
+    named = emps.diagnosis().effects
+    assert [effect.name for effect in named[:2]] == ["asymmetric_viscous", "time_delay"]
+    assert all(effect.probability >= 0.5 for effect in named[:2])
+
+
+@needs_emps
+def test_what_the_real_axis_repeats_beyond_its_causes_is_said_and_makes_them_less_sure(emps: Findings) -> None:
+    assert emps.lasting
+    assert all(cause.probability < 0.9 for cause in emps.causes)
 
 
 @needs_emps

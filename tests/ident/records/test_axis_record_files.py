@@ -207,3 +207,18 @@ def test_a_missing_file_is_named(tmp_path: Path, name: str) -> None:
 def test_an_unknown_ending_is_named(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match=r"\.txt"):
         read_axis_record(tmp_path / "axes.txt")
+
+
+def test_blank_lines_at_the_end_of_a_csv_file_and_other_channels_of_words_are_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "axis.csv"
+    rows = [f"{0.01 * i:.2f},{i * i},1.5,slow" for i in range(20)]
+    path.write_text("\n".join(["time,position,effort,remark", *rows, "", " ", ""]))
+    assert len(read_axis_record(path)) == 20
+
+
+def test_words_in_a_channel_that_is_needed_are_refused_with_the_first_of_them(tmp_path: Path) -> None:
+    path = tmp_path / "axis.csv"
+    rows = [f"{0.01 * i:.2f},{'none' if i == 7 else i},1.5" for i in range(20)]
+    path.write_text("\n".join(["time,position,effort", *rows]))
+    with pytest.raises(RecordError, match="channel position holds 'none' at sample 7"):
+        read_axis_record(path)

@@ -218,6 +218,14 @@ def test_a_word_among_the_numbers_of_a_csv_file_is_refused_with_its_channel(
     assert "decimal point" in error.remedy
 
 
+def test_a_channel_of_words_that_the_contract_does_not_know_is_passed_over(
+    tmp_path: Path, csv_lines: list[str]
+) -> None:
+    path = tmp_path / "record.csv"
+    path.write_text("\n".join([f"{csv_lines[0]},remark", *(f"{line},wet" for line in csv_lines[1:]), ""]))
+    assert "remark" not in read_record(path).segments[0].extra
+
+
 def test_an_empty_csv_file_is_refused(tmp_path: Path) -> None:
     assert "header" in csv_error(tmp_path, "").what
 
