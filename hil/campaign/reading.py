@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +17,7 @@ from ident.campaign.plan import Plan
 from ident.campaign.steps import LOADED
 from ident.errors import RecordError
 from ident.records.files import read_record
-from ident.records.record import Record, Segment, make_segment
-
-PAYLOAD: Final = "payload"
-"""Channel that holds the mass of a known load [kg], of the steps driven with it."""
+from ident.records.record import PAYLOAD, Record, Segment, make_segment
 
 
 def read_run(path: Path) -> Record:

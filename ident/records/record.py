@@ -9,6 +9,7 @@
 | alpha_l, alpha_r | (N, 2) | rad | steering angle of the front wheel of a side |
 | command_torque_{fl,...} | (N, 4) | Nm | optional: commanded at the motor shaft |
 | period | (N,) | - | optional: number of the repeat within the step, -1 outside of any |
+| payload | (N,) | kg | optional: mass of a known load over the centre, the same throughout a step; none: no load |
 """
 
 from __future__ import annotations
@@ -16,14 +17,19 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.errors import RecordError
 from ident.records.checks import refuse_nonfinite, refuse_short, uniform_sample_time
 from ident.vehicle.geometry import WHEELS
 
 Array = NDArray[np.float64]
+
+PAYLOAD: Final = "payload"
+"""Channel that holds the mass of a known load [kg]."""
 
 
 class Step(enum.StrEnum):
@@ -84,6 +90,11 @@ class Segment:
         return len(self.time)
 
     @property
+    def payload(self) -> float:
+        """Mass of a known load [kg]; 0 without any."""
+        return float(self.extra[PAYLOAD][0]) if PAYLOAD in self.extra else 0.0
+
+    @property
     def periods(self) -> list[int]:
         """Numbers of the complete repeats."""
         return [int(number) for number in np.unique(self.period) if number >= 0]
@@ -127,12 +138,19 @@ def make_segment(segment: Segment, source: str) -> Segment:
     """Check a segment and set its sample time from its time channel.
 
     Raises:
-        RecordError: fewer than ten samples, a value that is not finite, or time that is not uniform.
+        RecordError: fewer than ten samples, a value that is not finite, time that is not uniform, or a load that is
+            negative or changes.
     """
     where = f"{source}, step {segment.step!r}"
     refuse_short(len(segment), where)
     for name, values in _measured_channels(segment):
         refuse_nonfinite(name, values, where)
+    load = segment.extra.get(PAYLOAD)
+    if load is not None and (np.ptp(load) or load[0] < 0):
+        raise RecordError(
+            f"{where}: channel {PAYLOAD} is negative or changes.",
+            "Give the mass of the load in kg, the same throughout a step; give a step with another load another name.",
+        )
     return replace(segment, sample_time=uniform_sample_time(segment.time, where))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ident.errors import RecordError
 from ident.records.checks import holds_numbers, numbers, period_numbers
-from ident.records.record import Record, Segment, make_segment
+from ident.records.record import PAYLOAD, Record, Segment, make_segment
 from ident.vehicle.geometry import WHEELS
 
 TORQUES: Final = tuple(f"torque_{wheel}" for wheel in WHEELS)
@@ -26,6 +26,7 @@ CHANNEL_UNITS: Final = {
     "period": "",
     **dict.fromkeys((*TORQUES, *COMMANDS), "Nm"),
     **dict.fromkeys((*WHEEL_ANGLES, *STEERING_ANGLES), "rad"),
+    PAYLOAD: "kg",
 }
 """Unit of each channel of the contract; other channels state their own."""
 
@@ -74,6 +75,8 @@ def _starts(steps: NDArray[Any], time: NDArray[np.float64]) -> list[int]:
 def table_from_record(record: Record) -> dict[str, NDArray[Any]]:
     """Channels by name of all segments behind each other, the inverse of `record_from_table`."""
     parts = [_columns(segment) for segment in record.segments]
+    if any(PAYLOAD in part for part in parts):
+        parts = [{PAYLOAD: np.zeros(len(part["time"])), **part} for part in parts]
     shared = [name for name in parts[0] if all(name in part for part in parts)]
     return {name: np.concatenate([part[name] for part in parts]) for name in shared}
 

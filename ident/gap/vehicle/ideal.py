@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from ident.campaign.excitation import FourierSeries, resting_projection, series_of
 from ident.campaign.steps import EXCITATIONS, StepSpec
-from ident.records.record import Record, Segment, Step, make_segment
+from ident.records.record import PAYLOAD, Record, Segment, Step, make_segment
 from ident.vehicle import dynamics, kinematics
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import Effect, EffectName, make_effect
 from ident.vehicle.modes import Mode
+from ident.vehicle.parameters import PARAMETER_NAMES
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,8 @@ DITHER: Final = 0.15
 """Rms of the torque dither, in units of the rated torque."""
 TURN_TIME: Final = 6.0
 """Of half a turn on the spot [s]."""
+PAYLOAD_MASS: Final = 80.0
+"""Of a known load [kg], a tenth of the vehicle; half as much leaves too little of a drive's gain."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,7 @@ class Drive:
         speed: factor on the step's speed.
         dither: whether the motors work against each other too.
         turned: whether the vehicle is turned by half a turn before.
+        payload: mass of a known load [kg].
     """
 
     step: Step
@@ -45,6 +49,7 @@ class Drive:
     speed: float = 1.0
     dither: bool = False
     turned: bool = False
+    payload: float = 0.0
 
     @property
     def name(self) -> str:
@@ -94,6 +99,10 @@ DIAGNOSTIC: Final[Mapping[str, Experiment]] = MappingProxyType(
             (Drive(Step.STRAIGHT, "slope"), Drive(Step.ROTATION, "slope")),
             (make_effect(EffectName.SLOPE, "chassis", {"angle": 0.035}),),
         ),
+        "known payload": Experiment(
+            "drive straight and rotation with a load of known mass, a tenth of the vehicle or more (--payload)",
+            tuple(Drive(step, "loaded", payload=PAYLOAD_MASS) for step in (Step.STRAIGHT, Step.ROTATION)),
+        ),
     }
 )
 """Experiments by name, the easiest first."""
@@ -117,12 +126,15 @@ def _segment(drive: Drive, vehicle: VehicleDescription, generator: np.random.Gen
     time = np.linspace(0.0, PERIODS * spec.period, PERIODS * per_period, endpoint=False)
     motion = series.evaluate(time)
     alpha, beta, torques = (
-        _lifted(motion, vehicle) if spec.mode is None else _on_the_floor(spec, spec.mode, motion, vehicle)
+        _lifted(motion, vehicle)
+        if spec.mode is None
+        else _on_the_floor(spec, spec.mode, motion, vehicle, drive.payload)
     )
     if drive.dither and spec.mode is not None:
         torques = torques + _dither(spec.mode, alpha, time, vehicle, generator)
     period = np.repeat(np.arange(PERIODS), per_period)
-    return make_segment(Segment(drive.name, 0.0, time, torques, beta, alpha, period), "ideal")
+    extra = {PAYLOAD: np.full(len(time), drive.payload)} if drive.payload else {}
+    return make_segment(Segment(drive.name, 0.0, time, torques, beta, alpha, period, extra=extra), "ideal")
 
 
 def _series(spec: StepSpec, speed: float, generator: np.random.Generator) -> FourierSeries:
@@ -141,7 +153,7 @@ def _lifted(motion: tuple[Array, Array, Array], vehicle: VehicleDescription) -> 
 
 
 def _on_the_floor(
-    spec: StepSpec, mode: Mode, motion: tuple[Array, Array, Array], vehicle: VehicleDescription
+    spec: StepSpec, mode: Mode, motion: tuple[Array, Array, Array], vehicle: VehicleDescription, payload: float
 ) -> tuple[Array, Array, Array]:
     """Angles by the constant column of H_k that these steps drive, torques by (21)."""
     position, velocity, acceleration = motion
@@ -153,7 +165,8 @@ def _on_the_floor(
     velocities[:, row], accelerations[:, row] = velocity, acceleration
     if mode is Mode.ALIGNMENT:
         alpha[:, row] += position
-    torques = dynamics.feed_forward(mode, alpha, velocities, accelerations, vehicle.prior.values, vehicle.geometry)
+    loaded = vehicle.prior.values + payload * (np.array(PARAMETER_NAMES) == "m_ch")
+    torques = dynamics.feed_forward(mode, alpha, velocities, accelerations, loaded, vehicle.geometry)
     return alpha, position[:, None] * column, torques
 
 

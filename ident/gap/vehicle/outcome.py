@@ -6,7 +6,7 @@ a steering encoder that is late or misadjusted is put right in the record.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -17,6 +17,7 @@ from ident.gap.vehicle.rows import SLICES
 from ident.gap.vehicle.signals import shifted
 from ident.gap.vehicle.sources import Source
 from ident.vehicle import kinematics
+from ident.vehicle.effects import EffectName, make_effect
 from ident.vehicle.extended import ExtendedModel
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.kinematics import GENERALIZED_VELOCITIES
@@ -64,7 +65,7 @@ def outcomes(source: Source, model: ExtendedModel, geometry: Geometry) -> list[O
         inputs[:, 0, SLICES["beta"]],
         recorded[:, 0],
     )
-    simulation = Simulation(model, mode, geometry)
+    simulation = Simulation(_loaded(model, source), mode, geometry)
     run = simulation.run_from_readings(start, read, inputs[:, :, SLICES["torques"]], source.sample_time)
     simulated = _velocities(source, inputs, run.readings, geometry)
     names = GENERALIZED_VELOCITIES[mode]
@@ -72,6 +73,13 @@ def outcomes(source: Source, model: ExtendedModel, geometry: Geometry) -> list[O
         Outcome(source.step, name, (simulated - recorded)[:, 1:, names.index(name)], repeat, place)
         for name in source.spec.coordinates
     ]
+
+
+def _loaded(model: ExtendedModel, source: Source) -> ExtendedModel:
+    """The model with the known load of a segment aboard."""
+    mass = float(source.inputs[0, SLICES["payload"].start])
+    load = make_effect(EffectName.PAYLOAD, "chassis", {"mass": mass, "inertia": 0.0})
+    return replace(model, effects=(*model.effects, load)) if mass else model
 
 
 def _starts(source: Source, length: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:

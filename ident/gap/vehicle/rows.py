@@ -59,6 +59,7 @@ _SIZES: Final = {
     "rattle": 4,
     "wander": 2,
     "rest": 4,
+    "payload": 1,
 }
 _ENDS: Final = np.cumsum(list(_SIZES.values())).tolist()
 SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS, strict=True)}
@@ -70,6 +71,8 @@ roll as the others say, and `motor_acceleration` stays that of the motor.
 Zero but where something is loose: `hammer` [-], `swing` and `rattle` [rad] where a motor rattles in its gear
 (`ident.gap.vehicle.rattling`), `wander` [rad] where it can be told how far a rear unit moves in its coupling
 (`ident.gap.vehicle.wandering`), `rest` [rad] where a motor moves whose wheel rests (`ident.gap.vehicle.resting`).
+
+`payload` is the mass of a known load [kg].
 """
 
 INPUTS: Final = _ENDS[-1]
@@ -107,6 +110,7 @@ class _Inputs:
     rattle: Expression
     wander: Expression
     rest: Expression
+    payload: Expression
 
 
 @dataclass(frozen=True)
@@ -154,6 +158,8 @@ def kinematic_coordinates(spec: RowsOfStep) -> tuple[str, ...]:
 
 def dynamic_rows(mode: Mode | None, z: _Inputs, parameters: Expression, terms: Sequence[EffectTerm]) -> Expression:
     """Generalized forces that must sum to zero, (n_k,), or (4,) with the wheels in the air."""
+    known = EffectTerm(EffectName.PAYLOAD, "chassis", {"mass": z.payload, "inertia": 0.0})
+    terms = [*terms, known]
     alpha, radii = true_steering(terms, z.alpha), rolling_radii(terms, z.beta)
     rates, accelerations = _lifted(z) if mode is None else _on_the_floor(z, alpha, radii)
     state = State(z.heading, alpha, z.beta, rates, accelerations)

@@ -59,6 +59,7 @@ class Signals:
         for name in ("alpha", "beta", "alpha_rate", "beta_rate", "alpha_acceleration", "beta_acceleration", "torques"):
             inputs[:, SLICES[name]] = getattr(self, name)
         inputs[:, SLICES["motor_acceleration"]] = self.beta_acceleration
+        inputs[:, SLICES["payload"]] = self.segment.payload
         return inputs
 
     @property

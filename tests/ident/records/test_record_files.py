@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -332,3 +333,18 @@ def test_an_mf4_file_without_channels_is_refused(tmp_path: Path) -> None:
         mdf.save(tmp_path / "record.mf4", overwrite=True)
     with pytest.raises(RecordError, match="no channels"):
         read_record(tmp_path / "record.mf4")
+
+
+def test_a_known_load_is_of_its_step_and_comes_back_from_a_file(tmp_path: Path, table_of: Callable[..., Table]) -> None:
+    table = table_of(("straight", "straight_loaded"))
+    record = record_from_table({**table, "payload": np.where(table["step"] == "straight", 0.0, 40.0)}, "memory")
+    assert [segment.payload for segment in record.segments] == [0.0, 40.0]
+    bare = replace(record, segments=[replace(record.segments[0], extra={}), record.segments[1]])
+    write_record(bare, tmp_path / "record.csv")
+    assert [segment.payload for segment in read_record(tmp_path / "record.csv").segments] == [0.0, 40.0]
+
+
+@pytest.mark.parametrize("load", [np.linspace(0, 40, 20), np.full(20, -3.0)])
+def test_a_load_that_changes_or_pulls_up_is_refused(table_of: Callable[..., Table], load: NDArray) -> None:
+    with pytest.raises(RecordError, match="payload is negative or changes"):
+        record_from_table({**table_of(), "payload": load}, "memory")

@@ -57,6 +57,23 @@ def test_a_perfect_vehicle_leaves_nothing(vehicle: VehicleDescription) -> None:
             assert np.sqrt(np.mean(left**2)) < block.tolerance, block.label
 
 
+LOADED = DIAGNOSTIC["known payload"].drives
+
+
+def test_a_known_load_is_part_of_the_model(vehicle: VehicleDescription) -> None:
+    for block in problem_of(ideal_record(LOADED, vehicle), vehicle).blocks:
+        if block.channel is Channel.DYNAMIC:
+            left = (block.target - of_the_model(block) @ vehicle.prior.values)[block.moving]
+            assert np.abs(left).max() < 3e-3 * np.abs(block.target).max(), block.label
+
+
+def test_a_load_that_the_record_does_not_state_is_found_as_a_payload(vehicle: VehicleDescription) -> None:
+    silent = flawed(ideal_record(LOADED, vehicle), lambda segment: replace(segment, extra={}))
+    problem = problem_of(silent, vehicle, EffectName.PAYLOAD)
+    mass, _ = recovered(problem, "payload@chassis", vehicle)
+    assert mass == pytest.approx(LOADED[0].payload, rel=0.01)
+
+
 def test_dynamic_rows_are_those_of_the_estimator(vehicle: VehicleDescription) -> None:
     record = ideal_record(FOUR, vehicle)
     blocks = [block for block in problem_of(record, vehicle).blocks if block.channel is Channel.DYNAMIC]

@@ -41,6 +41,12 @@ def test_dither_shows_the_gain_of_every_drive(prototype: VehicleDescription) -> 
     assert all(sights[f"torque_gain@drive_{wheel}"].visible for wheel in ("fl", "rl", "fr", "rr"))
 
 
+def test_a_known_load_shows_the_gain_of_a_drive(prototype: VehicleDescription) -> None:
+    """Otherwise every parameter is larger by as much."""
+    assert not sights_of("four steps", prototype)["torque_gain@drive_fl"].visible
+    assert sights_of("known payload", prototype)["torque_gain@drive_fl"].visible
+
+
 def test_the_centre_of_mass_shows_where_weight_pulls_while_the_vehicle_turns(prototype: VehicleDescription) -> None:
     assert sights_of("on a slope", prototype)["com_offset@chassis"].visible
 
