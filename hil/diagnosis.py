@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -16,15 +16,17 @@ from hil.campaign.reading import read_any
 from hil.network import load_network
 from ident.errors import RecordError, UserError
 from ident.gap.axis.diagnose import diagnose_axis
-from ident.gap.diagnosis import Diagnosis, refuse_folder, write_diagnosis
+from ident.gap.diagnosis import Diagnosis, Verdict, refuse_folder, write_diagnosis
 from ident.gap.findings import Findings
+from ident.gap.vehicle.closing import extended_model
 from ident.gap.vehicle.diagnose import diagnose_vehicle
+from ident.gap.vehicle.unseen import unseen_gaps
 from ident.records.axis_record import AxisKind, AxisRecord, read_axis_record
 from ident.records.record import Record
 from ident.report.gap import GapReport, write_gap_report
 from ident.report.gap_summary import summary_lines
 from ident.vehicle.description import VehicleDescription, load_vehicle
-from ident.vehicle.extended import read_model
+from ident.vehicle.extended import ExtendedModel, read_model, write_model
 
 Array = NDArray[np.float64]
 
@@ -51,7 +53,7 @@ class DiagnosisOrder:
         model: `parameters.toml` that is judged; None: the parameters are refitted.
         axis: the records are of servo axes.
         seed: of the surrogates.
-        json, report: files to write, or None.
+        json, report, extended: files to write, or None; `extended` is the model with the effects that are named.
     """
 
     records: tuple[Path, ...]
@@ -62,17 +64,19 @@ class DiagnosisOrder:
     seed: int
     json: Path | None
     report: Path | None
+    extended: Path | None = None
 
     @property
     def files(self) -> tuple[Path, ...]:
         """What is to be written."""
-        return tuple(path for path in (self.json, self.report) if path is not None)
+        return tuple(path for path in (self.json, self.report, self.extended) if path is not None)
 
 
 @dataclass(frozen=True)
 class _Answer:
     findings: Findings
     diagnosis: Diagnosis
+    model: ExtendedModel | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -104,8 +108,7 @@ def diagnose_records(order: DiagnosisOrder, console: Console) -> Diagnosis:
     Raises:
         UserError: a record, the model or the vehicle cannot be used, or a record is to confirm itself.
     """
-    for path in order.files:
-        refuse_folder(path)
+    _refuse_unwritable(order)
     with console.status("diagnosing"):
         answer = _axis_answer(order) if order.axis else _vehicle_answer(order)
     for line in (*summary_lines(answer.findings, answer.diagnosis), *answer.notes):
@@ -116,11 +119,35 @@ def diagnose_records(order: DiagnosisOrder, console: Console) -> Diagnosis:
         write_gap_report(GapReport(answer.findings, answer.diagnosis, fitted, confirmed, model), order.report)
     if order.json is not None:
         write_diagnosis(answer.diagnosis, order.json)
-    if order.files:
+    if order.extended is not None and answer.model is not None:
+        write_model(answer.model, order.extended, {"run": "diagnosis", "records": _names(order.records)})
+    if order.extended is not None and answer.model is None:
         console.print(
-            f"Written: {', '.join(str(path) for path in order.files)}", highlight=False, markup=False, soft_wrap=True
+            f"{order.extended} is not written: no effect is named.", highlight=False, markup=False, soft_wrap=True
         )
+    written = [str(path) for path in order.files if path != order.extended or answer.model is not None]
+    if written:
+        console.print(f"Written: {', '.join(written)}", highlight=False, markup=False, soft_wrap=True)
     return answer.diagnosis
+
+
+def _refuse_unwritable(order: DiagnosisOrder) -> None:
+    """Refuse what could not be written, before the work.
+
+    Raises:
+        UserError: a name is that of a folder, or there is no such model.
+    """
+    for path in order.files:
+        refuse_folder(path)
+    if order.axis and order.extended is not None:
+        raise UserError(
+            "--extended writes a model of the platform, --axis says that the records are of servo axes.",
+            "Leave one of them out; --json holds the causes of an axis.",
+        )
+
+
+def _names(paths: Sequence[Path]) -> str:
+    return ", ".join(path.name for path in paths)
 
 
 def _axis_answer(order: DiagnosisOrder) -> _Answer:
@@ -133,7 +160,7 @@ def _axis_answer(order: DiagnosisOrder) -> _Answer:
     _refuse_repeated([_of_axes(record) for record in (*records, *confirming)])
     findings = diagnose_axis(records, confirming, seed=order.seed)
     assumed = [axis.kind for record in records for axis in record.axes if axis.assumed]
-    return _Answer(findings, findings.diagnosis(), (ASSUMED[assumed[0]],) if assumed else ())
+    return _Answer(findings, findings.diagnosis(), notes=(ASSUMED[assumed[0]],) if assumed else ())
 
 
 def _vehicle_answer(order: DiagnosisOrder) -> _Answer:
@@ -143,7 +170,11 @@ def _vehicle_answer(order: DiagnosisOrder) -> _Answer:
     records, confirming = ([read_any(path, network) for path in paths] for paths in (order.records, order.confirm))
     _refuse_repeated([part for record in (*records, *confirming) for part in _of_vehicle(record)])
     found = diagnose_vehicle(records, confirming, vehicle, model, seed=order.seed)
-    return _Answer(found.findings, found.diagnosis)
+    given = model.effects if model is not None else ()
+    diagnosis = replace(found.diagnosis, unseen=unseen_gaps(found.findings, records, confirming, vehicle, given))
+    named = diagnosis.verdict is Verdict.EFFECT
+    extended = extended_model(found.findings, vehicle.prior, given=given) if named else None
+    return _Answer(found.findings, diagnosis, extended)
 
 
 def _vehicle(order: DiagnosisOrder) -> VehicleDescription:

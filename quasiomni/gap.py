@@ -31,8 +31,11 @@ def diagnose(
     ] = False,
     json: Annotated[Path | None, typer.Option(help="Write diagnosis.json here.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write an HTML report here.")] = None,
+    extended: Annotated[
+        Path | None, typer.Option(help="Write the parameters.toml of the model with the effects named here.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the surrogates.")] = 1,
 ) -> None:
     """Say why model and machine disagree: which effect, where, how sure, how much it closes, what to do next."""
     given = tuple(records), tuple(confirm or ())
-    diagnose_records(DiagnosisOrder(*given, vehicle, model, axis, seed, json, report), console)
+    diagnose_records(DiagnosisOrder(*given, vehicle, model, axis, seed, json, report, extended), console)

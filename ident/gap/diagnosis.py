@@ -83,8 +83,23 @@ class Gap:
 
 
 @dataclass(frozen=True)
+class Unseen:
+    """The gap of one channel in whole steps that took no part in the fit.
+
+    Attributes:
+        steps: `repeated` for those that the diagnosis compares, `lane_change`.
+        channel: kinematic, dynamic or outcome.
+        gap: in units of the noise.
+    """
+
+    steps: str
+    channel: str
+    gap: Gap
+
+
+@dataclass(frozen=True)
 class Diagnosis:
-    """The content of `diagnosis.json`.
+    """The content of `diagnosis.json`, which other programs read and which therefore stays as it is; and `unseen`.
 
     Attributes:
         verdict: what kind of answer it is.
@@ -93,6 +108,8 @@ class Diagnosis:
         gap: on held-out rows.
         invisible: names of effects that these records cannot show anywhere.
         next_experiment: what would split an ambiguity or show what is invisible; None where nothing would.
+        unseen: gap by channel (kinematic, dynamic, outcome) of whole records that took no part in the fit; empty where
+            there is no model to simulate.
     """
 
     verdict: Verdict
@@ -101,6 +118,7 @@ class Diagnosis:
     gap: Gap
     invisible: tuple[str, ...]
     next_experiment: str | None
+    unseen: tuple[Unseen, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Plain values, numbers that JSON can hold."""

@@ -46,6 +46,23 @@ class Cause:
 
 
 @dataclass(frozen=True)
+class HeldOut:
+    """What was fitted without the confirming rows, and the problem that they come from.
+
+    Attributes:
+        problem: that confirms.
+        plain, extended: refits without and with the causes.
+        before, after: models (N,) of every block of `problem`; before is the model that was given, or that refit.
+    """
+
+    problem: Problem
+    plain: Refit
+    extended: Refit
+    before: tuple[Array, ...]
+    after: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
 class Findings:
     """Everything that was found.
 
@@ -63,6 +80,7 @@ class Findings:
         lasting: whether something repeats in every record, above its limit, that the effects leave.
         repeated_before, repeated_after: rms over noise of what repeats, by step and coordinate.
         problem: that was fitted.
+        held_out: models that the confirming rows took no part in.
     """
 
     verdict: Verdict
@@ -80,6 +98,7 @@ class Findings:
     repeated_before: Mapping[str, float]
     repeated_after: Mapping[str, float]
     problem: Problem
+    held_out: HeldOut
 
     def diagnosis(self, next_experiment: str | None = None) -> Diagnosis:
         """The answer as it is written down."""

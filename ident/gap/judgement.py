@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.gap.diagnosis import Gap, Verdict
-from ident.gap.findings import Cause, Findings
+from ident.gap.findings import Cause, Findings, HeldOut
 from ident.gap.generic import SmoothFunction
 from ident.gap.limits import Limits
 from ident.gap.linear import least_squares, rms
 from ident.gap.probability import calibration, rank
 from ident.gap.problem import Candidate, Problem
-from ident.gap.refit import refit
+from ident.gap.refit import Refit, refit
 from ident.gap.regression import Regression
 from ident.gap.remainder import held_out_gap, lasting, noise_floors, repeated, shares
 from ident.gap.search import Found
@@ -64,6 +64,7 @@ class Judgement:
             repeated_before=self._sizes(self._judged()),
             repeated_after=self._sizes(self.after.blocks),
             problem=self.problems[0],
+            held_out=self._held_out(),
         )
 
     def refuted(self) -> frozenset[str]:
@@ -100,7 +101,7 @@ class Judgement:
     @cached_property
     def _exactly(self) -> Gap:
         """With all effects, as their exact forms."""
-        return self._gap(self.found.variants, exact=True)
+        return held_out_gap(self.rows, self.floors, self.untouched, self._extended_models)
 
     @property
     def _removable(self) -> float:
@@ -133,15 +134,33 @@ class Judgement:
             return self.before.blocks
         return [block.baseline @ nominal.values for block, _ in self.rows.blocks]
 
-    def _held_out_models(self, variants: Sequence[int], *, exact: bool = False) -> Sequence[Array]:
-        """Models of all blocks, fitted without the confirming rows, every coordinate in units of its residual."""
+    def _held_out_models(self, variants: Sequence[int]) -> Sequence[Array]:
+        """Models of all blocks, fitted without the confirming rows."""
         if not variants and self.problems[0].nominal is not None:
             return self._judged()
-        held_out = ~self.rows.confirming
-        return refit(self.problems, self.regression, variants, self.weights, held_out, exact=exact).blocks
+        return self._held_out_refit(variants).blocks
 
-    def _gap(self, variants: Sequence[int], *, exact: bool = False) -> Gap:
-        return held_out_gap(self.rows, self.floors, self.untouched, self._held_out_models(variants, exact=exact))
+    def _held_out_refit(self, variants: Sequence[int], *, exact: bool = False) -> Refit:
+        """Fitted without the confirming rows, every coordinate in units of its residual."""
+        fitted = ~self.rows.confirming
+        return refit(self.problems, self.regression, variants, self.weights, fitted, exact=exact)
+
+    @cached_property
+    def _extended(self) -> Refit:
+        """With all effects, as their exact forms, without the confirming rows."""
+        return self._held_out_refit(self.found.variants, exact=True)
+
+    @property
+    def _extended_models(self) -> Sequence[Array]:
+        return self._extended.blocks if self.found.variants else self.untouched
+
+    def _held_out(self) -> HeldOut:
+        confirming = slice(len(self.problems[0].blocks), None)
+        before, after = (tuple(models[confirming]) for models in (self.untouched, self._extended_models))
+        return HeldOut(self.problems[1], self._held_out_refit(()), self._extended, before, after)
+
+    def _gap(self, variants: Sequence[int]) -> Gap:
+        return held_out_gap(self.rows, self.floors, self.untouched, self._held_out_models(variants))
 
     @cached_property
     def _closed(self) -> list[float]:

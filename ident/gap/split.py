@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ident.gap.problem import Block, Problem
 
@@ -22,11 +23,15 @@ def split_problem(problem: Problem) -> tuple[Problem, Problem]:
     return replace(problem, blocks=fitted), replace(problem, blocks=confirmed)
 
 
+def fitted_repeats(repeats: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Of the numbers of repeats (P,), in order, those that are fitted; the others confirm."""
+    return repeats[: (len(repeats) + 1) // 2]
+
+
 def _part(block: Block, *, confirming: bool) -> Block:
     repeats = np.unique(block.period[block.period >= 0])
     if len(repeats) >= 2:
-        first = repeats[: (len(repeats) + 1) // 2]
-        inside = (block.period >= 0) & (np.isin(block.period, first) != confirming)
+        inside = (block.period >= 0) & (np.isin(block.period, fitted_repeats(repeats)) != confirming)
         return replace(block, moving=block.moving & inside, period=np.where(inside, block.period, -1))
     rows = np.flatnonzero(block.moving)
     border = rows[int(FITTED * (len(rows) - 1))] if rows.size else 0

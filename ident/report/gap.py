@@ -14,6 +14,7 @@ from plotly import offline
 
 from ident.gap.diagnosis import Diagnosis, Verdict, write_whole
 from ident.gap.findings import Cause, Findings
+from ident.gap.vehicle.outcome import HORIZON
 from ident.report import digits
 from ident.report.gap_figures import Figure, map_figure, residual_figures
 from ident.report.gap_summary import gap_line, next_text, plain, verdict_line
@@ -89,6 +90,8 @@ def render_gap_report(content: GapReport) -> str:
         verdict=str(diagnosis.verdict),
         headline=verdict_line(diagnosis, findings),
         gap=diagnosis.gap,
+        unseen=diagnosis.unseen,
+        horizon=HORIZON,
         gap_text=gap_line(findings, diagnosis),
         next=next_text(diagnosis),
         rows=[_row(cause, content) for cause in findings.causes],

@@ -75,11 +75,11 @@ def _place(region: str) -> tuple[int, str]:
 
 
 def residual_figures(findings: Findings) -> list[tuple[str, str, Figure]]:
-    """Key, title and figure of what the model leaves, before and after; the largest gap over its noise first."""
+    """Key, title and figure of what models leave of held-out data; the largest gap over its noise first."""
     drawn: list[tuple[str, str, Figure]] = []
-    blocks = findings.problem.blocks
-    before, after = _judged(findings), findings.after.blocks[: len(blocks)]
-    rows = make_rows(replace(findings.problem, candidates=()))
+    held_out = findings.held_out
+    blocks, before, after = held_out.problem.blocks, held_out.before, held_out.after
+    rows = make_rows(replace(held_out.problem, candidates=()))
     floors = noise_floors(rows, after, rows.target - rows.stack(list(after)))
     sizes = [_size(*one) for one in zip(blocks, before, floors.tolist(), strict=True)]
     shown = [index for index in np.argsort(sizes)[::-1].tolist() if kept_rows(blocks[index]).samples.size]
@@ -92,14 +92,6 @@ def residual_figures(findings: Findings) -> list[tuple[str, str, Figure]]:
         title = f"{block.step} · {block.coordinate}{channel}: {significant(sizes[index], 2)} times the noise"
         drawn.append((f"residual-{index}", title, _residual(block, models)))
     return drawn
-
-
-def _judged(findings: Findings) -> Sequence[Array]:
-    """The model of every fitted block that is judged: as given, or refitted without the causes."""
-    blocks, nominal = findings.problem.blocks, findings.problem.nominal
-    if nominal is None:
-        return findings.before.blocks[: len(blocks)]
-    return [block.baseline @ nominal.values for block in blocks]
 
 
 def _size(block: Block, model: Array, floor: float) -> float:

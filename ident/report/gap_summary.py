@@ -8,7 +8,7 @@ from ident.gap.diagnosis import Diagnosis, NamedEffect, Share, Verdict
 from ident.gap.findings import Cause, Findings
 from ident.report.digits import percent, significant, unit_text, with_std
 
-MOST_CAUSES: Final = 4
+MOST_LINES: Final = 10
 MOST_EVENTS: Final = 3
 
 _VERDICTS: Final = {
@@ -17,11 +17,13 @@ _VERDICTS: Final = {
     Verdict.UNKNOWN: "Something is missing that the library has no name for.",
 }
 
+_UNSEEN: Final = {"repeated": "Held-out steps, times the noise", "lane_change": "Lane change, times the noise"}
+
 
 def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
     """At most ten lines: verdict, causes, gap, where, what cannot be seen, what to do."""
-    lines = [verdict_line(diagnosis, findings), *(cause_line(effect) for effect in diagnosis.effects[:MOST_CAUSES])]
-    lines.append(gap_line(findings, diagnosis))
+    lines = [gap_line(findings, diagnosis)]
+    lines += unseen_lines(diagnosis)
     place = largest_share(diagnosis)
     if place is not None and diagnosis.verdict is not Verdict.NONE:
         lines.append(f"Where: {percent(place.share)} of it in {place_text(place)}.")
@@ -32,7 +34,8 @@ def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
     if diagnosis.invisible:
         lines.append(f"These records cannot show: {', '.join(diagnosis.invisible)}.")
     lines.append(f"Next: {next_text(diagnosis)}")
-    return lines
+    causes = [cause_line(effect) for effect in diagnosis.effects]
+    return [verdict_line(diagnosis, findings), *causes[: MOST_LINES - 1 - len(lines)], *lines]
 
 
 def verdict_line(diagnosis: Diagnosis, findings: Findings) -> str:
@@ -65,6 +68,20 @@ def gap_line(findings: Findings, diagnosis: Diagnosis) -> str:
     return f"{before}, {significant(gap.after)} with the causes in the model: {percent(gap.closed)} of it closed{rest}."
 
 
+def unseen_lines(diagnosis: Diagnosis) -> list[str]:
+    """The gap of whole steps that took no part, by channel: a line for those that repeat, one for a lane change."""
+    named = diagnosis.verdict is Verdict.EFFECT
+    lines = []
+    for steps, title in _UNSEEN.items():
+        texts = [
+            f"{one.channel} {significant(one.gap.before)}" + (f" to {significant(one.gap.after)}" if named else "")
+            for one in diagnosis.unseen
+            if one.steps == steps
+        ]
+        lines += [f"{title}: {', '.join(texts)}."] if texts else []
+    return lines
+
+
 def largest_share(diagnosis: Diagnosis) -> Share | None:
     """The step and coordinate in which most of the gap lies."""
     whole = [share for share in diagnosis.where if share.region == "all" and share.share > 0]
@@ -86,7 +103,9 @@ def next_text(diagnosis: Diagnosis) -> str:
     if diagnosis.next_experiment:
         return diagnosis.next_experiment
     if diagnosis.verdict is Verdict.EFFECT:
-        return "put the causes into the model, and check it on another record."
+        model = "put the causes into the model"
+        written = f"{model} (--extended FILE writes it)" if diagnosis.unseen else model
+        return f"{written}, and check it on another record."
     if diagnosis.verdict is Verdict.UNKNOWN:
         return "look at the map of the gap (--report), and drive other speeds and loads where it lies."
     return "use the model."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from ident.gap.vehicle.ideal import FOUR, ideal_record
 from ident.records.channels import Channels, write_channels
+from ident.records.files import write_record
+from ident.records.record import Record
+from ident.vehicle.description import load_vehicle
+from ident.vehicle.extended import read_model
 
 Quasi = Callable[..., Any]
 
@@ -137,3 +143,35 @@ def test_a_folder_cannot_be_written_over(quasi: Quasi, record: Callable[..., Pat
     answer = quasi("diagnose", record(3), "--axis", "--json", tmp_path)
     assert answer.code == 2
     assert "is a folder" in answer.error
+
+
+def _platform(seed: int, path: Path) -> Path:
+    """A record of the four steps whose motor fr gives 0.05 Nm more than its drive reports."""
+    generator = np.random.default_rng(seed)
+    segments = []
+    for segment in ideal_record(FOUR, load_vehicle("prototype"), seed).segments:
+        noise = 0.01 * generator.normal(size=segment.motor_torques.shape)
+        torques = segment.motor_torques - np.array([0, 0, 0.05, 0]) + noise
+        segments.append(replace(segment, motor_torques=torques))
+    write_record(Record(segments, path.name), path)
+    return path
+
+
+def test_the_model_with_its_effects_is_written_for_every_command_that_takes_a_model(
+    quasi: Quasi, tmp_path: Path
+) -> None:
+    fit, confirm = (_platform(seed, tmp_path / f"run{seed}.parquet") for seed in (1, 2))
+    extended = tmp_path / "extended.toml"
+    answer = quasi("diagnose", fit, "--confirm", confirm, "--extended", extended)
+    assert answer.code == 0
+    assert "outcome" in answer.out
+    effect = read_model(extended).effects[0]
+    assert effect.where in ("drive_fr", "wheel_fr")
+    judged = quasi("diagnose", fit, "--confirm", confirm, "--model", extended, "--extended", tmp_path / "again.toml")
+    assert "Nothing is missing" in judged.out
+    assert "again.toml is not written: no effect is named." in " ".join(judged.out.split())
+    assert not (tmp_path / "again.toml").exists()
+
+
+def test_there_is_no_such_model_of_an_axis(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
+    assert "--extended" in _refused(quasi, tmp_path, record(1), "--axis", "--extended", tmp_path / "model.toml")

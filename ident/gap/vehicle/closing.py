@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -22,7 +22,7 @@ from ident.gap.vehicle.sources import Source, sources_of
 from ident.records.record import Record
 from ident.records.repeats import repeats_of
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.effects import EffectName, make_effect
+from ident.vehicle.effects import Effect, EffectName, make_effect
 from ident.vehicle.extended import ExtendedModel
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
@@ -48,7 +48,9 @@ class Series:
     least: float = 0.0
 
 
-def extended_model(findings: Findings, guesses: Parameters) -> ExtendedModel:
+def extended_model(
+    findings: Findings, guesses: Parameters, *, given: Sequence[Effect] = (), held_out: bool = False
+) -> ExtendedModel:
     """The parameters refitted jointly with the effects that were found, and these effects.
 
     A changed parameter is one of them; the parameters are those of the model that was judged.
@@ -57,23 +59,29 @@ def extended_model(findings: Findings, guesses: Parameters) -> ExtendedModel:
         findings: of a diagnosis.
         guesses: the vehicle file's, for what the records do not show where no model was given (the four steps do not
             split B_w from inertias and mass, and a gear that gives way needs it).
+        given: effects that the model that was judged has already.
+        held_out: whether the confirming rows take no part.
     """
-    refit = findings.after
+    refit = findings.held_out.extended if held_out else findings.after
+    candidates = {cause.candidate.key: cause.candidate for cause in findings.causes}
     effects = []
-    for cause in findings.causes:
-        names = [entry.name for entry in cause.candidate.parameters]
-        values = dict(zip(names, cause.part.values.tolist(), strict=True))
-        std = dict(zip(names, cause.part.std.tolist(), strict=True))
-        effects.append(make_effect(EffectName(cause.candidate.effect), cause.candidate.where, values, std))
-    return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), tuple(effects))
+    for part in refit.parts:
+        candidate = candidates[part.key]
+        names = [entry.name for entry in candidate.parameters]
+        values, std = (dict(zip(names, numbers.tolist(), strict=True)) for numbers in (part.values, part.std))
+        effects.append(make_effect(EffectName(candidate.effect), candidate.where, values, std))
+    return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), (*given, *effects))
 
 
-def plain_model(findings: Findings, guesses: Parameters) -> ExtendedModel:
-    """The model that is judged: as given, or refitted without any effect, with guesses as in `extended_model`."""
+def plain_model(
+    findings: Findings, guesses: Parameters, *, given: Sequence[Effect] = (), held_out: bool = False
+) -> ExtendedModel:
+    """The model that is judged: as given, or refitted without any effect; all else as in `extended_model`."""
     nominal = findings.problem.nominal
     if nominal is not None:
-        return ExtendedModel(_stated(nominal.values, nominal.std))
-    return ExtendedModel(_guessed_where_unseen(findings.before, findings.problem, guesses))
+        return ExtendedModel(_stated(nominal.values, nominal.std), tuple(given))
+    refit = findings.held_out.plain if held_out else findings.before
+    return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), tuple(given))
 
 
 def _guessed_where_unseen(refit: Refit, problem: Problem, guesses: Parameters) -> Parameters:
@@ -94,6 +102,25 @@ def _stated(values: Array, std: Array) -> Parameters:
     return Parameters(values[stated], std[stated])
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """What two models leave of the same segments.
+
+    Attributes:
+        before, after: one a coordinate and segment, in the same order.
+        floors: rms of the noise by channel and coordinate.
+    """
+
+    before: Sequence[Series]
+    after: Sequence[Series]
+    floors: Mapping[tuple[Channel, str], float]
+
+    def gaps(self, chosen: Callable[[str], bool] = lambda _: True) -> Mapping[Channel, Gap]:
+        """Gap by channel of the steps whose names are chosen; NaN where nothing has a floor."""
+        pairs = [pair for pair in zip(self.before, self.after, strict=True) if chosen(pair[0].step)]
+        return {channel: _gap(channel, pairs, self.floors) for channel in Channel}
+
+
 def channel_gaps(
     records: Sequence[Record],
     vehicle: VehicleDescription,
@@ -102,7 +129,19 @@ def channel_gaps(
     *,
     repeated: Sequence[Record] = (),
 ) -> Mapping[Channel, Gap]:
-    """Gap of two models on records, by channel, in units of the noise between repeats of each coordinate.
+    """Gap of two models on records, by channel: that of all steps of `compared`."""
+    return compared(records, vehicle, before, after, repeated=repeated).gaps()
+
+
+def compared(
+    records: Sequence[Record],
+    vehicle: VehicleDescription,
+    before: ExtendedModel,
+    after: ExtendedModel,
+    *,
+    repeated: Sequence[Record] = (),
+) -> Comparison:
+    """Two models on records, in units of the noise between repeats of each coordinate.
 
     Args:
         records: that neither model was fitted to; a lane change counts too.
@@ -115,14 +154,16 @@ def channel_gaps(
     """
     processing = Processing()
 
-    def left_by(model: ExtendedModel, some: Sequence[Record]) -> list[Series]:
+    def rows_of(some: Sequence[Record]) -> list[Source]:
         steps, lengths = tuple(ROWS), vehicle.geometry
-        sources = [s for record in some for s in sources_of(record, lengths, steps, processing, as_recorded=True)]
-        return list(_series(sources, vehicle, model, processing))
+        return [s for record in some for s in sources_of(record, lengths, steps, processing, as_recorded=True)]
 
-    first, second = left_by(before, records), left_by(after, records)
-    floors = _floors([*second, *(left_by(after, repeated) if repeated else ())])
-    return {channel: _gap(channel, first, second, floors) for channel in Channel}
+    def left_by(model: ExtendedModel, sources: Sequence[Source]) -> list[Series]:
+        return list(_series(sources, vehicle, model, processing)) if sources else []
+
+    sources = rows_of(records)
+    first, second = left_by(before, sources), left_by(after, sources)
+    return Comparison(first, second, _floors([*second, *left_by(after, rows_of(repeated))]))
 
 
 def _series(
@@ -177,12 +218,10 @@ def _floors(series: Sequence[Series]) -> Mapping[tuple[Channel, str], float]:
     return floors
 
 
-def _gap(
-    channel: Channel, before: Sequence[Series], after: Sequence[Series], floors: Mapping[tuple[Channel, str], float]
-) -> Gap:
+def _gap(channel: Channel, pairs: Sequence[tuple[Series, Series]], floors: Mapping[tuple[Channel, str], float]) -> Gap:
     sums, count = np.zeros(2), 0
-    for first, second in zip(before, after, strict=True):
-        floor = floors.get((channel, first.coordinate), 0.0)
+    for first, second in pairs:
+        floor = max(floors.get((channel, first.coordinate), 0.0), first.least)
         if first.channel is channel and floor > 0:
             sums += [float(np.sum((one.folded / floor) ** 2)) for one in (first, second)]
             count += first.folded.size
