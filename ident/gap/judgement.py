@@ -134,16 +134,16 @@ class Judgement:
             return self.before.blocks
         return [block.baseline @ nominal.values for block, _ in self.rows.blocks]
 
-    def _held_out_models(self, variants: Sequence[int]) -> Sequence[Array]:
+    def _held_out_models(self, variants: Sequence[int], *, held: bool = False) -> Sequence[Array]:
         """Models of all blocks, fitted without the confirming rows."""
-        if not variants and self.problems[0].nominal is not None:
+        if not variants and self._is_given:
             return self._judged()
-        return self._held_out_refit(variants).blocks
+        return self._held_out_refit(variants, held=held).blocks
 
-    def _held_out_refit(self, variants: Sequence[int], *, exact: bool = False) -> Refit:
+    def _held_out_refit(self, variants: Sequence[int], *, exact: bool = False, held: bool = False) -> Refit:
         """Fitted without the confirming rows, every coordinate in units of its residual."""
         fitted = ~self.rows.confirming
-        return refit(self.problems, self.regression, variants, self.weights, fitted, exact=exact)
+        return refit(self.problems, self.regression, variants, self.weights, fitted, exact=exact, held=held)
 
     @cached_property
     def _extended(self) -> Refit:
@@ -159,14 +159,22 @@ class Judgement:
         before, after = (tuple(models[confirming]) for models in (self.untouched, self._extended_models))
         return HeldOut(self.problems[1], self._held_out_refit(()), self._extended, before, after)
 
-    def _gap(self, variants: Sequence[int]) -> Gap:
-        return held_out_gap(self.rows, self.floors, self.untouched, self._held_out_models(variants))
+    @property
+    def _is_given(self) -> bool:
+        """Whether a model is judged: what an effect closes is then what those values lack without it."""
+        return self.problems[0].nominal is not None
+
+    def _gap(self, variants: Sequence[int], *, held: bool = False) -> Gap:
+        models = self._held_out_models(variants, held=held)
+        return held_out_gap(self.rows, self.floors, self.untouched, models)
 
     @cached_property
     def _closed(self) -> list[float]:
         """Share of the removable held-out gap that each effect closes, the others given; all as their columns."""
         whole, removable = self._whole, self._removable
-        without = [self._gap(self._others(index)).after for index in range(len(self.found.variants))]
+        without = [
+            self._gap(self._others(index), held=self._is_given).after for index in range(len(self.found.variants))
+        ]
         return [(after**2 - whole.after**2) / removable if removable > 0 else 0.0 for after in without]
 
     @property
@@ -206,9 +214,13 @@ class Judgement:
         return self._measurable() and self._exactly.closed < least
 
     def _foreign(self) -> bool:
-        """Whether something lasts in rows that the model itself says nothing of: what shows there is all of a cause."""
+        """Whether something lasts in rows that the model itself says nothing of: what shows there is all of a cause.
+
+        Not where the effects close nearly all: on a slope, a unit that is steered at rest moves in its coupling too.
+        """
         foreign = {block.label for block, _ in self.rows.blocks if not block.baseline.any()}
-        return any(size > self.limits.foreign for label, size in self._lasts.items() if label in foreign)
+        lasts = any(size > self.limits.foreign for label, size in self._lasts.items() if label in foreign)
+        return lasts and self._named() < self.limits.nearly
 
     def _unsteady(self) -> bool:
         """Whether the effects would rather have other sizes in some steps, where their columns are all there is."""

@@ -23,6 +23,8 @@ MOST_STEPS: Final = 15
 HALVINGS: Final = 6
 DIFFERENCE: Final = 1e-4
 """Relative step of numerical derivatives."""
+HELD: Final = 1e4
+"""Weight of what is known of the baseline beforehand, over its standard deviations, where it is held."""
 SETTLED: Final = 0.02
 """Decrease of the sum of squares, in units of the noise, from which the refit has settled: a seventh of a deviation."""
 
@@ -91,6 +93,7 @@ def refit(
     rows: Mask,
     *,
     exact: bool = True,
+    held: bool = False,
 ) -> Refit:
     """Gauss and Newton, damped, from the linear solution.
 
@@ -101,8 +104,9 @@ def refit(
         whitener: weights of the rows.
         rows: (n,) which rows are fitted.
         exact: whether candidates with an exact form are refitted by it; if not, all are their columns.
+        held: whether what is known of the baseline beforehand is taken to be exact.
     """
-    model = _Model(problems, regression, variants, whitener, rows, exact=exact)
+    model = _Model(problems, regression, variants, whitener, rows, exact=exact, held=held)
     return model.result(_descended(model) if model.nonlinear else model.start)
 
 
@@ -136,7 +140,9 @@ class _Model:
         chosen: Mask,
         *,
         exact: bool,
+        held: bool,
     ) -> None:
+        self._weight = HELD if held else 1.0
         self.regression, self.whitener, self.chosen = regression, whitener, chosen
         self.rows: Rows = regression.rows
         self.size = self.rows.baseline.shape[1]
@@ -165,13 +171,13 @@ class _Model:
         for number in range(len(self.unknowns)):
             model = model + self._added(number, values)
         white = self.whitener.apply(self.rows, self.rows.target - model)[self.chosen]
-        return np.append(white, self.regression.prior_residual(values[: self.size]))
+        return np.append(white, self._weight * self.regression.prior_residual(values[: self.size]))
 
     def jacobian(self, values: Array) -> Array:
         """Derivative of the model of the same rows, (n + prior, all values)."""
         columns = [self.rows.baseline, *(self._derivative(number, values) for number in range(len(self.unknowns)))]
         white = self.whitener.apply(self.rows, np.hstack(columns))[self.chosen]
-        prior = self.regression.prior_jacobian(white.shape[1])
+        prior = self._weight * self.regression.prior_jacobian(white.shape[1])
         return np.vstack([white, prior])
 
     def result(self, values: Array) -> Refit:
@@ -195,8 +201,8 @@ class _Model:
     def _linear(self, variants: Sequence[int]) -> Array:
         design = np.hstack([self.rows.baseline, self.regression.columns_of(variants)])
         white = self.whitener.apply(self.rows, np.column_stack([design, self.rows.target]))[self.chosen]
-        prior = self.regression.prior_jacobian(design.shape[1])
-        known = self.regression.prior_residual(np.zeros(self.size))
+        prior = self._weight * self.regression.prior_jacobian(design.shape[1])
+        known = self._weight * self.regression.prior_residual(np.zeros(self.size))
         return least_squares(np.vstack([white[:, :-1], prior]), np.append(white[:, -1], known))
 
     def _added(self, number: int, values: Array) -> Array:
