@@ -342,21 +342,37 @@ def test_what_the_parameters_absorb_is_invisible(world: type[Any]) -> None:
     assert judge(*problems, seed=1).invisible == ("hidden",)
 
 
-def test_with_a_model_a_changed_parameter_is_a_cause_and_without_one_it_is_not(world: type[Any]) -> None:
-    """The truth is (1, -2, 0.5); the model says that the first is 0.9 and is sure of it."""
+def _with_drift(world: Any) -> list[Problem]:
+    """With a candidate for a change of the first parameter, relative to 0.9."""
     problems = []
     for part in (0, 1):
-        problem = world(seed=13).problem(part)
+        problem = world.problem(part)
         first = problem.candidates[0]
         columns = tuple(0.9 * block.baseline[:, :1] for block in problem.blocks)
         drift = replace(first, effect="parameter_change", where="p", drift=True)
         drift = replace(drift, variants=(replace(first.variants[0], columns=columns),))
         problems.append(replace(problem, candidates=(*problem.candidates, drift)))
+    return problems
+
+
+def test_with_a_model_a_changed_parameter_is_a_cause_and_without_one_it_is_not(world: type[Any]) -> None:
+    """The truth is (1, -2, 0.5); the model says that the first is 0.9 and is sure of it."""
+    problems = _with_drift(world(seed=13))
     nominal = Nominal(np.array([0.9, -2.0, 0.5]), np.full(3, 0.005))
     judged = judge(*(replace(problem, nominal=nominal) for problem in problems), seed=1)
     assert _names(judged) == ["parameter_change"]
     assert judged.causes[0].part.values[0] == pytest.approx(1 / 0.9 - 1, abs=0.03)
     assert _names(judge(*problems, seed=1)) == []
+
+
+def test_with_a_model_each_of_two_causes_closes_what_the_models_values_lack_without_it(world: type[Any]) -> None:
+    """Both are as large; what the model knows of its values is so little that a refit could stand in for the first."""
+    problems = _with_drift(world(seed=13, true={"c": 0.3}, samples=1600))
+    nominal = Nominal(np.array([0.7, -2.0, 0.5]), np.full(3, 0.06))
+    judged = judge(*(replace(problem, nominal=nominal) for problem in problems), seed=1)
+    assert sorted(_names(judged)) == ["c", "parameter_change"]
+    for cause in judged.causes:
+        assert cause.closed == pytest.approx(0.5, abs=0.12)
 
 
 def test_an_effect_left_out_is_said_to_bias_the_parameter_it_hides_in(world: type[Any]) -> None:
@@ -435,3 +451,33 @@ def test_a_place_that_cannot_be_written_is_named(world: type[Any], tmp_path: Pat
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="cannot be written"):
         write_diagnosis(_judged(world(seed=7)).diagnosis(), tmp_path / "file" / "diagnosis.json")
+
+
+def _with_rows_of_its_own(problem: Problem, size: float) -> Problem:
+    """With a third coordinate, of which neither model nor candidates say anything, and in which something repeats."""
+    motion = np.sin(np.linspace(0, 20, int(np.sum(problem.blocks[0].period == 0))))
+    first = problem.blocks[0]
+    noise = np.random.default_rng(len(problem.blocks[0].target)).normal(size=len(first.target))
+    own = replace(
+        first,
+        coordinate="own",
+        target=noise + size * np.sqrt(2) * np.tile(motion, len(first.target) // len(motion)),
+        baseline=np.zeros_like(first.baseline),
+        features=None,
+    )
+    candidates = tuple(
+        replace(one, variants=tuple(replace(v, columns=(*v.columns, None)) for v in one.variants))
+        for one in problem.candidates
+    )
+    return replace(problem, blocks=(*problem.blocks, own), candidates=candidates)
+
+
+@pytest.mark.parametrize(("size", "verdict"), [(4.0, Verdict.EFFECT), (0.3, Verdict.UNKNOWN)])
+def test_what_lasts_in_rows_of_their_own_is_pardoned_beside_a_cause_that_closes_nearly_all(
+    world: type[Any], size: float, verdict: Verdict
+) -> None:
+    problems = (_with_rows_of_its_own(world(seed=21, true={"c": size}).problem(part), 1.2) for part in (0, 1))
+    findings = judge(*problems, seed=1)
+    assert _names(findings) == ["c"]
+    assert findings.verdict is verdict
+    assert findings.lasting
