@@ -30,14 +30,20 @@ class Exported:
     seconds: float
 
 
-def source_of_run(path: Path) -> ModelSource:
-    """The model that a run identified.
+def source_of_run(path: Path, model: Path | None = None) -> ModelSource:
+    """The model that a run identified, or another one of its vehicle.
+
+    Args:
+        path: run folder.
+        model: a `parameters.toml`, extended by a diagnosis for one; None: that of the run.
 
     Raises:
-        DataFileError: it is no run folder, or has not been identified yet.
+        DataFileError: it is no run folder, or has not been identified yet, or the model cannot be used.
     """
     run = open_run(path)
     folder = run.folder
+    if model is not None:
+        return source_of_files(model, folder.vehicle, provenance_of(run) | {"model": model.name})
     if not folder.parameters.is_file():
         raise DataFileError(f"{path} has no parameters.toml yet.", f"Identify it first: quasiomni identify {path}.")
     return source_of_files(folder.parameters, folder.vehicle, provenance_of(run))
@@ -58,13 +64,13 @@ def source_of_files(parameters: Path, vehicle: Path, provenance: dict[str, str])
     )
 
 
-def export_run(run: Path, out: Path, order: Order, console: Console) -> Exported:
+def export_run(run: Path, out: Path, order: Order, console: Console, model: Path | None = None) -> Exported:
     """Build the FMU of a run and write it.
 
     Raises:
         UserError: the run is not identified, there is no compiler for a platform, or the file cannot be written.
     """
-    source, compiler = source_of_run(run), find_compiler()
+    source, compiler = source_of_run(run, model), find_compiler()
     check_platforms(compiler, order.platforms)
     start = time.monotonic()
     with progress(console) as bars:

@@ -27,6 +27,10 @@ from quasiomni.options import NetworkOption, VehicleOption
 @app.command("fmu")
 def build(
     run: Annotated[Path, typer.Argument(help="Run folder, identified.")],
+    model: Annotated[
+        Path | None,
+        typer.Option(help="parameters.toml in place of that of RUN: what `diagnose --extended` wrote, for one."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File to write. Default: platform.fmu in RUN.")
     ] = None,
@@ -40,7 +44,7 @@ def build(
 ) -> None:
     """Package the identified model, with its confirmed effects, as an FMU for co-simulation and model exchange."""
     order = Order(fmi, inputs, parse_platforms(platforms))
-    written = export_run(run, out or run / "platform.fmu", order, console)
+    written = export_run(run, out or run / "platform.fmu", order, console, model)
     console.print(f"Written: {written.path}, {written.size / 1e3:.0f} kB, in {written.seconds:.1f} s")
 
 

@@ -22,6 +22,7 @@ from ident.records.record import Record, Segment, Step, make_segment
 from ident.vehicle.description import find_data_file, load_vehicle
 from ident.vehicle.effect_text import effects_text
 from ident.vehicle.effects import EffectName, make_effect
+from ident.vehicle.extended import ExtendedModel, write_model
 from ident.vehicle.parameters import PARAMETER_UNITS
 
 Quasi = Callable[..., Any]
@@ -86,6 +87,25 @@ def test_an_identified_run_becomes_an_fmu_whose_motion_is_that_of_the_record(
     assert len(differences) == 1
     assert max(differences) < 5.0
     assert (tmp_path / "gap.html").stat().st_size > 1e5
+
+
+def test_another_model_of_the_vehicle_becomes_an_fmu_and_that_of_the_run_stays(
+    quasi: Quasi, run: Path, tmp_path: Path
+) -> None:
+    """As `diagnose --extended` writes one."""
+    extended, fmu = tmp_path / "extended.toml", tmp_path / "platform.fmu"
+    before = (run / "parameters.toml").read_bytes()
+    effect = make_effect(EffectName.STRIBECK, "steering_left", {"amplitude": 6.0, "velocity": 0.3})
+    write_model(ExtendedModel(load_vehicle().prior, (effect,)), extended, {"run": "test"})
+    built = quasi("fmu", run, "--model", extended, "-o", fmu, "--platforms", "host")
+    assert built.code == 0, built
+    with zipfile.ZipFile(fmu) as archive:
+        assert b"stribeck.steering_left.amplitude" in archive.read("modelDescription.xml")
+        assert b"backlash" not in archive.read("modelDescription.xml")
+    assert (run / "parameters.toml").read_bytes() == before
+    missing = quasi("fmu", run, "--model", tmp_path / "nothing.toml")
+    assert missing.code == 2
+    assert "nothing.toml does not exist" in missing.error
 
 
 def test_a_run_that_is_not_identified_is_refused(quasi: Quasi, run: Path, tmp_path: Path) -> None:
