@@ -10,19 +10,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.gap.diagnosis import Gap, Verdict
-from ident.gap.findings import Cause, Findings, HeldOut
-from ident.gap.generic import SmoothFunction
+from ident.gap.diagnosis import Verdict
+from ident.gap.findings import Cause, Findings
+from ident.gap.fitted import Fitted
 from ident.gap.limits import Limits
-from ident.gap.linear import least_squares, rms
 from ident.gap.probability import calibration, rank
-from ident.gap.problem import Candidate, Problem
-from ident.gap.refit import Refit, refit
+from ident.gap.problem import Problem
 from ident.gap.regression import Regression
-from ident.gap.remainder import held_out_gap, lasting, noise_floors, repeated, shares
+from ident.gap.remainder import lasting, repeated, shares
 from ident.gap.search import Found
 from ident.gap.steady import log_unsteady
-from ident.gap.whitening import Predictor, Whitener
 
 Array = NDArray[np.float64]
 
@@ -35,15 +32,7 @@ class Judgement:
     ) -> None:
         self.problems, self.regression, self.found, self.limits = problems, regression, found, limits
         self.rows = regression.rows
-        self.weights = _weights(regression, found)
-        smooth = SmoothFunction(regression, found.whitener, seed)
-        self.bare = smooth.beside(())
-        self.rest = smooth.beside(found.variants) if found.variants else self.bare
-        everything = np.ones(len(self.rows), dtype=bool)
-        self.after = refit(problems, regression, found.variants, found.whitener, everything)
-        self.before = refit(problems, regression, (), found.whitener, everything)
-        self.floors = self._floors()
-        self.untouched = self._held_out_models(())
+        self.fitted = Fitted(problems, regression, found, seed)
 
     def findings(self) -> Findings:
         """The answer, with all that reports show of it."""
@@ -53,65 +42,45 @@ class Judgement:
             causes=causes,
             doubtful=self._doubtful(),
             events=tuple(self.problems[0].candidates[owner].key for owner in self.found.rest.events),
-            gap=self._exactly,
-            where=shares(self.rows, self.floors, self._judged()),
+            gap=self.fitted.exactly,
+            where=shares(self.rows, self.fitted.floors, self.fitted.judged()),
             invisible=invisible_names(self.regression),
-            before=self.before,
-            after=self.after,
+            before=self.fitted.before,
+            after=self.fitted.after,
             significance=min(slot.evidence.significance for slot in (self.found.rest, *self.found.slots)),
-            remainder=self.rest,
+            remainder=self.fitted.rest,
             lasting=self._repeating() > 1,
-            repeated_before=self._sizes(self._judged()),
-            repeated_after=self._sizes(self.after.blocks),
+            repeated_before=self._sizes(self.fitted.judged()),
+            repeated_after=self._sizes(self.fitted.after.blocks),
             problem=self.problems[0],
-            held_out=self._held_out(),
+            held_out=self.fitted.held_out(),
         )
 
     def refuted(self) -> frozenset[str]:
         """Effects of no size of which another candidate is what comes along with them, not refuted before."""
         keys = {candidate.key for candidate in self.problems[0].candidates if not candidate.excluded}
-        taken = [self._candidate(index) for index in range(len(self.found.variants)) if self._sizeless(index)]
+        taken = [self.fitted.candidate(index) for index in range(len(self.found.variants)) if self._sizeless(index)]
         return frozenset(one.key for one in taken if f"{one.along}@{one.where}" in keys)
 
     def worthwhile(self) -> tuple[int, ...]:
         """The effects without one that widens the held-out gap, is of no size itself, or is the least and a trifle."""
         variants = self.found.variants
-        closed = self._closed
+        closed = self.fitted.closed
         widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
         refuted = [index for index in widened if self._measurable() or self._log_predictive(index) < self.limits.sure]
         if refuted:
-            return self._others(min(refuted, key=lambda index: closed[index]))
+            return self.fitted.others(min(refuted, key=lambda index: closed[index]))
         if len(variants) < 2:
             return variants
         for index in range(len(variants)):
             if index != self._strongest and (self._sizeless(index) or self._outside(index)):
-                return self._others(index)
+                return self.fitted.others(index)
         evidence = [self._log_evidence(index) for index in range(len(variants))]
         least = int(np.argmin(evidence))
         minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
-        trifle = self.limits.trifle * self._whole.floor**2 / max(self._removable, np.finfo(float).tiny)
-        needed = max(trifle, self.limits.share * self._left)
-        return self._others(least) if minor and closed[least] < needed else variants
-
-    @cached_property
-    def _whole(self) -> Gap:
-        """With all effects, as their columns."""
-        return self._gap(self.found.variants)
-
-    @cached_property
-    def _exactly(self) -> Gap:
-        """With all effects, as their exact forms."""
-        return held_out_gap(self.rows, self.floors, self.untouched, self._extended_models)
-
-    @property
-    def _removable(self) -> float:
-        """Power of the held-out gap above the noise."""
-        return self._whole.before**2 - self._whole.floor**2
-
-    @property
-    def _left(self) -> float:
-        """Share of the removable held-out gap that all effects leave."""
-        return max(1 - self._whole.closed, 0.0)
+        trifle = self.limits.trifle * self.fitted.whole.floor**2 / max(self.fitted.removable, np.finfo(float).tiny)
+        needed = max(trifle, self.limits.share * self.fitted.left)
+        return self.fitted.others(least) if minor and closed[least] < needed else variants
 
     def _log_evidence(self, index: int) -> float:
         return float(self.found.slots[index].evidence.log_evidence[self.found.variants[index]])
@@ -121,81 +90,21 @@ class Judgement:
 
     def _measurable(self) -> bool:
         """Whether the held-out gap that effects could close is more than an accident of the noise."""
-        return self._removable > self.limits.measurable * self._whole.floor**2
+        return self.fitted.removable > self.limits.measurable * self.fitted.whole.floor**2
 
     def _doubtful(self) -> Mapping[str, float]:
         rest = self.found.rest
         return rank(self.regression, rest, rest.variants[0], calibration()).probabilities if rest.variants else {}
 
-    def _judged(self) -> Sequence[Array]:
-        """The model that is judged: as given, or refitted to all records."""
-        nominal = self.problems[0].nominal
-        if nominal is None:
-            return self.before.blocks
-        return [block.baseline @ nominal.values for block, _ in self.rows.blocks]
-
-    def _held_out_models(self, variants: Sequence[int], *, held: bool = False) -> Sequence[Array]:
-        """Models of all blocks, fitted without the confirming rows."""
-        if not variants and self._is_given:
-            return self._judged()
-        return self._held_out_refit(variants, held=held).blocks
-
-    def _held_out_refit(self, variants: Sequence[int], *, exact: bool = False, held: bool = False) -> Refit:
-        """Fitted without the confirming rows, every coordinate in units of its residual."""
-        fitted = ~self.rows.confirming
-        return refit(self.problems, self.regression, variants, self.weights, fitted, exact=exact, held=held)
-
-    @cached_property
-    def _extended(self) -> Refit:
-        """With all effects, as their exact forms, without the confirming rows."""
-        return self._held_out_refit(self.found.variants, exact=True)
-
-    @property
-    def _extended_models(self) -> Sequence[Array]:
-        return self._extended.blocks if self.found.variants else self.untouched
-
-    def _held_out(self) -> HeldOut:
-        confirming = slice(len(self.problems[0].blocks), None)
-        before, after = (tuple(models[confirming]) for models in (self.untouched, self._extended_models))
-        return HeldOut(self.problems[1], self._held_out_refit(()), self._extended, before, after)
-
-    @property
-    def _is_given(self) -> bool:
-        """Whether a model is judged: what an effect closes is then what those values lack without it."""
-        return self.problems[0].nominal is not None
-
-    def _gap(self, variants: Sequence[int], *, held: bool = False) -> Gap:
-        models = self._held_out_models(variants, held=held)
-        return held_out_gap(self.rows, self.floors, self.untouched, models)
-
-    @cached_property
-    def _closed(self) -> list[float]:
-        """Share of the removable held-out gap that each effect closes, the others given; all as their columns."""
-        whole, removable = self._whole, self._removable
-        without = [
-            self._gap(self._others(index), held=self._is_given).after for index in range(len(self.found.variants))
-        ]
-        return [(after**2 - whole.after**2) / removable if removable > 0 else 0.0 for after in without]
-
     @property
     def _strongest(self) -> int:
         """The effect that closes most."""
-        return int(np.argmax(self._closed))
-
-    def _candidate(self, index: int) -> Candidate:
-        return self.problems[0].candidates[self.regression.owners[self.found.variants[index]]]
-
-    def _others(self, index: int) -> tuple[int, ...]:
-        return tuple(other for place, other in enumerate(self.found.variants) if place != index)
-
-    def _floors(self) -> Array:
-        stacked = self.rows.stack(list(self.after.blocks))
-        return noise_floors(self.rows, self.after.blocks, self.rows.target - stacked - self.rest.prediction)
+        return int(np.argmax(self.fitted.closed))
 
     def _explained(self) -> float:
         """Share of what can be predicted of the confirming rows that the effects taken explain."""
-        named = max(self.bare.before - self.rest.before, 0.0)
-        return named / max(named + self.rest.gain, np.finfo(float).tiny)
+        named = max(self.fitted.bare.before - self.fitted.rest.before, 0.0)
+        return named / max(named + self.fitted.rest.gain, np.finfo(float).tiny)
 
     def _verdict(self) -> Verdict:
         if not self.found.variants:
@@ -211,16 +120,17 @@ class Judgement:
         Or hardly nearer, where nothing repeats that would tell noise from what is left.
         """
         least = -self.limits.widening if self._lasts else self.limits.most
-        return self._measurable() and self._exactly.closed < least
+        return self._measurable() and self.fitted.exactly.closed < least
 
     def _foreign(self) -> bool:
         """Whether something lasts in rows that the model itself says nothing of: what shows there is all of a cause.
 
-        Not where the effects close nearly all: on a slope, a unit that is steered at rest moves in its coupling too.
+        Not where no effect acts in them and one closes nearly all elsewhere: on a slope, a unit that is steered at rest
+        moves in its coupling too.
         """
         foreign = {block.label for block, _ in self.rows.blocks if not block.baseline.any()}
-        lasts = any(size > self.limits.foreign for label, size in self._lasts.items() if label in foreign)
-        return lasts and self._named() < self.limits.nearly
+        lasts = {label for label, size in self._lasts.items() if label in foreign and size > self.limits.foreign}
+        return bool(lasts & self.fitted.reached) or (bool(lasts) and self._named < self.limits.nearly)
 
     def _unsteady(self) -> bool:
         """Whether the effects would rather have other sizes in some steps, where their columns are all there is."""
@@ -239,7 +149,7 @@ class Judgement:
 
     def _sizeless(self, index: int) -> bool:
         """Whether an effect may be of no size itself, and what comes along with it is the explanation."""
-        part, least = self.after.parts[index], self._candidate(index).least
+        part, least = self.fitted.after.parts[index], self.fitted.candidate(index).least
         along = slice(len(part.values), None)
         accompanied = np.abs(part.numbers[along]) > self.limits.sure_of * part.scatter[along]
         size = np.abs(part.values) if least is None else part.values - least
@@ -247,29 +157,30 @@ class Judgement:
 
     def _outside(self, index: int) -> bool:
         """Whether the refit has made something else of an effect: parameters that it does not have."""
-        lowest = self._candidate(index).lowest
-        return bool(lowest) and bool(np.any(np.abs(self.after.parts[index].values) < lowest))
+        lowest = self.fitted.candidate(index).lowest
+        return bool(lowest) and bool(np.any(np.abs(self.fitted.after.parts[index].values) < lowest))
 
+    @cached_property
     def _named(self) -> float:
         """What the effect that closes most closes, alone or beside the others, in that and what all of them leave."""
-        most = max(*self._closed, *(self._gap((variant,)).closed for variant in self.found.variants))
-        return max(most, 0.0) / max(most + self._left, np.finfo(float).tiny)
+        most = max(*self.fitted.closed, *(self.fitted.gap((variant,)).closed for variant in self.found.variants))
+        return max(most, 0.0) / max(most + self.fitted.left, np.finfo(float).tiny)
 
     def _surest(self) -> float:
         """Where something repeats that all effects leave, the name of the strongest may be part of another cause."""
-        return self._named() if self.limits.humble and self._repeating() > 1 else 1.0
+        return self._named if self.limits.humble and self._repeating() > 1 else 1.0
 
     def _predictable(self) -> bool:
         """Whether a smooth function of the states predicts what the effects leave, and it is no trifle."""
-        sizes = self._sizes(self.after.blocks)
+        sizes = self._sizes(self.fitted.after.blocks)
         large = not sizes or max(sizes.values()) > self.limits.size
-        return large and self.rest.deviations > self.limits.deviations and self.rest.gain > 0
+        return large and self.fitted.rest.deviations > self.limits.deviations and self.fitted.rest.gain > 0
 
     def _lasting(self) -> bool:
         """Whether what repeats is above its limit, and the effects close too little to have that pardoned."""
         excess = self._repeating()
         needed = self.limits.named if excess <= self.limits.far else self.limits.nearly
-        return excess > 1 and self._named() < needed
+        return excess > 1 and self._named < needed
 
     def _repeating(self) -> float:
         """What the model leaves and repeats in every record, over the noise, in units of what may."""
@@ -282,10 +193,10 @@ class Judgement:
     @cached_property
     def _lasts(self) -> Mapping[str, float]:
         """What the model leaves and repeats in every record, over the noise, by coordinate."""
-        return lasting(self.rows, self.floors, self.after.blocks)
+        return lasting(self.rows, self.fitted.floors, self.fitted.after.blocks)
 
     def _sizes(self, models: Sequence[Array]) -> Mapping[str, float]:
-        return repeated(self.rows, self.floors, models)
+        return repeated(self.rows, self.fitted.floors, models)
 
     def _causes(self) -> tuple[Cause, ...]:
         made = [self._cause(index, variant) for index, variant in enumerate(self.found.variants)]
@@ -295,25 +206,16 @@ class Judgement:
         settings = calibration()
         ranked = rank(self.regression, self.found.slots[index], variant, settings)
         return Cause(
-            candidate=self._candidate(index),
-            part=self.after.parts[index],
+            candidate=self.fitted.candidate(index),
+            part=self.fitted.after.parts[index],
             ranked=ranked,
             probability=min(ranked.probability, settings.ceiling, self._surest()),
             log_evidence=self._log_evidence(index),
             log_predictive=self._log_predictive(index),
-            closed=self._closed[index],
-            biased=self._biased(self._others(index)),
+            closed=self.fitted.closed[index],
+            biased=self.fitted.biased(index),
             sizeless=self._sizeless(index),
         )
-
-    def _biased(self, others: Sequence[int]) -> Mapping[str, float]:
-        everything, whitener = np.ones(len(self.rows), dtype=bool), self.found.whitener
-        without, whole = (
-            refit(self.problems, self.regression, variants, whitener, everything, exact=False)
-            for variants in (others, self.found.variants)
-        )
-        shift = (without.baseline - whole.baseline) / np.maximum(whole.baseline_std, np.finfo(float).tiny)
-        return dict(zip(self.problems[0].names, shift.tolist(), strict=True))
 
 
 def _ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
@@ -335,14 +237,3 @@ def invisible_names(regression: Regression) -> tuple[str, ...]:
     visible = {candidates[owner].effect for owner, size in zip(regression.owners, sizes, strict=True) if size}
     names = dict.fromkeys(candidate.effect for candidate in candidates)
     return tuple(str(name) for name in names if name not in visible)
-
-
-def _weights(regression: Regression, found: Found) -> Whitener:
-    """Every group of rows in units of the rms of what the search leaves of it, no colour."""
-    rows = regression.rows
-    design = np.hstack([rows.baseline, regression.columns_of(found.variants)])
-    white = found.whitener.apply(rows, np.column_stack([design, rows.target]))
-    residual = rows.target - design @ least_squares(white[:, :-1], white[:, -1])
-    deviations = [rms(residual[rows.group == group]) for group in np.unique(rows.group)]
-    tiny = np.finfo(float).tiny
-    return Whitener(tuple(Predictor((np.zeros(0),), np.array([max(one, tiny)])) for one in deviations))

@@ -15,7 +15,7 @@ class Limits:
         repeating: the same, above which there is a remainder whether or not it can be predicted.
         beside: the same beside effects that are named, where the held-out gap can be measured.
         creeping: the same of rows with a tolerance, whose noise is that.
-        foreign: the same of rows of which the model says nothing, unless one effect closes `nearly` all.
+        foreign: the same of rows that the model says nothing of; where no effect acts, `nearly` pardons it.
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
         named: what one effect must close, over that and what all leave, where a remainder repeats.
         nearly: the same where what repeats exceeds its limit by more than `far`.
