@@ -28,7 +28,8 @@ class Cause:
         ranked: what else may stand in its place.
         probability: that its name is right, or one that is the same in these records.
         log_evidence, log_predictive: of all records, and what the confirming rows add.
-        closed: share of the removable held-out gap that it closes, the other effects given.
+        closed: share of the removable held-out gap that it closes, others given, the values of a judged model held.
+        needed: the same with everything else refitted without it.
         biased: how much each parameter of the model shifts when the effect is left out, by name, in standard
             deviations.
         sizeless: it may be of no size itself, and what comes along with it is the explanation.
@@ -41,6 +42,7 @@ class Cause:
     log_evidence: float
     log_predictive: float
     closed: float
+    needed: float
     biased: Mapping[str, float]
     sizeless: bool
 

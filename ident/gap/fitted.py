@@ -101,12 +101,19 @@ class Fitted:
 
     @cached_property
     def closed(self) -> list[float]:
-        """Share of the removable held-out gap that each effect closes, the others given; all as their columns.
+        """Share of the removable held-out gap that each effect closes, all else refitted without it, as columns.
 
-        Where a model is judged, its values are held: what an effect closes is what they lack without it.
+        Whether an effect is worth its place is judged by this: what a refit can do without it is no reason for it.
         """
-        others = (self.others(index) for index in range(self.count))
-        without = [self.gap(variants, held=self._is_given).after for variants in others]
+        return self._shares(held=False)
+
+    @cached_property
+    def lacking(self) -> list[float]:
+        """The same with the values of a model that is judged held: what they lack without the effect."""
+        return self._shares(held=True) if self._is_given else self.closed
+
+    def _shares(self, *, held: bool) -> list[float]:
+        without = [self.gap(self.others(index), held=held).after for index in range(self.count)]
         whole, removable = self.whole, self.removable
         return [(after**2 - whole.after**2) / removable if removable > 0 else 0.0 for after in without]
 

@@ -212,19 +212,20 @@ class Judgement:
             probability=min(ranked.probability, settings.ceiling, self._surest()),
             log_evidence=self._log_evidence(index),
             log_predictive=self._log_predictive(index),
-            closed=self.fitted.closed[index],
+            closed=self.fitted.lacking[index],
+            needed=self.fitted.closed[index],
             biased=self.fitted.biased(index),
             sizeless=self._sizeless(index),
         )
 
 
 def _ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
-    """By the share of the held-out gap that they close, to a half, then by evidence; none surer than those before it.
+    """By the share of the held-out gap that needs them, to a half, then by evidence; none surer than those before it.
 
     What is found beside another cause is right only as far as that one is.
     """
     found: list[Cause] = []
-    for cause in sorted(causes, key=lambda cause: (-round(2 * cause.closed), -cause.log_evidence)):
+    for cause in sorted(causes, key=lambda cause: (-round(2 * cause.needed), -cause.log_evidence)):
         surest = min([cause.probability, *(other.probability for other in found[-1:])])
         found.append(replace(cause, probability=surest))
     return tuple(found)

@@ -368,7 +368,7 @@ def test_with_a_model_a_changed_parameter_is_a_cause_and_without_one_it_is_not(w
 def test_with_a_model_each_of_two_causes_closes_what_the_models_values_lack_without_it(world: type[Any]) -> None:
     """Both are as large; what the model knows of its values is so little that a refit could stand in for the first."""
     problems = _with_drift(world(seed=13, true={"c": 0.3}, samples=1600))
-    nominal = Nominal(np.array([0.7, -2.0, 0.5]), np.full(3, 0.06))
+    nominal = Nominal(np.array([0.7, -2.0, 0.5]), np.full(3, 0.03))
     judged = judge(*(replace(problem, nominal=nominal) for problem in problems), seed=1)
     assert sorted(_names(judged)) == ["c", "parameter_change"]
     for cause in judged.causes:
