@@ -9,11 +9,12 @@ from typing import Final
 
 import numpy as np
 
+from ident.errors import RecordError
 from ident.gap.diagnosis import Unseen
 from ident.gap.findings import Findings
 from ident.gap.split import FITTED, fitted_repeats
 from ident.gap.vehicle.closing import compared, extended_model, plain_model
-from ident.records.checks import SHORTEST
+from ident.gap.vehicle.signals import SHORTEST
 from ident.records.record import Record, Segment, Step, base_step
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import Effect
@@ -28,7 +29,8 @@ def unseen_gaps(
 ) -> tuple[Unseen, ...]:
     """Gap by channel without and with the causes, both models fitted to `fit` alone, or to its fitted part.
 
-    Lane changes stand by themselves: nothing repeats in them, and in their curves wheels creep as no model here does.
+    Empty where every step took part, or nothing moves in those that did not. Lane changes stand by themselves: nothing
+    repeats in them, and in their curves wheels creep as no model here does.
 
     Args:
         findings: of the diagnosis.
@@ -41,7 +43,11 @@ def unseen_gaps(
         model(findings, vehicle.prior, given=given, held_out=True) for model in (plain_model, extended_model)
     )
     unseen = list(confirm) or [part for record in fit if (part := later_part(record)) is not None]
-    found = compared(unseen, vehicle, plain, extended, repeated=() if confirm else fit)
+    try:
+        found = compared(unseen, vehicle, plain, extended, repeated=() if confirm else fit)
+    except RecordError:
+        # Repeats may all be in the part that is fitted; the diagnosis, which has rows to confirm, stands without this.
+        return ()
     return tuple(
         Unseen(name, str(channel), gap)
         for name, chosen in _CHOSEN.items()
@@ -74,7 +80,7 @@ def _later(segment: Segment) -> Segment | None:
     else:
         start = int(FITTED * len(segment))
     kept = slice(start, None)
-    if len(segment) - start < SHORTEST:
+    if len(segment) - start <= SHORTEST:
         return None
     return replace(
         segment,

@@ -73,3 +73,21 @@ def test_of_a_record_without_repeats_the_end_is_held_out(prototype: VehicleDescr
     later = later_part(replace(fit, segments=segments))
     assert later is not None
     assert len(later.segments[0]) == pytest.approx(0.4 * len(segments[0]), abs=2)
+
+
+def test_where_nothing_moves_in_what_is_held_out_there_is_nothing_to_say(
+    prototype: VehicleDescription, drives: Drives
+) -> None:
+    fit, confirm = drives(prototype, lambda segment: segment)
+    findings = diagnose_vehicle([fit], [confirm], prototype).findings
+
+    def stopped(segment: Segment) -> Segment:
+        """Standing through the later 60 %, in a record that numbers no repeats."""
+        last = int(0.4 * len(segment))
+        wheels, steering = segment.wheel_angles.copy(), segment.steering_angles.copy()
+        wheels[last:], steering[last:] = wheels[last], steering[last]
+        period = np.full(len(segment), -1)
+        return replace(segment, wheel_angles=wheels, steering_angles=steering, period=period)
+
+    still = replace(fit, segments=[stopped(segment) for segment in fit.segments])
+    assert unseen_gaps(findings, [still], [], prototype) == ()
