@@ -162,7 +162,8 @@ def compared(
         return list(_series(sources, vehicle, model, processing)) if sources else []
 
     sources = rows_of(records)
-    first, second = left_by(before, sources), left_by(after, sources)
+    first = left_by(before, sources)
+    second = first if after is before else left_by(after, sources)
     return Comparison(first, second, _floors([*second, *left_by(after, rows_of(repeated))]))
 
 

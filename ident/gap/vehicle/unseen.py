@@ -15,6 +15,7 @@ from ident.gap.findings import Findings
 from ident.gap.split import FITTED, fitted_repeats
 from ident.gap.vehicle.closing import compared, extended_model, plain_model
 from ident.gap.vehicle.signals import SHORTEST
+from ident.gap.vehicle.sources import DIAGNOSED
 from ident.records.record import Record, Segment, Step, base_step
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import Effect
@@ -39,12 +40,13 @@ def unseen_gaps(
         vehicle: of the records.
         given: effects of the model that was judged.
     """
-    plain, extended = (
-        model(findings, vehicle.prior, given=given, held_out=True) for model in (plain_model, extended_model)
-    )
+    plain = plain_model(findings, vehicle.prior, given=given, held_out=True)
+    extended = extended_model(findings, vehicle.prior, given=given, held_out=True) if findings.causes else plain
     unseen = list(confirm) or [part for record in fit if (part := later_part(record)) is not None]
+    # Simulating takes long: the fitted part is asked for the noise only where what is held out does not repeat.
+    repeated = [] if confirm or all(_repeats(record) for record in unseen) else fit
     try:
-        found = compared(unseen, vehicle, plain, extended, repeated=() if confirm else fit)
+        found = compared(unseen, vehicle, plain, extended, repeated=repeated)
     except RecordError:
         # Repeats may all be in the part that is fitted; the diagnosis, which has rows to confirm, stands without this.
         return ()
@@ -54,6 +56,14 @@ def unseen_gaps(
         for channel, gap in found.gaps(chosen).items()
         if np.isfinite(gap.before)
     )
+
+
+def _repeats(record: Record) -> bool:
+    return all(len(segment.periods) >= 2 for segment in record.segments if _compared(segment.step))
+
+
+def _compared(step: str) -> bool:
+    return base_step(step) in DIAGNOSED
 
 
 def _changes_lane(step: str) -> bool:
