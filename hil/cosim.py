@@ -17,7 +17,7 @@ from hil.fmu_instance import FmuInstance
 from ident.errors import UserError
 from ident.estimate.equations import ROWS, RowsOfStep, motion_of
 from ident.estimate.filters import Processing, differentiate
-from ident.records.record import Record, Segment, Step, base_step
+from ident.records.record import PAYLOAD, Record, Segment, Step, base_step
 from ident.report.digits import percent, unit_text
 from ident.report.figures import MEASURED, MODELLED, drawn
 from ident.vehicle.geometry import WHEELS, Geometry
@@ -109,7 +109,7 @@ def simulate(fmu: Path, segment: Segment, spec: RowsOfStep, geometry: Geometry) 
 
 
 def _start(fmu: Path, segment: Segment, spec: RowsOfStep, geometry: Geometry) -> Mapping[str, float]:
-    """Recorded angles, freed of what the encoders of the model add; rates where the record begins in motion."""
+    """Recorded angles, freed of what the encoders of the model add; rates where it begins in motion; a known load."""
     angles = {f"beta_{wheel}": float(value) for wheel, value in zip(WHEELS, segment.wheel_angles[0], strict=True)}
     with FmuInstance(fmu, {}) as fresh:
         added = fresh.read(fresh.port([f"alpha_{side}_reported" for side in _SIDES]))
@@ -119,7 +119,8 @@ def _start(fmu: Path, segment: Segment, spec: RowsOfStep, geometry: Geometry) ->
     rates = motion_of(segment, geometry, processing).rates[0]
     moving = np.any(np.abs(rates[3:]) > processing.moving)
     speeds = dict(zip(_RATES, rates.tolist(), strict=True)) if moving else {}
-    return angles | speeds | (FREE_WHEELS if spec.mode is None else {})
+    load = {PAYLOAD: segment.payload} if segment.payload else {}
+    return angles | speeds | load | (FREE_WHEELS if spec.mode is None else {})
 
 
 def _outcomes(segment: Segment, simulated: Segment, spec: RowsOfStep, geometry: Geometry) -> Iterator[Outcome]:
