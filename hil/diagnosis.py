@@ -16,7 +16,7 @@ from hil.campaign.reading import read_any
 from hil.network import load_network
 from ident.errors import RecordError, UserError
 from ident.gap.axis.diagnose import diagnose_axis
-from ident.gap.diagnosis import Diagnosis, Verdict, refuse_folder, write_diagnosis
+from ident.gap.diagnosis import Diagnosis, Verdict, refuse_folder, write_diagnosis, write_whole
 from ident.gap.findings import Findings
 from ident.gap.vehicle.closing import extended_model
 from ident.gap.vehicle.diagnose import diagnose_vehicle
@@ -26,7 +26,7 @@ from ident.records.record import Record
 from ident.report.gap import GapReport, write_gap_report
 from ident.report.gap_summary import summary_lines
 from ident.vehicle.description import VehicleDescription, load_vehicle
-from ident.vehicle.extended import ExtendedModel, read_model, write_model
+from ident.vehicle.extended import ExtendedModel, model_text, read_model
 
 Array = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ def diagnose_records(order: DiagnosisOrder, console: Console) -> Diagnosis:
     if order.json is not None:
         write_diagnosis(answer.diagnosis, order.json)
     if order.extended is not None and answer.model is not None:
-        write_model(answer.model, order.extended, {"run": "diagnosis", "records": _names(order.records)})
+        write_whole(model_text(answer.model, {"run": "diagnosis", "records": _names(order.records)}), order.extended)
     if order.extended is not None and answer.model is None:
         console.print(
             f"{order.extended} is not written: no effect is named.", highlight=False, markup=False, soft_wrap=True

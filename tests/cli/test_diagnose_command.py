@@ -161,7 +161,7 @@ def test_the_model_with_its_effects_is_written_for_every_command_that_takes_a_mo
     quasi: Quasi, tmp_path: Path
 ) -> None:
     fit, confirm = (_platform(seed, tmp_path / f"run{seed}.parquet") for seed in (1, 2))
-    extended = tmp_path / "extended.toml"
+    extended = tmp_path / "models" / "extended.toml"
     answer = quasi("diagnose", fit, "--confirm", confirm, "--extended", extended)
     assert answer.code == 0
     assert "outcome" in answer.out
