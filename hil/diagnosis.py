@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -16,7 +16,7 @@ from hil.campaign.reading import read_any
 from hil.network import load_network
 from ident.errors import RecordError, UserError
 from ident.gap.axis.diagnose import diagnose_axis
-from ident.gap.diagnosis import Diagnosis, Verdict, refuse_folder, write_diagnosis, write_whole
+from ident.gap.diagnosis import Diagnosis, Verdict, write_diagnosis
 from ident.gap.findings import Findings
 from ident.gap.vehicle.closing import extended_model
 from ident.gap.vehicle.diagnose import diagnose_vehicle
@@ -26,7 +26,8 @@ from ident.records.record import Record
 from ident.report.gap import GapReport, write_gap_report
 from ident.report.gap_summary import summary_lines
 from ident.vehicle.description import VehicleDescription, load_vehicle
-from ident.vehicle.extended import ExtendedModel, model_text, read_model
+from ident.vehicle.extended import ExtendedModel, read_model, write_model
+from ident.writing import refuse_folder
 
 Array = NDArray[np.float64]
 
@@ -111,24 +112,49 @@ def diagnose_records(order: DiagnosisOrder, console: Console) -> Diagnosis:
     _refuse_unwritable(order)
     with console.status("diagnosing"):
         answer = _axis_answer(order) if order.axis else _vehicle_answer(order)
-    for line in (*summary_lines(answer.findings, answer.diagnosis), *answer.notes):
+    _say(console, [*summary_lines(answer.findings, answer.diagnosis), *answer.notes])
+    written = _written(order, answer)
+    if order.extended is not None and order.extended not in written:
+        _say(console, [f"{order.extended} is not written: no effect is named."])
+    if written:
+        _say(console, [f"Written: {', '.join(map(str, written))}"])
+    return answer.diagnosis
+
+
+def _say(console: Console, lines: Iterable[str]) -> None:
+    for line in lines:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
-    if order.report is not None:
-        fitted, confirmed = ([str(path) for path in paths] for paths in (order.records, order.confirm))
-        model = None if order.model is None else str(order.model)
-        write_gap_report(GapReport(answer.findings, answer.diagnosis, fitted, confirmed, model), order.report)
+
+
+def _written(order: DiagnosisOrder, answer: _Answer) -> list[Path]:
+    """The files that were asked for, each written whole; no model where no effect is named."""
+    fitted, confirmed = (tuple(map(str, paths)) for paths in (order.records, order.confirm))
+    judged = None if order.model is None else str(order.model)
+    written = []
     if order.json is not None:
         write_diagnosis(answer.diagnosis, order.json)
+        written.append(order.json)
+    if order.report is not None:
+        write_gap_report(GapReport(answer.findings, answer.diagnosis, fitted, confirmed, judged), order.report)
+        written.append(order.report)
     if order.extended is not None and answer.model is not None:
-        write_whole(model_text(answer.model, {"run": "diagnosis", "records": _names(order.records)}), order.extended)
-    if order.extended is not None and answer.model is None:
-        console.print(
-            f"{order.extended} is not written: no effect is named.", highlight=False, markup=False, soft_wrap=True
-        )
-    written = [str(path) for path in order.files if path != order.extended or answer.model is not None]
-    if written:
-        console.print(f"Written: {', '.join(written)}", highlight=False, markup=False, soft_wrap=True)
-    return answer.diagnosis
+        write_model(answer.model, order.extended, _provenance(order))
+        written.append(order.extended)
+    return written
+
+
+def _provenance(order: DiagnosisOrder) -> dict[str, str]:
+    """What the numbers of the model come from: names of the records, and of the model that was judged."""
+    sources = {"run": "diagnosis", "records": _names(order.records)}
+    if order.confirm:
+        sources["confirm"] = _names(order.confirm)
+    if order.model is not None:
+        sources["model"] = order.model.name
+    return sources
+
+
+def _names(paths: Sequence[Path]) -> str:
+    return ", ".join(path.name for path in paths)
 
 
 def _refuse_unwritable(order: DiagnosisOrder) -> None:
@@ -144,10 +170,6 @@ def _refuse_unwritable(order: DiagnosisOrder) -> None:
             "--extended writes a model of the platform, --axis says that the records are of servo axes.",
             "Leave one of them out; --json holds the causes of an axis.",
         )
-
-
-def _names(paths: Sequence[Path]) -> str:
-    return ", ".join(path.name for path in paths)
 
 
 def _axis_answer(order: DiagnosisOrder) -> _Answer:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ident.estimate.identify import Estimate, Identification
 from ident.vehicle.parameters import PARAMETER_NAMES
+from ident.writing import write_whole
 
 
 def parameters_text(identification: Identification, provenance: Mapping[str, str]) -> str:
@@ -29,10 +30,12 @@ def parameters_text(identification: Identification, provenance: Mapping[str, str
 
 
 def write_parameters(identification: Identification, path: Path, provenance: Mapping[str, str]) -> None:
-    """Write the file whole or not at all."""
-    temporary = path.with_suffix(".tmp")
-    temporary.write_text(parameters_text(identification, provenance), encoding="utf-8")
-    temporary.replace(path)
+    """Write the file whole or not at all.
+
+    Raises:
+        UserError: it cannot be written.
+    """
+    write_whole(parameters_text(identification, provenance), path)
 
 
 def _entry(estimate: Estimate, source: str) -> list[str]:

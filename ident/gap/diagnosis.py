@@ -5,14 +5,13 @@ from __future__ import annotations
 import enum
 import json
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ident.errors import UserError
 from ident.vehicle.quantities import Quantity
+from ident.writing import write_whole
 
 
 class Verdict(enum.StrEnum):
@@ -140,32 +139,6 @@ def write_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
         UserError: it cannot be written.
     """
     write_whole(json.dumps(diagnosis.as_json(), indent=2, allow_nan=False) + "\n", path)
-
-
-def refuse_folder(path: Path) -> None:
-    """Refuse the name of a folder for a file that is to be written.
-
-    Raises:
-        UserError: it is one.
-    """
-    if path.is_dir():
-        raise UserError(f"{path} is a folder.", "Name the file to write, in it or elsewhere.")
-
-
-def write_whole(text: str, path: Path) -> None:
-    """Write a text; a reader of `path` sees the old file or the new one, never half of it.
-
-    Raises:
-        UserError: it cannot be written, or is a folder.
-    """
-    refuse_folder(path)
-    part = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    except OSError as error:
-        raise UserError(f"{path} cannot be written: {error.strerror}.", "Name a place that can be written.") from error
 
 
 def _effect(effect: NamedEffect) -> dict[str, Any]:

@@ -35,6 +35,7 @@ class Fitted:
 
     def __init__(self, problems: Sequence[Problem], regression: Regression, found: Found, seed: int) -> None:
         self.problems, self.regression, self.found = problems, regression, found
+        self._kept: dict[tuple[tuple[int, ...], bool], Refit] = {}
         self.rows = regression.rows
         self._weights = _weights(regression, found)
         smooth = SmoothFunction(regression, found.whitener, seed)
@@ -148,15 +149,22 @@ class Fitted:
             return self.judged()
         return self._held_out_refit(variants, held=held).blocks
 
-    def _held_out_refit(self, variants: Sequence[int], *, exact: bool = False, held: bool = False) -> Refit:
-        """Fitted without the confirming rows, every coordinate in units of its residual."""
-        fitted = ~self.rows.confirming
-        return refit(self.problems, self.regression, variants, self._weights, fitted, exact=exact, held=held)
+    def _held_out_refit(self, variants: Sequence[int], *, held: bool = False) -> Refit:
+        """With some effects, as their columns, without the confirming rows; several questions need the same one."""
+        key = tuple(variants), held
+        if key not in self._kept:
+            self._kept[key] = self._fitted_to_others(variants, exact=False, held=held)
+        return self._kept[key]
 
     @cached_property
     def _extended(self) -> Refit:
         """With all effects, as their exact forms, without the confirming rows."""
-        return self._held_out_refit(self.found.variants, exact=True)
+        return self._fitted_to_others(self.found.variants, exact=True, held=False)
+
+    def _fitted_to_others(self, variants: Sequence[int], *, exact: bool, held: bool) -> Refit:
+        """Fitted without the confirming rows, every coordinate in units of its residual."""
+        fitted = ~self.rows.confirming
+        return refit(self.problems, self.regression, variants, self._weights, fitted, exact=exact, held=held)
 
     @property
     def _extended_models(self) -> Sequence[Array]:

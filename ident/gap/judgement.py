@@ -59,7 +59,7 @@ class Judgement:
     def refuted(self) -> frozenset[str]:
         """Effects of no size of which another candidate is what comes along with them, not refuted before."""
         keys = {candidate.key for candidate in self.problems[0].candidates if not candidate.excluded}
-        taken = [self.fitted.candidate(index) for index in range(len(self.found.variants)) if self._sizeless(index)]
+        taken = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._sizeless(index)]
         return frozenset(one.key for one in taken if f"{one.along}@{one.where}" in keys)
 
     def worthwhile(self) -> tuple[int, ...]:
@@ -70,12 +70,12 @@ class Judgement:
         refuted = [index for index in widened if self._measurable() or self._log_predictive(index) < self.limits.sure]
         if refuted:
             return self.fitted.others(min(refuted, key=lambda index: closed[index]))
-        if len(variants) < 2:
+        if self.fitted.count < 2:
             return variants
-        for index in range(len(variants)):
+        for index in range(self.fitted.count):
             if index != self._strongest and (self._sizeless(index) or self._outside(index)):
                 return self.fitted.others(index)
-        evidence = [self._log_evidence(index) for index in range(len(variants))]
+        evidence = [self._log_evidence(index) for index in range(self.fitted.count)]
         least = int(np.argmin(evidence))
         minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
         trifle = self.limits.trifle * self.fitted.whole.floor**2 / max(self.fitted.removable, np.finfo(float).tiny)
@@ -137,7 +137,7 @@ class Judgement:
         columns = [self.rows.layout[variant] for variant in self.found.variants]
         candidates = [self.problems[0].candidates[column.candidate] for column in columns]
         exact = all(one.contribution is None for one in candidates) and not any(column.beside for column in columns)
-        evidence = max(self._log_evidence(index) for index in range(len(self.found.variants)))
+        evidence = max(self._log_evidence(index) for index in range(self.fitted.count))
         limit = max(self.limits.unsteady, self.limits.bent * evidence)
         return exact and log_unsteady(self.regression, self.found) > limit
 

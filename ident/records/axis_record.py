@@ -70,6 +70,10 @@ class AxisSignals:
         """Name for messages."""
         return f"axis {self.name}" if self.name else "axis"
 
+    def named(self, word: str) -> str:
+        """A word with the axis' name behind it, as in channels and results: `position_1`, or `position` alone."""
+        return channel_of(word, self.name)
+
 
 @dataclass(frozen=True)
 class AxisRecord:
@@ -129,7 +133,7 @@ def write_axis_record(record: AxisRecord, path: Path) -> None:
     values: dict[str, NDArray[Any]] = {"time": record.time, "period": record.period}
     units = {"time": "s"}
     for axis in record.axes:
-        position, effort = _channel("position", axis.name), _channel("effort", axis.name)
+        position, effort = axis.named("position"), axis.named("effort")
         values |= {position: axis.position, effort: axis.effort}
         units |= {position: axis.kind.position_unit, effort: axis.kind.effort_unit}
     write_channels(Channels(values, units), path)
@@ -143,11 +147,9 @@ def axis_record_from_channels(channels: Channels, source: str, kind: AxisKind = 
             is no SI unit of an axis.
     """
     _refuse_incomplete(channels.values, source)
-    needed = ["time", *(_channel(part, axis) for axis in _axis_names(channels.values) for part in _PARTS)]
+    needed = ["time", *(channel_of(part, axis) for axis in _axis_names(channels.values) for part in _PARTS)]
+    _refuse_unequal({name: channels.values[name] for name in (*needed, "period") if name in channels.values}, source)
     values = {name: numbers(name, channels.values[name], source) for name in needed}
-    if "period" in channels.values:
-        values["period"] = numbers("period", channels.values["period"], source)
-    _refuse_unequal(values, source)
     refuse_short(len(values["time"]), source)
     for name in needed:
         refuse_nonfinite(name, values[name], source)
@@ -158,17 +160,18 @@ def axis_record_from_channels(channels: Channels, source: str, kind: AxisKind = 
         AxisSignals(
             name=name,
             kind=_kind_of(name, channels.units, source, kind),
-            position=values[_channel("position", name)],
-            effort=values[_channel("effort", name)],
-            assumed=not any(_channel(part, name) in channels.units for part in _PARTS),
+            position=values[channel_of("position", name)],
+            effort=values[channel_of("effort", name)],
+            assumed=not any(channel_of(part, name) in channels.units for part in _PARTS),
         )
         for name in _axis_names(values)
     )
-    period = period_numbers(values.get("period"), len(values["time"]), source)
+    period = period_numbers(channels.values.get("period"), len(values["time"]), source)
     return AxisRecord(axes, uniform_sample_time(values["time"], source), values["time"], period, source)
 
 
-def _channel(quantity: str, axis: str) -> str:
+def channel_of(quantity: str, axis: str) -> str:
+    """Name of the channel that holds a quantity of an axis, whose own name may be empty."""
     return f"{quantity}_{axis}" if axis else quantity
 
 
@@ -179,7 +182,7 @@ def _axis_names(values: Mapping[str, Any]) -> list[str]:
 
 def _refuse_incomplete(values: Mapping[str, Any], source: str) -> None:
     names = _axis_names(values)
-    wanted = ["time", *(["position"] if not names else []), *(_channel("effort", name) for name in names or [""])]
+    wanted = ["time", *(["position"] if not names else []), *(channel_of("effort", name) for name in names or [""])]
     missing = [name for name in wanted if name not in values]
     if missing:
         raise RecordError(
@@ -189,7 +192,7 @@ def _refuse_incomplete(values: Mapping[str, Any], source: str) -> None:
         )
 
 
-def _refuse_unequal(values: Mapping[str, Array], source: str) -> None:
+def _refuse_unequal(values: Mapping[str, NDArray[Any]], source: str) -> None:
     lengths = {name: len(channel) for name, channel in values.items()}
     if len(set(lengths.values())) > 1:
         raise RecordError(f"{source} has channels of different lengths: {lengths}.", "Write one row a sample.")
@@ -197,13 +200,13 @@ def _refuse_unequal(values: Mapping[str, Array], source: str) -> None:
 
 def _kind_of(name: str, units: Mapping[str, str], source: str, default: AxisKind) -> AxisKind:
     """The kind whose units the file states; units left out may be any."""
-    stated = [units.get(_channel(quantity, name)) for quantity in ("position", "effort")]
+    stated = [units.get(channel_of(quantity, name)) for quantity in ("position", "effort")]
     if stated == [None, None]:
         return default
     for kind in AxisKind:
         if all(unit in (None, expected) for unit, expected in zip(stated, kind.value, strict=True)):
             return kind
-    channels = f"{_channel('position', name)} and {_channel('effort', name)}"
+    channels = f"{channel_of('position', name)} and {channel_of('effort', name)}"
     raise RecordError(
         f"{source}: {channels} are in {stated[0]!r} and {stated[1]!r}.",
         "Give a linear axis in 'm' and 'N', a rotary one in 'rad' and 'Nm'.",

@@ -12,12 +12,13 @@ import jinja2
 from markupsafe import Markup
 from plotly import offline
 
-from ident.gap.diagnosis import Diagnosis, Verdict, write_whole
+from ident.gap.diagnosis import Diagnosis, Verdict
 from ident.gap.findings import Cause, Findings
 from ident.gap.vehicle.outcome import HORIZON
 from ident.report import digits
 from ident.report.gap_figures import Figure, map_figure, residual_figures
 from ident.report.gap_summary import gap_line, next_text, plain, verdict_line
+from ident.writing import write_whole
 
 BIASED: Final = 2.0
 """Shift of a parameter, in standard deviations, from which it is said to be biased."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +14,6 @@ from markupsafe import Markup, escape
 from plotly import offline
 
 from ident.campaign.plan import Plan
-from ident.errors import UserError
 from ident.estimate.identify import Identification
 from ident.records.record import Record
 from ident.report import digits, figures
@@ -27,6 +25,7 @@ from ident.report.rows import Role, loop_rows, parameter_rows, step_rows, torque
 from ident.report.summary import summarise
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+from ident.writing import write_whole
 
 _SYMBOL: Final = re.compile(r"(?P<letter>[A-Za-z])_(?P<index>\w+)")
 
@@ -105,16 +104,7 @@ def write_report(content: ReportContent, path: Path) -> None:
     Raises:
         UserError: the folder cannot be made or written.
     """
-    page = render_report(content)
-    part = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(page, encoding="utf-8")
-        os.replace(part, path)
-    except OSError as error:
-        raise UserError(
-            f"The report cannot be written to {path}: {error.strerror}.", "Name a place that can be written."
-        ) from error
+    write_whole(render_report(content), path)
 
 
 def _environment() -> jinja2.Environment:

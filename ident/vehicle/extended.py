@@ -17,6 +17,7 @@ from ident.vehicle.effects import DRIVES, ENCODERS, STEERING, Effect, EffectName
 from ident.vehicle.flexible import Spring
 from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters, read_parameters
 from ident.vehicle.quantities import read_toml
+from ident.writing import write_whole
 
 Array = NDArray[np.float64]
 
@@ -95,7 +96,9 @@ def model_text(model: ExtendedModel, provenance: Mapping[str, str]) -> str:
 
 
 def write_model(model: ExtendedModel, path: Path, provenance: Mapping[str, str]) -> None:
-    """Write the file whole or not at all."""
-    temporary = path.with_suffix(".tmp")
-    temporary.write_text(model_text(model, provenance), encoding="utf-8")
-    temporary.replace(path)
+    """Write the file whole or not at all.
+
+    Raises:
+        UserError: it cannot be written.
+    """
+    write_whole(model_text(model, provenance), path)

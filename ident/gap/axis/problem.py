@@ -50,11 +50,6 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
     return Problem(parameters, units, blocks, candidates)
 
 
-def place_of(axis: AxisSignals) -> str:
-    """Place of an axis in results."""
-    return f"axis_{axis.name}" if axis.name else "axis"
-
-
 def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]]]:
     period = with_repeats(signals.record)
     models = [_model(signals, index, scale) for index, scale in enumerate(reference.scales)]
@@ -74,7 +69,7 @@ def delayed_axes(found: Refit, problem: Problem, axes: Sequence[AxisSignals], sc
     values = dict(zip(problem.names, zip(found.baseline, found.baseline_std, strict=True), strict=True))
     late = []
     for axis, scale in zip(axes, scales, strict=True):
-        lag, std = (0.0, 0.0) if scale.hold is None else values[_named(LAG, axis)]
+        lag, std = (0.0, 0.0) if scale.hold is None else values[axis.named(LAG)]
         late.append(abs((scale.hold or 0.0) + lag) - SURELY * std > LONGEST_HOLD)
     return late
 
@@ -87,7 +82,7 @@ def _candidates(model: AxisModel, scale: Scale) -> list[Candidate]:
 def _model(signals: Signals, index: int, scale: Scale) -> AxisModel:
     axis, motion = signals.record.axes[index], signals.motions[index]
     return AxisModel(
-        place=place_of(axis),
+        place=axis.named("axis"),
         block=index,
         blocks=len(signals.motions),
         kind=axis.kind,
@@ -126,14 +121,10 @@ def _baseline_names(axes: Sequence[AxisSignals], scales: Sequence[Scale]) -> lis
     named = []
     for axis, scale in zip(axes, scales, strict=True):
         inertia = PARAMETER_UNITS[axis.kind]["M"]
-        named += [(_named(name, axis), PARAMETER_UNITS[axis.kind][name]) for name in PARAMETERS]
+        named += [(axis.named(name), PARAMETER_UNITS[axis.kind][name]) for name in PARAMETERS]
         named += [(f"M_{axis.name}_{other.name}", inertia) for other in axes if other is not axis]
-        named += [(_named(LAG, axis), "samples")] if scale.hold is not None else []
+        named += [(axis.named(LAG), "samples")] if scale.hold is not None else []
     return named
-
-
-def _named(parameter: str, axis: AxisSignals) -> str:
-    return f"{parameter}_{axis.name}" if axis.name else parameter
 
 
 def _baselines(models: Sequence[AxisModel], signals: Signals, scales: Sequence[Scale]) -> list[Array]:

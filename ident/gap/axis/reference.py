@@ -24,7 +24,7 @@ from ident.gap.axis.motion import (
     repeat_duration,
 )
 from ident.gap.derivatives import delayed, derivative
-from ident.records.axis_record import AxisRecord
+from ident.records.axis_record import AxisRecord, AxisSignals
 
 Array = NDArray[np.float64]
 
@@ -88,10 +88,9 @@ class Signals:
 
     def equations(self, index: int) -> tuple[Array, Array]:
         """Own columns (n, p) of an axis in its moving rows, and its effort (n,) there."""
-        moving = self.motions[index].moving
-        return self.filtered(own_columns(self.motions, index))[moving], self.filtered(self.motions[index].effort)[
-            moving
-        ]
+        motion = self.motions[index]
+        columns, effort = self.filtered(own_columns(self.motions, index)), self.filtered(motion.effort)
+        return columns[motion.moving], effort[motion.moving]
 
     def first_estimate(self, index: int, values: Array) -> Array:
         """Effort (N,) of an axis by a first estimate of its parameters, from its smoothed motion."""
@@ -157,11 +156,16 @@ def axis_signals(record: AxisRecord, cutoff: float, bandwidth: float, scales: Se
         EstimationError: the record is too short, or an axis does not move.
     """
     if scales:
-        dt = record.sample_time
-        late = [0.0 if scale.hold is None else scale.hold * dt for scale in scales]
-        axes = (replace(axis, effort=delayed(axis.effort, t, dt)) for axis, t in zip(record.axes, late, strict=True))
+        axes = [_on_time(axis, scale, record.sample_time) for axis, scale in zip(record.axes, scales, strict=True)]
         record = replace(record, axes=tuple(axes))
     return Signals(record, [axis_motion(record, axis, cutoff, bandwidth) for axis in record.axes], cutoff, bandwidth)
+
+
+def _on_time(axis: AxisSignals, scale: Scale, sample_time: float) -> AxisSignals:
+    """The axis with its effort when it acts, where sampling can be why that is not when it is recorded."""
+    if scale.hold is None:
+        return axis
+    return replace(axis, effort=delayed(axis.effort, scale.hold * sample_time, sample_time))
 
 
 def refuse_other_axes(records: Sequence[AxisRecord]) -> None:

@@ -1,0 +1,34 @@
+"""Files that are whole or not there."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ident.errors import UserError
+
+
+def refuse_folder(path: Path) -> None:
+    """Refuse the name of a folder for a file that is to be written.
+
+    Raises:
+        UserError: it is one.
+    """
+    if path.is_dir():
+        raise UserError(f"{path} is a folder.", "Name the file to write, in it or elsewhere.")
+
+
+def write_whole(text: str, path: Path) -> None:
+    """Write a text; a reader of `path` sees the old file or the new one, never half of it.
+
+    Raises:
+        UserError: it cannot be written, or is a folder.
+    """
+    refuse_folder(path)
+    part = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    except OSError as error:
+        raise UserError(f"{path} cannot be written: {error.strerror}.", "Name a place that can be written.") from error
