@@ -55,10 +55,17 @@ def load_payload(prototype: Prototype, mass: float, inertia: float) -> Prototype
         raise UserError("payload@chassis: a load cannot be negative.", "Give a positive mass and inertia.")
     chassis = prototype.rigid_bodies.chassis
     roll, pitch, yaw = chassis.inertia
-    loaded = RigidBody(
-        chassis.mass + mass, chassis.centre, (roll + FLAT * inertia, pitch + FLAT * inertia, yaw + inertia)
+    together = chassis.mass + mass
+    # About the common centre both masses turn, the further apart the more.
+    ahead, left, _ = chassis.centre
+    apart = chassis.mass * mass / together
+    spread = (
+        roll + FLAT * inertia + apart * left**2,
+        pitch + FLAT * inertia + apart * ahead**2,
+        yaw + inertia + apart * (ahead**2 + left**2),
     )
-    return _with_chassis(prototype, loaded)
+    share = chassis.mass / together
+    return _with_chassis(prototype, RigidBody(together, (share * ahead, share * left, chassis.centre[2]), spread))
 
 
 def shift_centre(prototype: Prototype, x: float, y: float) -> Prototype:

@@ -23,12 +23,13 @@ _LEAST_LOAD: Final = 1e-3
 
 
 def static_loads(p: Symbols, terms: Sequence[EffectTerm]) -> Expression:
-    """Loads of the contacts (4,) [N] on a level floor at rest, for the centre of mass of `com_offset`."""
-    mass = p["m_ch"] + sum(term["mass"] for term in terms if term.name is EffectName.PAYLOAD)
+    """Loads of the contacts (4,) [N] on a level floor at rest; `com_offset` shifts m_ch, no payload."""
+    load = sum((term["mass"] for term in terms if term.name is EffectName.PAYLOAD), ca.SX(0))
     ahead = sum((term["x"] for term in terms if term.name is EffectName.COM_OFFSET), ca.SX(0))
     left = sum((term["y"] for term in terms if term.name is EffectName.COM_OFFSET), ca.SX(0))
     shares = [1 + front * 2 * ahead / p["wheelbase"] + side * 2 * left / p["track_width"] for front, side in CORNERS]
-    return mass * GRAVITY / 4 * ca.vertcat(*(ca.fmax(share, _LEAST_LOAD) for share in shares))
+    quarters = [ca.fmax(p["m_ch"] * share + load, _LEAST_LOAD * p["m_ch"]) for share in shares]
+    return GRAVITY / 4 * ca.vertcat(*quarters)
 
 
 def contact_forces(slip: Expression, loads: Expression, p: Symbols) -> Expression:

@@ -70,7 +70,7 @@ class Equations:
         sample_time: [s].
         time: (N,) [s].
         regressor: (N, 11), columns in the order of (18).
-        torque: (N,) generalized torque [Nm or N].
+        torque: (N,) generalized torque less what a known load takes [Nm or N].
         moving: (N,) rows to be used; the others are stiction.
         period: (N,) number of the repeat, -1 outside of any.
     """
@@ -136,6 +136,8 @@ def _raw_rows(
         return theta, geometry.gear_ratio * segment.motor_torques, spec.coordinates
     theta = dynamics.projected_regressor(spec.mode, motion.alpha, motion.rates, motion.accelerations, geometry, epsilon)
     torque = dynamics.generalized_torques(spec.mode, motion.alpha, segment.motor_torques, geometry)
+    # A load over the centre moves as m_ch does; what it takes is known.
+    torque = torque - segment.payload * theta[:, :, column("m_ch")]
     return theta, torque, kinematics.GENERALIZED_VELOCITIES[spec.mode]
 
 

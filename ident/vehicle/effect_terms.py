@@ -86,6 +86,19 @@ class State:
     accelerations: Expression
 
 
+@dataclass(frozen=True)
+class Masses:
+    """What moves over the floor [kg].
+
+    Attributes:
+        own: m_ch, whose centre `com_offset` shifts.
+        loaded: with payloads, which stay over the centre of the chassis.
+    """
+
+    own: Expression
+    loaded: Expression
+
+
 def term_of(effect: Effect) -> EffectTerm:
     """The term of an effect with numbers."""
     return EffectTerm(effect.name, effect.where, {name: value.value for name, value in effect.parameters.items()})
@@ -125,20 +138,20 @@ def added_forces(terms: Sequence[EffectTerm], state: State, parameters: Expressi
         parameters: p (11,); a slope acts on the mass that is there, so payload and its inertia are added here.
     """
     total = ca.SX.zeros(9)
-    mass = parameters[PARAMETER_NAMES.index("m_ch")]
-    for term in _of(terms, EffectName.PAYLOAD):
-        mass = mass + term["mass"]
+    own = parameters[PARAMETER_NAMES.index("m_ch")]
+    masses = Masses(own, own + sum(term["mass"] for term in _of(terms, EffectName.PAYLOAD)))
     for term in terms:
         if term.name in _FORCES:
-            total += _FORCES[term.name](term, state, mass)
-    return total + _tilted_centre(terms, state, mass)
+            total += _FORCES[term.name](term, state, masses)
+    return total + _tilted_centre(terms, state, masses)
 
 
 def shaft_torques(terms: Sequence[EffectTerm], reported: Expression, beta: Expression) -> Expression:
     """u′ (4,) [Nm] at the motor shafts, from the torques that the drives report and β (4,)."""
     true = ca.SX(reported)
     for term in _of(terms, EffectName.TORQUE_GAIN):
-        true[DRIVES.index(term.where)] *= 1 + term["error"]
+        drive = DRIVES.index(term.where)
+        true[drive] += term["error"] * reported[drive]
     for term in _of(terms, EffectName.TORQUE_BIAS):
         true[DRIVES.index(term.where)] += term["bias"]
     for term in _of(terms, EffectName.TORQUE_RIPPLE):
@@ -184,8 +197,8 @@ def _sign(rate: Expression) -> Expression:
 def _at_joints(law: Callable[[EffectTerm, Expression], Expression]) -> Callable[..., Expression]:
     """A friction law of one rate, at every joint of the term's place."""
 
-    def force(term: EffectTerm, state: State, mass: Expression) -> Expression:
-        del mass
+    def force(term: EffectTerm, state: State, masses: Masses) -> Expression:
+        del masses
         rows = ca.SX.zeros(9)
         for row in _ROWS[term.where]:
             rows[row] = law(term, state.rates[row])
@@ -206,32 +219,32 @@ def _asymmetric_viscous(term: EffectTerm, rate: Expression) -> Expression:
     return term["imbalance"] * rate * _sign(rate)
 
 
-def _drag(term: EffectTerm, state: State, mass: Expression) -> Expression:
+def _drag(term: EffectTerm, state: State, masses: Masses) -> Expression:
     """v·abs(v) at wheels; at the chassis against its velocity, wherever that points."""
     if term.where in _ROWS:
-        return _at_joints(lambda each, rate: each["coefficient"] * rate * ca.fabs(rate))(term, state, mass)
+        return _at_joints(lambda each, rate: each["coefficient"] * rate * ca.fabs(rate))(term, state, masses)
     velocity = state.rates[:2]
     speed = ca.sqrt(ca.sumsqr(velocity) + EPSILON**4)  # the addend keeps the derivative finite at rest
     return ca.vertcat(term["coefficient"] * speed * velocity, ca.SX.zeros(7))
 
 
-def _com_offset(term: EffectTerm, state: State, mass: Expression) -> Expression:
+def _com_offset(term: EffectTerm, state: State, masses: Masses) -> Expression:
     """What a centre of mass at (x, y) changes, C_ch being about the centre of mass."""
     offset = ca.vertcat(term["x"], term["y"])
     change = _acceleration_at(offset, state) - _acceleration_at(ca.SX.zeros(2), state)
     moment = _cross(offset, _acceleration_at(offset, state))
-    return mass * ca.vertcat(change, moment, ca.SX.zeros(6))
+    return masses.own * ca.vertcat(change, moment, ca.SX.zeros(6))
 
 
-def _payload(term: EffectTerm, state: State, mass: Expression) -> Expression:
-    del mass
+def _payload(term: EffectTerm, state: State, masses: Masses) -> Expression:
+    del masses
     linear = term["mass"] * _acceleration_at(ca.SX.zeros(2), state)
     return ca.vertcat(linear, term["inertia"] * state.accelerations[2], ca.SX.zeros(6))
 
 
-def _scrub(term: EffectTerm, state: State, mass: Expression) -> Expression:
+def _scrub(term: EffectTerm, state: State, masses: Masses) -> Expression:
     """Each contact patch resists the turning of its wheel over the floor; the torque is that of the whole place."""
-    del mass
+    del masses
     sides = [STEERING.index(term.where)] if term.where in STEERING else [0, 1]
     rows = ca.SX.zeros(9)
     for side in sides:
@@ -242,13 +255,13 @@ def _scrub(term: EffectTerm, state: State, mass: Expression) -> Expression:
     return rows
 
 
-def _steering_unit_mass(term: EffectTerm, state: State, mass: Expression) -> Expression:
+def _steering_unit_mass(term: EffectTerm, state: State, masses: Masses) -> Expression:
     """First-moment coupling of four point masses at the wheel contacts.
 
     The masses themselves are part of m_ch, and their inertias about the steering axes of C_l, C_r and C_ch; what is
     left is the difference between a mass at the contact and the same mass at the axis, less that inertia.
     """
-    del mass
+    del masses
     rows = ca.SX.zeros(9)
     for front, side in CORNERS:
         column = 3 if side > 0 else 4
@@ -265,23 +278,24 @@ def _steering_unit_mass(term: EffectTerm, state: State, mass: Expression) -> Exp
     return term["mass"] * rows
 
 
-def _eccentricity(term: EffectTerm, state: State, mass: Expression) -> Expression:
+def _eccentricity(term: EffectTerm, state: State, masses: Masses) -> Expression:
     """A quarter of the weight goes up and down with the axle: ∂/∂β of (m g/4) amplitude cos(β + phase)."""
     wheel = WHEEL_PLACES.index(term.where)
     rows = ca.SX.zeros(9)
-    rows[_FIRST_WHEEL + wheel] = -mass * GRAVITY / 4 * term["amplitude"] * ca.sin(state.beta[wheel] + term["phase"])
+    quarter = masses.loaded * GRAVITY / 4
+    rows[_FIRST_WHEEL + wheel] = -quarter * term["amplitude"] * ca.sin(state.beta[wheel] + term["phase"])
     return rows
 
 
-def _tilted_centre(terms: Sequence[EffectTerm], state: State, mass: Expression) -> Expression:
+def _tilted_centre(terms: Sequence[EffectTerm], state: State, masses: Masses) -> Expression:
     """Weight along the floor, acting at the centre of mass."""
     rows = ca.SX.zeros(9)
     for slope in _of(terms, EffectName.SLOPE):
         bearing = slope["direction"] - state.heading
-        weight = mass * GRAVITY * ca.sin(slope["angle"]) * ca.vertcat(ca.cos(bearing), ca.sin(bearing))
-        rows[:2] += weight
+        uphill = GRAVITY * ca.sin(slope["angle"]) * ca.vertcat(ca.cos(bearing), ca.sin(bearing))
+        rows[:2] += masses.loaded * uphill
         for centre in _of(terms, EffectName.COM_OFFSET):
-            rows[2] += _cross(ca.vertcat(centre["x"], centre["y"]), weight)
+            rows[2] += masses.own * _cross(ca.vertcat(centre["x"], centre["y"]), uphill)
     return rows
 
 

@@ -80,4 +80,4 @@ def creep_columns(inputs: Array, source: Source, setting: Setting) -> Array:
 def _slip(inputs: Array, wheel: int, setting: Setting) -> Array:
     """Slip of a wheel (N,) under its traction for unit creep [m/s]."""
     speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, wheel])
-    return np.asarray(speed * traction(inputs, wheel, setting) / wheel_load(setting))
+    return np.asarray(speed * traction(inputs, wheel, setting) / wheel_load(inputs, setting))

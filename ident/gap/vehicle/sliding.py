@@ -120,12 +120,13 @@ def sliding_cause(where: str) -> SlidingCause:
 def adhesion(inputs: Array, wheels: tuple[int, ...], setting: Setting) -> float:
     """Largest traction of some wheels over a quarter of the weight [-]."""
     pulls = [np.abs(traction(inputs, wheel, setting)).max(initial=0.0) for wheel in wheels]
-    return float(max(pulls)) / wheel_load(setting)
+    return float(max(pulls)) / wheel_load(inputs, setting)
 
 
-def wheel_load(setting: Setting) -> float:
-    """Weight that rests on a wheel: a quarter of all [N]."""
-    return setting["m_ch"] * GRAVITY / 4
+def wheel_load(inputs: Array, setting: Setting) -> float:
+    """Weight that rests on a wheel: a quarter of all, the known load of a step too [N]."""
+    load = float(inputs[0, SLICES["payload"].start])
+    return (setting["m_ch"] + load) * GRAVITY / 4
 
 
 def traction(inputs: Array, wheel: int, setting: Setting) -> Array:

@@ -93,6 +93,16 @@ def test_the_centre_of_mass_is_where_it_was_put_and_the_yaw_inertia_about_it_sta
     assert moving.vehicle.ground_truth().pose[:2] == pytest.approx([0.0, 0.0], abs=1e-4)
 
 
+def test_a_load_stands_over_the_centre_wherever_the_centre_of_mass_is(make: Make) -> None:
+    moving = make("com_offset@chassis=0.08m,y=-0.05m")
+    before, centre, yaw = inertias(moving.vehicle)
+    moving.vehicle.load(200.0)
+    mass, loaded, with_it = inertias(moving.vehicle)
+    assert mass == pytest.approx(before + 200.0)
+    assert mass * loaded == pytest.approx(before * centre, rel=1e-3)
+    assert with_it == pytest.approx(yaw, rel=1e-4)
+
+
 def test_a_centre_of_mass_ahead_loads_the_front_wheels(make: Make) -> None:
     moving = make("com_offset@chassis=0.08m")
     engine = moving.vehicle.engine

@@ -85,6 +85,17 @@ def test_filtered_columns_still_balance_the_filtered_torque(
         assert np.sqrt(np.mean(error**2)) < 1e-3 * np.sqrt(np.mean(rows.torque[rows.moving] ** 2)), rows.step
 
 
+def test_what_a_known_load_takes_is_no_mass_of_the_vehicle(
+    record_of: Callable[..., Record], vehicle: VehicleDescription, truth: Parameters
+) -> None:
+    driven = record_of(vehicle, truth.replaced(m_ch=truth["m_ch"] + 80.0))
+    for segment in driven.segments:
+        loaded = replace(segment, extra={"payload": np.full(len(segment), 80.0)})
+        for rows in equations_of(loaded, vehicle.geometry, Processing()):
+            error = (rows.torque - rows.regressor @ truth.values)[rows.moving]
+            assert np.sqrt(np.mean(error**2)) < 1e-3 * np.sqrt(np.mean(rows.torque[rows.moving] ** 2)), rows.step
+
+
 def test_every_step_gives_the_rows_of_the_coordinate_it_drives(record: Record, vehicle: VehicleDescription) -> None:
     found = {
         segment.step: [rows.coordinate for rows in equations_of(segment, vehicle.geometry, Processing())]

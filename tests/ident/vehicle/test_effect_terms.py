@@ -78,23 +78,26 @@ def test_without_size_no_effect_changes_anything(state: terms.State, vehicle: Ve
     assert np.allclose(number(terms.true_steering(everything, state.alpha), geometry), state.alpha)
 
 
+@pytest.mark.parametrize("load", [0.0, 120.0])
 def test_a_centre_of_mass_off_the_centre_obeys_lagrange_on_a_slope(
-    state: terms.State, vehicle: VehicleDescription
+    state: terms.State, vehicle: VehicleDescription, load: float
 ) -> None:
+    """A load stands over the centre of the chassis, wherever the centre of mass is."""
     offset, angle, direction = np.array([0.11, -0.07]), 0.05, 0.4
     mass, inertia = vehicle.prior["m_ch"], vehicle.prior["C_ch"]
     q, rates = ca.SX.sym("q", 5), ca.SX.sym("qd", 5)
     centre = q[:2] + planar(q[2]) @ offset
     velocity = ca.jtimes(centre, q, rates)
-    kinetic = mass * ca.sumsqr(velocity) / 2 + inertia * rates[2] ** 2 / 2
+    kinetic = (mass * ca.sumsqr(velocity) + load * ca.sumsqr(rates[:2]) + inertia * rates[2] ** 2) / 2
     uphill = np.array([np.cos(direction), np.sin(direction)])
-    potential = mass * terms.GRAVITY * np.sin(angle) * ca.dot(centre, uphill)
+    potential = terms.GRAVITY * np.sin(angle) * ca.dot(mass * centre + load * q[:2], uphill)
     whole = lagrange(kinetic, potential, q, rates, state, vehicle.geometry)
     plain = mass * ca.sumsqr(rates[:2]) / 2 + inertia * rates[2] ** 2 / 2
     expected = whole - lagrange(plain, ca.SX(0), q, rates, state, vehicle.geometry)
     effects = [
         terms.term_of(make_effect(EffectName.COM_OFFSET, "chassis", {"x": offset[0], "y": offset[1]})),
         terms.term_of(make_effect(EffectName.SLOPE, "chassis", {"angle": angle, "direction": direction})),
+        terms.term_of(make_effect(EffectName.PAYLOAD, "chassis", {"mass": load})),
     ]
     added = number(terms.added_forces(effects, state, vehicle.prior.values), vehicle.geometry)
     assert np.allclose(added[:5], expected, rtol=1e-9)

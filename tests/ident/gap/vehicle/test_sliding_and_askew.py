@@ -11,7 +11,7 @@ from ident.gap.problem import Candidate, Channel, Variant
 from ident.gap.vehicle.askew import beside_sliding
 from ident.gap.vehicle.ideal import Drive, ideal_record
 from ident.gap.vehicle.rows import SLICES
-from ident.gap.vehicle.sliding import slides_alone, sliding_cause, sliding_times, traction
+from ident.gap.vehicle.sliding import adhesion, slides_alone, sliding_cause, sliding_times, traction
 from ident.gap.vehicle.sources import Source, sources_of
 from ident.gap.vehicle.transforms import Setting, transform_cause
 from ident.records.record import Step
@@ -49,6 +49,14 @@ def sliding(straight: Source, setting: Setting, wheels: list[int], sense: float 
         spin = setting["B_w"] * differentiate(more, setting.sample_time) + setting["d_vw"] * more
         inputs[:, SLICES["torques"].start + wheel] += spin / setting.geometry.gear_ratio
     return inputs, ahead
+
+
+def test_a_known_load_presses_on_the_wheels(straight: Source, setting: Setting) -> None:
+    loaded = straight.inputs.copy()
+    loaded[:, SLICES["payload"]] = 80.0
+    ratio = (setting["m_ch"] + 80.0) / setting["m_ch"]
+    wheels = (0, 1, 2, 3)
+    assert adhesion(straight.inputs, wheels, setting) == pytest.approx(ratio * adhesion(loaded, wheels, setting))
 
 
 def test_nothing_slides_where_all_wheels_roll(straight: Source, setting: Setting) -> None:
