@@ -150,7 +150,7 @@ def identities(problem: Problem) -> Identities:
             for cause in group
             for positive in (True, False)
         },
-        hidden_effects(block.step for block in problem.blocks),
+        hidden_effects(dict.fromkeys((block.step for block in problem.blocks), 0.0)),
     )
 
 

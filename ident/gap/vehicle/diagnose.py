@@ -16,7 +16,7 @@ from ident.gap.problem import Problem
 from ident.gap.split import split_problem
 from ident.gap.vehicle.belonging import refuse_other_vehicle
 from ident.gap.vehicle.build import build_problem
-from ident.gap.vehicle.experiments import hidden_effects, next_experiment
+from ident.gap.vehicle.experiments import driven_steps, hidden_effects, next_experiment
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EffectName
@@ -77,7 +77,8 @@ def diagnose_vehicle(
         _refuse_zero(model.parameters)
     refuse_other_vehicle((*fit, *confirm), vehicle.geometry)
     _refuse_silent((*fit, *confirm))
-    hidden = hidden_effects(segment.step for record in fit for segment in record.segments)
+    driven = driven_steps(fit, vehicle.prior["m_ch"])
+    hidden = hidden_effects(driven)
     shown = [name for name in effects if name not in hidden]
     fitted = _problem(fit, vehicle, model, shown)
     if confirm:
@@ -88,8 +89,7 @@ def diagnose_vehicle(
     findings = judge(fitted, confirming, seed=seed)
     invisible = tuple(str(name) for name in effects if name in hidden or name in findings.invisible)
     findings = replace(findings, invisible=invisible)
-    advice = next_experiment(findings, [block.step for block in fitted.blocks])
-    return VehicleDiagnosis(findings, advice, (fitted, confirming))
+    return VehicleDiagnosis(findings, next_experiment(findings, driven), (fitted, confirming))
 
 
 def _problem(

@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final
 
 from ident.gap.findings import Findings
-from ident.gap.vehicle.ideal import DIAGNOSTIC
+from ident.gap.vehicle.ideal import DIAGNOSTIC, Drive, Experiment
 from ident.gap.vehicle.library import DRIFTS
 from ident.gap.vehicle.visibility import Sight
 from ident.gap.vehicle.visibility_table import stored_table
+from ident.records.record import Record, base_step
 from ident.vehicle.effects import EffectName
 
+LIGHTEST: Final = 0.09
+"""Mass of a known load over the vehicle's from which it counts as the tenth that the experiment asks for [-]."""
 
-def next_experiment(findings: Findings, steps: Collection[str]) -> str | None:
+Driven = Mapping[str, float]
+"""Steps by name, with the heaviest known load of each over the mass of the vehicle [-]."""
+
+
+def driven_steps(records: Iterable[Record], mass: float) -> Driven:
+    """What records hold of a vehicle of some mass [kg]."""
+    driven: dict[str, float] = {}
+    for segment in (segment for record in records for segment in record.segments):
+        driven[segment.step] = max(driven.get(segment.step, 0.0), segment.payload / mass)
+    return driven
+
+
+def next_experiment(findings: Findings, driven: Driven) -> str | None:
     """Advice to a person.
 
     Args:
         findings: of a diagnosis.
-        steps: names that it was made from.
+        driven: what it was made from.
 
     Returns:
         None where nothing is in doubt that another experiment would clear up.
@@ -25,19 +41,18 @@ def next_experiment(findings: Findings, steps: Collection[str]) -> str | None:
     diagnosis = findings.diagnosis()
     for effect in diagnosis.effects:
         rivals = [name for name in effect.ambiguity_set if name != effect.name]
-        advice = _splitting(f"{effect.name}@{effect.where}", rivals, steps) if rivals else None
+        advice = _splitting(f"{effect.name}@{effect.where}", rivals, driven) if rivals else None
         if advice is not None:
             return f"To tell {effect.name} from {' and '.join(rivals)}: {advice}."
-    return _showing(diagnosis.invisible, steps)
+    return _showing(diagnosis.invisible, driven)
 
 
-def hidden_effects(steps: Iterable[str]) -> frozenset[EffectName]:
+def hidden_effects(driven: Driven) -> frozenset[EffectName]:
     """Effects that an experiment of these steps cannot show, by the equations.
 
     What breaks the equations, a sliding wheel for one, can look like them; they are not candidates. Changed parameters
     are: they are hidden only as long as the parameters are free.
     """
-    driven = frozenset(steps)
     done = ["four steps", *(name for name in DIAGNOSTIC if name not in _open(driven))]
     names = {key.partition("@")[0] for key in stored_table()["four steps"]} - set(DRIFTS)
     return frozenset(
@@ -45,30 +60,37 @@ def hidden_effects(steps: Iterable[str]) -> frozenset[EffectName]:
     )
 
 
-def _splitting(key: str, rivals: Sequence[str], steps: Collection[str]) -> str | None:
+def _splitting(key: str, rivals: Sequence[str], driven: Driven) -> str | None:
     """Of the experiments not driven yet, the first that leaves none of the rivals alike."""
-    for name in _open(steps):
+    for name in _open(driven):
         sight = stored_table()[name].get(key)
         if sight is not None and sight.visible and not set(sight.alike_effects(key.partition("@")[0])) & set(rivals):
             return DIAGNOSTIC[name].advice
     return None
 
 
-def _showing(invisible: Sequence[str], steps: Collection[str]) -> str | None:
+def _showing(invisible: Sequence[str], driven: Driven) -> str | None:
     """Of the experiments not driven yet, the one that shows most of what is invisible."""
-    shown = {name: [effect for effect in invisible if _seen(effect, stored_table()[name])] for name in _open(steps)}
+    shown = {name: [effect for effect in invisible if _seen(effect, stored_table()[name])] for name in _open(driven)}
     best = max(shown, key=lambda name: len(shown[name]), default=None)
     if best is None or not shown[best]:
         return None
     return f"To see {' and '.join(shown[best])} as well: {DIAGNOSTIC[best].advice}."
 
 
-def _open(steps: Collection[str]) -> list[str]:
-    return [
-        name
-        for name, experiment in DIAGNOSTIC.items()
-        if not all(any(step.startswith(drive.name) for step in steps) for drive in experiment.drives)
-    ]
+def _open(driven: Driven) -> list[str]:
+    return [name for name, experiment in DIAGNOSTIC.items() if not _is_done(experiment, driven)]
+
+
+def _is_done(experiment: Experiment, driven: Driven) -> bool:
+    return all(any(_is(drive, step, load) for step, load in driven.items()) for drive in experiment.drives)
+
+
+def _is(drive: Drive, step: str, load: float) -> bool:
+    """Whether a step is that drive: by its load where the drive has one, whatever it is called, else by its name."""
+    if drive.payload:
+        return base_step(step) is drive.step and load >= LIGHTEST
+    return step.startswith(drive.name)
 
 
 def _seen(effect: str, sights: Mapping[str, Sight]) -> bool:

@@ -1,0 +1,40 @@
+"""What was driven decides what can be seen, and what is advised next; a load counts by what it weighs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ident.gap.vehicle.experiments import driven_steps, hidden_effects
+from ident.gap.vehicle.ideal import FOUR, ideal_record
+from ident.records.record import PAYLOAD, Record, Segment
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effects import EffectName
+
+FOUR_STEPS = dict.fromkeys((drive.name for drive in FOUR), 0.0)
+
+
+def loaded(segment: Segment, name: str, mass: float) -> Segment:
+    return replace(segment, step=name, extra={PAYLOAD: np.full(len(segment), mass)})
+
+
+@pytest.mark.parametrize(
+    ("suffix", "load", "seen"), [("_loaded", 0.1, True), ("", 0.1, True), ("_loaded", 0.0, False), ("", 0.04, False)]
+)
+def test_a_load_is_known_by_its_mass_and_not_by_the_name_of_its_step(suffix: str, load: float, seen: bool) -> None:
+    driven = FOUR_STEPS | {f"straight{suffix}": load, f"rotation{suffix}": load}
+    assert (EffectName.TORQUE_GAIN not in hidden_effects(driven)) is seen
+
+
+def test_the_heaviest_load_of_a_step_counts(prototype: VehicleDescription) -> None:
+    mass = prototype.prior["m_ch"]
+    straight = next(segment for segment in ideal_record(FOUR, prototype).segments if segment.step == "straight")
+    records = [Record([loaded(straight, "straight", weight * mass)], "one") for weight in (0.1, 0.2, 0.0)]
+    assert driven_steps(records, mass) == {"straight": pytest.approx(0.2)}
+
+
+def test_steps_without_a_load_are_known_by_name() -> None:
+    assert EffectName.TORQUE_GAIN not in hidden_effects(FOUR_STEPS | {"straight_dither": 0.0, "rotation_dither": 0.0})
+    assert EffectName.TORQUE_GAIN in hidden_effects(FOUR_STEPS | {"straight_dither": 0.0})
