@@ -188,7 +188,9 @@ def _refuse_unexcited(estimates: Sequence[Estimate]) -> None:
         named = ", ".join(f"{e.name} ({e.value:.3g} ± {e.std:.3g} {e.unit})" for e in lost)
         steps = ", ".join(f"{e.name}: {INERTIAL[e.name]}" for e in lost)
         raise EstimationError(
-            f"The data hardly excite {named}.", f"Add or repeat the step that does, with more acceleration ({steps})."
+            f"The data hardly excite {named}.",
+            f"Add or repeat the step that does, with more acceleration ({steps}). If it was fast, the model lacks "
+            "something: quasiomni diagnose says what.",
         )
 
 

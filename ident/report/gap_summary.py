@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from ident.gap.diagnosis import Diagnosis, NamedEffect, Share, Verdict
@@ -34,8 +35,16 @@ def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
     if diagnosis.invisible:
         lines.append(f"These records cannot show: {', '.join(diagnosis.invisible)}.")
     lines.append(f"Next: {next_text(diagnosis)}")
-    causes = [cause_line(effect) for effect in diagnosis.effects]
-    return [verdict_line(diagnosis, findings), *causes[: MOST_LINES - 1 - len(lines)], *lines]
+    causes = _shortened([cause_line(effect) for effect in diagnosis.effects], MOST_LINES - 1 - len(lines))
+    return [verdict_line(diagnosis, findings), *causes, *lines]
+
+
+def _shortened(causes: Sequence[str], room: int) -> list[str]:
+    """The first of them, and how many more there are where room lacks."""
+    if len(causes) <= room:
+        return list(causes)
+    shown = max(room - 1, 0)
+    return [*causes[:shown], f"  and {len(causes) - shown} more (--report FILE shows them)"]
 
 
 def verdict_line(diagnosis: Diagnosis, findings: Findings) -> str:

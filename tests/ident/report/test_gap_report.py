@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ident.gap.diagnosis import Diagnosis, Gap, NamedEffect, Share, Verdict
+from ident.gap.diagnosis import Diagnosis, Gap, NamedEffect, Share, Unseen, Verdict
 from ident.gap.findings import Findings
 from ident.gap.judge import judge
 from ident.gap.problem import Block, Candidate, Channel, Problem, Variant
@@ -163,8 +163,20 @@ def test_ten_lines_say_it_all(findings: Findings, verdict: Verdict, count: int) 
     assert len(lines) <= 10
     assert lines[-1] == "Next: drive a circle"
     assert sum("might as well be slope" in line for line in lines) == count
+    assert not any("more (--report" in line for line in lines)
     assert any("2.00 times the noise" in line for line in lines)
     assert any("80 % of it in straight, x" in line for line in lines) is (verdict is not Verdict.NONE)
+
+
+def test_causes_that_ten_lines_have_no_room_for_are_counted(findings: Findings) -> None:
+    gap = Gap(4.0, 1.1, 1.0)
+    unseen = tuple(Unseen(steps, "dynamic", gap) for steps in ("repeated", "lane_change"))
+    many = replace(_diagnosis(Verdict.EFFECT, 4), unseen=unseen)
+    lines = summary_lines(replace(findings, events=("slip@wheel_fl",)), many)
+    assert len(lines) == 10
+    shown = sum("might as well be slope" in line for line in lines)
+    assert f"  and {4 - shown} more (--report FILE shows them)" in lines
+    assert lines[-1] == "Next: drive a circle"
 
 
 def test_a_cause_of_no_size_is_said_to_be_what_comes_along_with_it(findings: Findings) -> None:
