@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -9,6 +10,7 @@ from fmu.model.generate import generate_core
 from fmu.parameter_rows import parameters_of
 from fmu.table import neutral_effects, variable_table
 from fmu.variables import Inputs, VariableTable
+from ident.errors import DataFileError
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import Effect
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
@@ -21,9 +23,12 @@ class ModelSource:
     Attributes:
         vehicle: geometry and limits.
         parameters: identified, with standard deviations.
-        effects: confirmed.
+        effects: confirmed, each once at a place.
         provenance: what a reader must know to repeat it, by name.
         documents: files that go along as they are, by file name.
+
+    Raises:
+        DataFileError: an effect is twice at a place; its parameters would have one name.
     """
 
     vehicle: VehicleDescription
@@ -31,6 +36,14 @@ class ModelSource:
     effects: tuple[Effect, ...]
     provenance: Mapping[str, str]
     documents: Mapping[str, bytes]
+
+    def __post_init__(self) -> None:
+        for effect, count in Counter(str(effect) for effect in self.effects).items():
+            if count > 1:
+                raise DataFileError(
+                    f"{effect} is there {count} times, with numbers that do not add up to one.",
+                    "Leave one entry of it in the file of parameters.",
+                )
 
     @property
     def standard_deviations(self) -> Mapping[str, float]:

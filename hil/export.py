@@ -15,6 +15,7 @@ from fmu.source import ModelSource
 from hil.campaign.folder import open_run
 from hil.workflow import progress, provenance_of
 from ident.errors import DataFileError
+from ident.vehicle.combining import combined
 from ident.vehicle.description import load_vehicle
 from ident.vehicle.effect_text import read_effects
 from ident.vehicle.parameters import read_parameters
@@ -53,14 +54,14 @@ def source_of_files(parameters: Path, vehicle: Path, provenance: dict[str, str])
     """The model of a file of parameters, with the effects in it, and a vehicle file.
 
     Raises:
-        DataFileError: a file is missing or malformed.
+        DataFileError: a file is missing or malformed, or has an effect twice that cannot be one.
     """
     return ModelSource(
         vehicle=load_vehicle(vehicle),
         parameters=read_parameters(parameters),
-        effects=read_effects(read_toml(parameters), str(parameters)),
+        effects=combined(read_effects(read_toml(parameters), str(parameters))),
         provenance=provenance,
-        documents={parameters.name: parameters.read_bytes(), "vehicle.toml": vehicle.read_bytes()},
+        documents={"parameters.toml": parameters.read_bytes(), "vehicle.toml": vehicle.read_bytes()},
     )
 
 

@@ -18,6 +18,7 @@ from ident.records.files import write_record
 from ident.records.record import Record
 from ident.vehicle.description import load_vehicle
 from ident.vehicle.extended import read_model
+from ident.vehicle.quantities import read_toml
 
 Quasi = Callable[..., Any]
 
@@ -167,6 +168,7 @@ def test_the_model_with_its_effects_is_written_for_every_command_that_takes_a_mo
     assert "outcome" in answer.out
     effect = read_model(extended).effects[0]
     assert effect.where in ("drive_fr", "wheel_fr")
+    assert read_toml(extended)["source"] == {"run": "diagnosis", "records": fit.name, "confirm": confirm.name}
     judged = quasi("diagnose", fit, "--confirm", confirm, "--model", extended, "--extended", tmp_path / "again.toml")
     assert "Nothing is missing" in judged.out
     assert "again.toml is not written: no effect is named." in " ".join(judged.out.split())

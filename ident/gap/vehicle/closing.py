@@ -21,6 +21,7 @@ from ident.gap.vehicle.outcome import outcomes
 from ident.gap.vehicle.sources import Source, sources_of
 from ident.records.record import Record
 from ident.records.repeats import repeats_of
+from ident.vehicle.combining import combined
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import Effect, EffectName, make_effect
 from ident.vehicle.extended import ExtendedModel
@@ -59,7 +60,7 @@ def extended_model(
         findings: of a diagnosis.
         guesses: the vehicle file's, for what the records do not show where no model was given (the four steps do not
             split B_w from inertias and mass, and a gear that gives way needs it).
-        given: effects that the model that was judged has already.
+        given: effects that the model that was judged has already; more of one of them is added to it.
         held_out: whether the confirming rows take no part.
     """
     refit = findings.held_out.extended if held_out else findings.after
@@ -70,7 +71,7 @@ def extended_model(
         names = [entry.name for entry in candidate.parameters]
         values, std = (dict(zip(names, numbers.tolist(), strict=True)) for numbers in (part.values, part.std))
         effects.append(make_effect(EffectName(candidate.effect), candidate.where, values, std))
-    return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), (*given, *effects))
+    return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), combined((*given, *effects)))
 
 
 def plain_model(
@@ -139,6 +140,7 @@ def compared(
     before: ExtendedModel,
     after: ExtendedModel,
     *,
+    part: Callable[[Source], Source] | None = None,
     repeated: Sequence[Record] = (),
 ) -> Comparison:
     """Two models on records, in units of the noise between repeats of each coordinate.
@@ -147,7 +149,8 @@ def compared(
         records: that neither model was fitted to; a lane change counts too.
         vehicle: its geometry.
         before, after: the models.
-        repeated: further records of the vehicle, for the noise alone, where those above repeat nothing.
+        part: rows of a source that are compared; None: all.
+        repeated: further records of the vehicle, for the noise alone, where some coordinate above does not repeat.
 
     Raises:
         RecordError: a record has no step that the model describes.
@@ -161,10 +164,16 @@ def compared(
     def left_by(model: ExtendedModel, sources: Sequence[Source]) -> list[Series]:
         return list(_series(sources, vehicle, model, processing)) if sources else []
 
-    sources = rows_of(records)
+    sources = rows_of(records) if part is None else [part(source) for source in rows_of(records)]
+    sources = [source for source in sources if any(moving.any() for moving in source.moving)]
     first = left_by(before, sources)
     second = first if after is before else left_by(after, sources)
-    return Comparison(first, second, _floors([*second, *left_by(after, rows_of(repeated))]))
+    floors = _floors(second)
+    # Simulating takes long: other records are asked for the noise only where these do not show it.
+    if any((one.channel, one.coordinate) not in floors and one.folded.size for one in second):
+        repeating = [record for record in repeated if any(len(segment.periods) > 1 for segment in record.segments)]
+        floors = _floors([*second, *left_by(after, rows_of(repeating))])
+    return Comparison(first, second, floors)
 
 
 def _series(

@@ -8,8 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ident.estimate.filters import Processing
 from ident.gap.vehicle.closing import extended_model
 from ident.gap.vehicle.diagnose import diagnose_vehicle
+from ident.gap.vehicle.ideal import DIAGNOSTIC
+from ident.gap.vehicle.sources import DIAGNOSED, Source, sources_of
 from ident.gap.vehicle.unseen import later_part, unseen_gaps
 from ident.records.record import Record, Segment
 from ident.vehicle.description import VehicleDescription
@@ -47,6 +50,15 @@ def test_a_lane_change_is_told_apart(prototype: VehicleDescription, drives: Driv
     assert changed["dynamic"].closed > 0.8
 
 
+def test_more_of_an_effect_that_the_model_has_is_one_effect(prototype: VehicleDescription, drives: Drives) -> None:
+    known = make_effect(EffectName.TORQUE_BIAS, "drive_fr", {"bias": 0.03}, {"bias": 0.001})
+    fit, confirm = drives(prototype, biased)
+    model = ExtendedModel(replace(prototype.prior, std=0.005 * prototype.prior.values), (known,))
+    findings = diagnose_vehicle([fit], [confirm], prototype, model, effects=(EffectName.TORQUE_BIAS,)).findings
+    (bias,) = extended_model(findings, prototype.prior, given=model.effects).effects
+    assert bias["bias"] == pytest.approx(0.05, abs=0.003)
+
+
 def test_the_model_that_was_given_keeps_its_effects(prototype: VehicleDescription, drives: Drives) -> None:
     known = make_effect(EffectName.QUADRATIC_DRAG, "chassis", {"coefficient": 0.001})
     fit, confirm = drives(prototype, biased)
@@ -57,37 +69,65 @@ def test_the_model_that_was_given_keeps_its_effects(prototype: VehicleDescriptio
     assert {effect.where for effect in extended.effects[1:]} & {"drive_fr", "wheel_fr"}
 
 
-def test_the_later_repeats_of_a_step_are_its_later_part(drives: Drives, prototype: VehicleDescription) -> None:
-    fit, _ = drives(prototype, lambda segment: segment)
-    later = later_part(fit)
-    assert later is not None
-    for whole, part in zip(fit.segments, later.segments, strict=True):
-        fitted = whole.periods[: (len(whole.periods) + 1) // 2]
-        assert set(part.periods) == set(whole.periods) - set(fitted)
-        assert len(part.motor_torques) == len(part) < len(whole)
+@pytest.fixture(scope="module")
+def sources(drives: Drives, prototype: VehicleDescription) -> list[Source]:
+    return sources_of(drives(prototype, lambda segment: segment)[0], prototype.geometry, DIAGNOSED, Processing())
 
 
-def test_of_a_record_without_repeats_the_end_is_held_out(prototype: VehicleDescription, drives: Drives) -> None:
-    fit, _ = drives(prototype, lambda segment: segment)
-    segments = [replace(segment, period=np.full(len(segment), -1)) for segment in fit.segments]
-    later = later_part(replace(fit, segments=segments))
-    assert later is not None
-    assert len(later.segments[0]) == pytest.approx(0.4 * len(segments[0]), abs=2)
+def test_the_later_repeats_of_a_step_are_its_later_part(sources: list[Source]) -> None:
+    for source in sources:
+        later = later_part(source)
+        assert set(np.unique(source.period)) == {0, 1}
+        assert set(np.unique(later.period)) == {-1, 1}
+        assert len(later.inputs) == len(source.inputs), "what was before is still what an effect remembers"
+        for rows, whole in zip(later.moving, source.moving, strict=True):
+            np.testing.assert_array_equal(rows, whole & (source.period == 1))
 
 
-def test_where_nothing_moves_in_what_is_held_out_there_is_nothing_to_say(
+def test_of_a_record_without_repeats_the_end_is_held_out(sources: list[Source]) -> None:
+    source = replace(sources[0], period=np.full_like(sources[0].period, -1))
+    (rows,), (whole,) = later_part(source).moving, source.moving
+    assert rows.sum() == pytest.approx(0.4 * whole.sum(), rel=0.05)
+    assert np.flatnonzero(rows)[-1] == np.flatnonzero(whole)[-1]
+
+
+def test_a_lane_change_is_held_out_whole(sources: list[Source]) -> None:
+    lane = replace(sources[0], step="lane_change")
+    assert later_part(lane) is lane
+
+
+def test_a_turn_between_the_steps_is_driven_though_it_is_no_part_that_repeats(
     prototype: VehicleDescription, drives: Drives
 ) -> None:
-    fit, confirm = drives(prototype, lambda segment: segment)
-    findings = diagnose_vehicle([fit], [confirm], prototype).findings
+    """A floor that rises one way helps the other way: whoever loses half a turn has a gap twice as large."""
+    force = prototype.prior["m_ch"] * 9.81 * np.sin(0.01)
+    torque = force * prototype.geometry.wheel_radius / (4 * prototype.geometry.gear_ratio)
+    uphill = {"straight": 1.0, "straight_turned": -1.0}
 
-    def stopped(segment: Segment) -> Segment:
-        """Standing through the later 60 %, in a record that numbers no repeats."""
-        last = int(0.4 * len(segment))
-        wheels, steering = segment.wheel_angles.copy(), segment.steering_angles.copy()
-        wheels[last:], steering[last:] = wheels[last], steering[last]
-        period = np.full(len(segment), -1)
-        return replace(segment, wheel_angles=wheels, steering_angles=steering, period=period)
+    def on_a_slope(segment: Segment) -> Segment:
+        return replace(segment, motor_torques=segment.motor_torques + uphill.get(segment.step, 0.0) * torque)
 
-    still = replace(fit, segments=[stopped(segment) for segment in fit.segments])
-    assert unseen_gaps(findings, [still], [], prototype) == ()
+    fit, _ = drives(prototype, on_a_slope, DIAGNOSTIC["two headings"].drives)
+    findings = diagnose_vehicle([fit], [], prototype).findings
+    assert "slope@chassis" in {cause.candidate.key for cause in findings.causes}
+    dynamic = next(one.gap for one in unseen_gaps(findings, [fit], [], prototype) if one.channel == "dynamic")
+    assert dynamic.before > 5
+    assert dynamic.after < 1.5
+
+
+def test_a_record_that_numbers_no_repeats_confirms_in_the_noise_of_those_that_do(
+    prototype: VehicleDescription, drives: Drives
+) -> None:
+    fit, confirm = drives(prototype, biased)
+    once = replace(confirm, segments=[replace(s, period=np.full(len(s), -1)) for s in confirm.segments])
+    findings = diagnose_vehicle([fit], [once], prototype).findings
+    found = {one.channel: one.gap for one in unseen_gaps(findings, [fit], [once], prototype)}
+    assert set(found) == {"kinematic", "dynamic", "outcome"}
+    assert found["dynamic"].closed > 0.8
+
+
+def test_without_any_repeat_there_is_no_noise_to_measure_in(prototype: VehicleDescription, drives: Drives) -> None:
+    fit, _ = drives(prototype, biased)
+    once = replace(fit, segments=[replace(s, period=np.full(len(s), -1)) for s in fit.segments])
+    findings = diagnose_vehicle([once], [], prototype).findings
+    assert {one.channel for one in unseen_gaps(findings, [once], [], prototype)} <= {"kinematic"}

@@ -1,0 +1,121 @@
+"""Two entries of an effect become one exactly where the equations of both are those of one."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ident.vehicle import effect_terms as terms
+from ident.vehicle import symbolic
+from ident.vehicle.combining import combined
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effects import EFFECTS, Effect, EffectName, make_effect
+from ident.vehicle.extended import ExtendedModel
+
+Array = NDArray[np.float64]
+
+NEARLY = {EffectName.COM_OFFSET: 1e-3, EffectName.SLOPE: 1e-3}
+"""Sizes for which terms add up that are not quite linear."""
+KEPT = {EffectName.STRIBECK: {"velocity": 0.4}, EffectName.TORQUE_RIPPLE: {"order": 3.0}}
+"""What two entries of one effect have in common."""
+MEMORIES = (EffectName.TIME_DELAY, EffectName.ELASTICITY, EffectName.BACKLASH)
+
+
+def everything(effects: tuple[Effect, ...], vehicle: VehicleDescription) -> Array:
+    """All that effects are in the equations, one number behind the other."""
+    generator = np.random.default_rng(3)
+    alpha, beta, rates, accelerations = (generator.normal(size=count) for count in (2, 4, 9, 9))
+    state = terms.State(0.3, alpha, beta, rates, accelerations)
+    there = [terms.term_of(effect) for effect in effects]
+    parts = (
+        terms.added_forces(there, state, vehicle.prior.values),
+        terms.changed_parameters(there, vehicle.prior.values),
+        terms.shaft_torques(there, np.array([1.0, -2.0, 3.0, 0.5]), beta),
+        terms.rolling_radii(there, beta),
+        terms.true_steering(there, alpha),
+    )
+    column = ca.densify(ca.vertcat(*parts))
+    function = ca.Function("f", [symbolic.GEOMETRY, symbolic.EPSILON], [column])
+    return np.asarray(function(vehicle.geometry.as_vector(), 0.01)).ravel()
+
+
+def pair(name: EffectName) -> tuple[Effect, Effect]:
+    generator, spec = np.random.default_rng(5), EFFECTS[name]
+    kept, scale = KEPT.get(name, {}), NEARLY.get(name, 1.0)
+
+    def one() -> Effect:
+        values = {entry.name: float(generator.uniform(0.1, 0.9)) for entry in spec.parameters}
+        values[spec.size.name] *= scale
+        if name is EffectName.COM_OFFSET:
+            values["y"] *= scale
+        return make_effect(name, spec.places[-1], values | kept, dict.fromkeys(values, 0.1))
+
+    return one(), one()
+
+
+@pytest.mark.parametrize("name", terms.TERMS)
+def test_the_one_does_what_the_two_did(name: EffectName, vehicle: VehicleDescription) -> None:
+    two = pair(name)
+    one = combined(two)
+    assert len(one) == 1
+    plain, summed, separate = (everything(each, vehicle) for each in ((), one, two))
+    # Compared with what the effect changes; curvature is left of the two that are not linear.
+    change = np.abs(separate - plain).max()
+    assert change > 0
+    np.testing.assert_allclose(summed, separate, atol=(2e-3 if name in NEARLY else 1e-10) * change, rtol=0)
+
+
+@pytest.mark.parametrize("name", MEMORIES)
+def test_dead_times_plays_and_compliances_add(name: EffectName, vehicle: VehicleDescription) -> None:
+    two = pair(name)
+    assert len(combined(two)) == 1
+    one, separate = (ExtendedModel(vehicle.prior, effects) for effects in (combined(two), two))
+    for of in (ExtendedModel.encoder_delays, ExtendedModel.drive_delays):
+        np.testing.assert_allclose(of(one), of(separate))
+    assert one.springs == separate.springs
+
+
+def test_uncertainties_add_as_those_of_independent_numbers() -> None:
+    generator = np.random.default_rng(1)
+    two = pair(EffectName.WHEEL_ECCENTRICITY)
+    drawn = [
+        effect["amplitude"] * (1 + 0.01 * generator.normal(size=200_000))
+        * np.exp(1j * (effect["phase"] + 0.01 * generator.normal(size=200_000)))
+        for effect in two
+    ]  # fmt: skip
+    stated = [
+        make_effect(
+            effect.name,
+            effect.where,
+            {"amplitude": effect["amplitude"], "phase": effect["phase"]},
+            {"amplitude": 0.01 * effect["amplitude"], "phase": 0.01},
+        )
+        for effect in two
+    ]
+    (one,) = combined(stated)
+    assert one.parameters["amplitude"].std == pytest.approx(np.abs(sum(drawn)).std(), rel=0.02)
+    assert one.parameters["phase"].std == pytest.approx(np.angle(sum(drawn)).std(), rel=0.02)
+
+
+def test_what_takes_all_of_an_effect_away_leaves_no_direction() -> None:
+    ahead, back = (make_effect(EffectName.SLOPE, "chassis", {"angle": a}, {"angle": 0.1}) for a in (0.02, -0.02))
+    (none,) = combined((ahead, back))
+    assert none["angle"] == 0
+    assert none.parameters["direction"].std == pytest.approx(np.pi)
+
+
+@pytest.mark.parametrize("name", [EffectName.STRIBECK, EffectName.TORQUE_RIPPLE, EffectName.SLIP])
+def test_what_is_not_one_stays_two(name: EffectName) -> None:
+    """Friction that falls off elsewhere, a ripple of another order; coefficients of friction are never added."""
+    first, second = pair(name)
+    other = {"velocity": 0.9} if name is EffectName.STRIBECK else {"order": 7.0}
+    values = {key: second[key] for key in second.parameters}
+    changed = make_effect(name, second.where, values | {k: v for k, v in other.items() if k in values})
+    assert combined((first, changed)) == (first, changed)
+
+
+def test_other_places_and_names_are_left_alone() -> None:
+    effects = tuple(make_effect(EffectName.TORQUE_BIAS, f"drive_{wheel}", {"bias": 0.1}) for wheel in ("fl", "rr"))
+    assert combined(effects) == effects
