@@ -186,9 +186,9 @@ def _series(
         for row, name in enumerate(source.coordinates):
             rows = _folded(residual[:, row], source.moving[row][:: source.factor], source.period[:: source.factor])
             yield Series(source.channel, source.step, name, rows, least)
-        for outcome in outcomes(source, model, vehicle.geometry):
-            rows = _folded_runs(outcome.differences, outcome.repeat, outcome.place)
-            yield Series(Channel.OUTCOME, outcome.step, outcome.coordinate, rows)
+    for outcome in outcomes(sources, model, vehicle.geometry):
+        rows = _folded_runs(outcome.differences, outcome.repeat, outcome.place)
+        yield Series(Channel.OUTCOME, outcome.step, outcome.coordinate, rows)
 
 
 def _creep(source: Source, vehicle: VehicleDescription) -> float:

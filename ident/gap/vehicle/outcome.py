@@ -6,6 +6,7 @@ a steering encoder that is late or misadjusted is put right in the record.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -21,6 +22,7 @@ from ident.vehicle.effects import EffectName, make_effect
 from ident.vehicle.extended import ExtendedModel
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.kinematics import GENERALIZED_VELOCITIES
+from ident.vehicle.modes import Mode
 from ident.vehicle.simulation import Motion, Readings, Simulation
 
 Array = NDArray[np.float64]
@@ -47,37 +49,72 @@ class Outcome:
     place: NDArray[np.int64]
 
 
-def outcomes(source: Source, model: ExtendedModel, geometry: Geometry) -> list[Outcome]:
-    """Differences of the coordinates that a segment moves; none for wheels in the air, or where nothing moves long."""
-    mode = source.spec.mode
-    if source.channel is not Channel.DYNAMIC or mode is None:
-        return []
+@dataclass(frozen=True, eq=False)
+class _Runs:
+    """Runs of one segment.
+
+    Attributes:
+        source: the segment.
+        inputs: (W, T, INPUTS) recorded, encoders put right.
+        repeat, place: (W,) as of an outcome.
+    """
+
+    source: Source
+    inputs: Array
+    repeat: NDArray[np.int64]
+    place: NDArray[np.int64]
+
+    @property
+    def simulated_with(self) -> tuple[Mode, float, float]:
+        """Mode, sample time [s] and known load [kg]: runs that have these in common are simulated at once."""
+        assert self.source.spec.mode is not None
+        return self.source.spec.mode, self.source.sample_time, float(self.source.inputs[0, SLICES["payload"].start])
+
+
+def outcomes(sources: Iterable[Source], model: ExtendedModel, geometry: Geometry) -> list[Outcome]:
+    """Differences of the coordinates that segments move; none for wheels in the air, or where nothing moves long."""
+    groups: dict[tuple[Mode, float, float], list[_Runs]] = {}
+    for source in sources:
+        runs = _runs(source, model)
+        if runs is not None:
+            groups.setdefault(runs.simulated_with, []).append(runs)
+    return [outcome for (mode, *_), runs in groups.items() for outcome in _simulated(runs, mode, model, geometry)]
+
+
+def _runs(source: Source, model: ExtendedModel) -> _Runs | None:
+    if source.channel is not Channel.DYNAMIC or source.spec.mode is None:
+        return None
     length = round(HORIZON / source.sample_time) + 1
     starts, repeat, place = _starts(source, length)
     if not len(starts):
-        return []
+        return None
     inputs = without_encoder_errors(source.inputs, model, source.sample_time)[starts[:, None] + np.arange(length)]
+    return _Runs(source, inputs, repeat, place)
+
+
+def _simulated(group: Sequence[_Runs], mode: Mode, model: ExtendedModel, geometry: Geometry) -> Iterable[Outcome]:
+    inputs = np.concatenate([runs.inputs for runs in group])
     read = Readings(inputs[..., SLICES["alpha_rate"]], inputs[..., SLICES["beta_rate"]])
-    recorded = _velocities(source, inputs, read, geometry)
+    recorded = _velocities(mode, inputs, read, geometry)
     start = Motion(
         inputs[:, 0, SLICES["heading"].start],
         inputs[:, 0, SLICES["alpha"]],
         inputs[:, 0, SLICES["beta"]],
         recorded[:, 0],
     )
-    simulation = Simulation(_loaded(model, source), mode, geometry)
-    run = simulation.run_from_readings(start, read, inputs[:, :, SLICES["torques"]], source.sample_time)
-    simulated = _velocities(source, inputs, run.readings, geometry)
+    _, sample_time, load = group[0].simulated_with
+    simulation = Simulation(_loaded(model, load), mode, geometry)
+    run = simulation.run_from_readings(start, read, inputs[:, :, SLICES["torques"]], sample_time)
+    differences = (_velocities(mode, inputs, run.readings, geometry) - recorded)[:, 1:]
     names = GENERALIZED_VELOCITIES[mode]
-    return [
-        Outcome(source.step, name, (simulated - recorded)[:, 1:, names.index(name)], repeat, place)
-        for name in source.spec.coordinates
-    ]
+    borders = np.cumsum([len(runs.inputs) for runs in group])[:-1]
+    for runs, own in zip(group, np.split(differences, borders), strict=True):
+        for name in runs.source.spec.coordinates:
+            yield Outcome(runs.source.step, name, own[..., names.index(name)], runs.repeat, runs.place)
 
 
-def _loaded(model: ExtendedModel, source: Source) -> ExtendedModel:
-    """The model with the known load of a segment aboard."""
-    mass = float(source.inputs[0, SLICES["payload"].start])
+def _loaded(model: ExtendedModel, mass: float) -> ExtendedModel:
+    """The model with a known load [kg] aboard."""
     load = make_effect(EffectName.PAYLOAD, "chassis", {"mass": mass, "inertia": 0.0})
     return replace(model, effects=(*model.effects, load)) if mass else model
 
@@ -106,10 +143,8 @@ def without_encoder_errors(inputs: Array, model: ExtendedModel, sample_time: flo
     return true
 
 
-def _velocities(source: Source, inputs: Array, read: Readings, geometry: Geometry) -> Array:
+def _velocities(mode: Mode, inputs: Array, read: Readings, geometry: Geometry) -> Array:
     """ṡ_k (W, T, n_k) that rates of the joints, as their encoders read them, stand for at the recorded angles."""
-    mode = source.spec.mode
-    assert mode is not None
     H = kinematics.complement(mode, inputs.reshape(-1, inputs.shape[-1])[:, SLICES["alpha"]], geometry)[:, 3:]
     rates = np.concatenate([read.steering_rates, read.wheel_rates], axis=-1).reshape(-1, H.shape[1])
     solved = np.einsum("nij,nj->ni", np.linalg.pinv(H), rates)
