@@ -33,7 +33,8 @@ def combined(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """The same effects, those of one name and place as one where their equations add up to one.
 
     What does not add up must be equal: two ripples of one order are a ripple, two Stribeck frictions that fall off at
-    other rates stay two. Uncertainties add as those of independent numbers.
+    other rates stay two. A later entry is what was found beside an earlier one, which was taken as it is: how sure the
+    sum is, the later one says.
     """
     found: list[Effect] = []
     for effect in effects:
@@ -69,16 +70,15 @@ def _sum(first: Effect, second: Effect) -> Effect:
 def _plain_sum(first: Effect, second: Effect) -> tuple[dict[str, float], dict[str, float]]:
     names = _added(first.name)
     values = {name: first[name] + second[name] for name in names}
-    return values, {name: math.hypot(first.parameters[name].std, second.parameters[name].std) for name in names}
+    return values, {name: second.parameters[name].std for name in names}
 
 
 def _vector_sum(first: Effect, second: Effect) -> tuple[dict[str, float], dict[str, float]]:
     names = _POLAR[first.name]
-    vectors, spreads = zip(*(_cartesian(effect, names) for effect in (first, second)), strict=True)
-    total = np.sum(vectors, axis=0)
+    (known, _), (found, covariance) = (_cartesian(effect, names) for effect in (first, second))
+    total = known + found
     length, angle = float(np.hypot(*total)), float(np.arctan2(total[1], total[0]))
     along, across = _axes(angle)
-    covariance = np.sum(spreads, axis=0)
     std = (math.sqrt(along @ covariance @ along), math.sqrt(across @ covariance @ across))
     turn = min(std[1] / length, math.pi) if length else math.pi
     return dict(zip(names, (length, angle), strict=True)), dict(zip(names, (std[0], turn), strict=True))

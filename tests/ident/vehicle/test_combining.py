@@ -77,26 +77,16 @@ def test_dead_times_plays_and_compliances_add(name: EffectName, vehicle: Vehicle
     assert one.springs == separate.springs
 
 
-def test_uncertainties_add_as_those_of_independent_numbers() -> None:
+def test_a_sum_is_as_sure_as_what_was_found_beside_the_known_part() -> None:
     generator = np.random.default_rng(1)
-    two = pair(EffectName.WHEEL_ECCENTRICITY)
-    drawn = [
-        effect["amplitude"] * (1 + 0.01 * generator.normal(size=200_000))
-        * np.exp(1j * (effect["phase"] + 0.01 * generator.normal(size=200_000)))
-        for effect in two
-    ]  # fmt: skip
-    stated = [
-        make_effect(
-            effect.name,
-            effect.where,
-            {"amplitude": effect["amplitude"], "phase": effect["phase"]},
-            {"amplitude": 0.01 * effect["amplitude"], "phase": 0.01},
-        )
-        for effect in two
-    ]
-    (one,) = combined(stated)
-    assert one.parameters["amplitude"].std == pytest.approx(np.abs(sum(drawn)).std(), rel=0.02)
-    assert one.parameters["phase"].std == pytest.approx(np.angle(sum(drawn)).std(), rel=0.02)
+    known, found = pair(EffectName.WHEEL_ECCENTRICITY)
+    std = {"amplitude": 0.01 * found["amplitude"], "phase": 0.02}
+    values = {name: found[name] for name in found.parameters}
+    (one,) = combined((known, make_effect(found.name, found.where, values, std)))
+    amplitudes, phases = (values[name] + std[name] * generator.normal(size=200_000) for name in ("amplitude", "phase"))
+    drawn = known["amplitude"] * np.exp(1j * known["phase"]) + amplitudes * np.exp(1j * phases)
+    assert one.parameters["amplitude"].std == pytest.approx(np.abs(drawn).std(), rel=0.02)
+    assert one.parameters["phase"].std == pytest.approx(np.angle(drawn).std(), rel=0.02)
 
 
 def test_what_takes_all_of_an_effect_away_leaves_no_direction() -> None:
