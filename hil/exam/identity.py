@@ -24,7 +24,7 @@ from ident.gap.linear import least_squares, orthonormal
 from ident.gap.problem import Candidate, Problem
 from ident.gap.rows import Column, make_rows
 from ident.gap.vehicle.build import build_problem
-from ident.gap.vehicle.experiments import hidden_effects
+from ident.gap.vehicle.experiments import Driven, hidden_effects
 from ident.gap.vehicle.library import DRIFTS, ONE_SIDED
 from ident.gap.vehicle.visibility import RANK, VISIBLE, row_noise
 from ident.records.record import Record, Segment, make_segment
@@ -150,7 +150,7 @@ def identities(problem: Problem) -> Identities:
             for cause in group
             for positive in (True, False)
         },
-        hidden_effects(dict.fromkeys((block.step for block in problem.blocks), 0.0)),
+        hidden_effects(Driven(dict.fromkeys((block.step for block in problem.blocks), 0.0))),
     )
 
 

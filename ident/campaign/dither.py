@@ -12,10 +12,13 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ident.campaign.reference import Reference
 from ident.campaign.steps import StepSpec
 from ident.vehicle.description import VehicleDescription
+
+Array = NDArray[np.float64]
 
 HELD_SHARE: Final = 0.35
 """Share of a side's steering friction that the dither may ask to hold the wheels."""
@@ -62,12 +65,18 @@ def add_dither(reference: Reference, spec: StepSpec, vehicle: VehicleDescription
     """
     first = int(np.argmax(reference.period >= 0))
     time = (np.arange(len(reference)) - first) * reference.sample_time
-    torques = np.zeros((len(reference), 4))
-    for pattern in PATTERNS:
-        wave = np.sin(2 * math.pi * pattern.harmonic * time / spec.period)
-        torques += wave[:, None] * dither_amplitude(pattern, vehicle) * np.array(pattern.wheels)
+    torques = dither_torques(time, spec.period, vehicle)
     torques[reference.period < 0] = 0.0
-    return replace(reference, feed_forward=reference.feed_forward + torques / vehicle.geometry.gear_ratio)
+    return replace(reference, feed_forward=reference.feed_forward + torques)
+
+
+def dither_torques(time: NDArray[np.floating], period: float, vehicle: VehicleDescription) -> Array:
+    """Motor torques (N, 4) of all PATTERNS [Nm], for a time (N,) since an excitation of some period began [s]."""
+    torques = np.zeros((len(time), 4))
+    for pattern in PATTERNS:
+        wave = np.sin(2 * math.pi * pattern.harmonic * time / period)
+        torques += wave[:, None] * dither_amplitude(pattern, vehicle) * np.array(pattern.wheels)
+    return torques / vehicle.geometry.gear_ratio
 
 
 def dither_amplitude(pattern: Pattern, vehicle: VehicleDescription) -> float:

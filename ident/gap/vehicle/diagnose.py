@@ -77,7 +77,7 @@ def diagnose_vehicle(
         _refuse_zero(model.parameters)
     refuse_other_vehicle((*fit, *confirm), vehicle.geometry)
     _refuse_silent((*fit, *confirm))
-    driven = driven_steps(fit, vehicle.prior["m_ch"])
+    driven = driven_steps(fit, vehicle.prior["m_ch"], model.effects if model else ())
     hidden = hidden_effects(driven)
     shown = [name for name in effects if name not in hidden]
     fitted = _problem(fit, vehicle, model, shown)

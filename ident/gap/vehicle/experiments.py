@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from ident.gap.findings import Findings
@@ -11,21 +12,34 @@ from ident.gap.vehicle.library import DRIFTS
 from ident.gap.vehicle.visibility import Sight
 from ident.gap.vehicle.visibility_table import stored_table
 from ident.records.record import Record, base_step
-from ident.vehicle.effects import EffectName
+from ident.vehicle.effects import Effect, EffectName
 
 LIGHTEST: Final = 0.09
 """Mass of a known load over the vehicle's from which it counts as the tenth that the experiment asks for [-]."""
 
-Driven = Mapping[str, float]
-"""Steps by name, with the heaviest known load of each over the mass of the vehicle [-]."""
+SMALLEST: Final = 0.5
+"""Size of an effect that the model has, over the one that the experiment asks for, from which it counts [-]."""
 
 
-def driven_steps(records: Iterable[Record], mass: float) -> Driven:
-    """What records hold of a vehicle of some mass [kg]."""
-    driven: dict[str, float] = {}
+@dataclass(frozen=True)
+class Driven:
+    """What a diagnosis is made from.
+
+    Attributes:
+        loads: steps by name, with the heaviest known load of each over the mass of the vehicle [-].
+        given: effects that the model has.
+    """
+
+    loads: Mapping[str, float]
+    given: Sequence[Effect] = ()
+
+
+def driven_steps(records: Iterable[Record], mass: float, given: Sequence[Effect] = ()) -> Driven:
+    """What records hold of a vehicle of some mass [kg], judged by a model with some effects."""
+    loads: dict[str, float] = {}
     for segment in (segment for record in records for segment in record.segments):
-        driven[segment.step] = max(driven.get(segment.step, 0.0), segment.payload / mass)
-    return driven
+        loads[segment.step] = max(loads.get(segment.step, 0.0), segment.payload / mass)
+    return Driven(loads, given)
 
 
 def next_experiment(findings: Findings, driven: Driven) -> str | None:
@@ -83,7 +97,13 @@ def _open(driven: Driven) -> list[str]:
 
 
 def _is_done(experiment: Experiment, driven: Driven) -> bool:
-    return all(any(_is(drive, step, load) for step, load in driven.items()) for drive in experiment.drives)
+    known = all(any(_is_at_least(effect, asked) for effect in driven.given) for asked in experiment.given)
+    drives = (any(_is(drive, step, load) for step, load in driven.loads.items()) for drive in experiment.drives)
+    return known and all(drives)
+
+
+def _is_at_least(effect: Effect, asked: Effect) -> bool:
+    return (effect.name, effect.where) == (asked.name, asked.where) and abs(effect.size) >= SMALLEST * asked.size
 
 
 def _is(drive: Drive, step: str, load: float) -> bool:

@@ -10,7 +10,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.campaign.dither import dither_torques
 from ident.campaign.excitation import FourierSeries, resting_projection, series_of
+from ident.campaign.steps import DIAGNOSTIC as DRIVEN
 from ident.campaign.steps import EXCITATIONS, StepSpec
 from ident.records.record import PAYLOAD, Record, Segment, Step, make_segment
 from ident.vehicle import dynamics, kinematics
@@ -23,8 +25,6 @@ Array = NDArray[np.float64]
 
 SAMPLE_TIME: Final = 0.004
 PERIODS: Final = 2
-DITHER: Final = 0.15
-"""Rms of the torque dither, in units of the rated torque."""
 TURN_TIME: Final = 6.0
 """Of half a turn on the spot [s]."""
 PAYLOAD_MASS: Final = 80.0
@@ -37,8 +37,7 @@ class Drive:
 
     Attributes:
         step: base step.
-        variant: appended to its name, empty for the step itself.
-        speed: factor on the step's speed.
+        variant: appended to its name, empty for the step itself; in the limits that a campaign drives it in.
         dither: whether the motors work against each other too.
         turned: whether the vehicle is turned by half a turn before.
         payload: mass of a known load [kg].
@@ -46,7 +45,6 @@ class Drive:
 
     step: Step
     variant: str = ""
-    speed: float = 1.0
     dither: bool = False
     turned: bool = False
     payload: float = 0.0
@@ -55,6 +53,11 @@ class Drive:
     def name(self) -> str:
         """In records."""
         return f"{self.step}_{self.variant}" if self.variant else str(self.step)
+
+    @property
+    def spec(self) -> StepSpec:
+        """Its limits."""
+        return DRIVEN.get(self.name, EXCITATIONS[self.step])
 
 
 @dataclass(frozen=True)
@@ -81,22 +84,18 @@ DIAGNOSTIC: Final[Mapping[str, Experiment]] = MappingProxyType(
             (Drive(Step.STRAIGHT, "turned", turned=True),),
         ),
         "torque dither": Experiment(
-            "drive straight and rotation with torque dither, the motors working against each other",
-            (Drive(Step.STRAIGHT, "dither", dither=True), Drive(Step.ROTATION, "dither", dither=True)),
+            "drive straight with torque dither, the motors working against each other",
+            (Drive(Step.STRAIGHT, "dither", dither=True),),
         ),
         "wheels lifted": Experiment("drive wheel_lifted on a jack-stand", (Drive(Step.WHEEL_LIFTED),)),
         "lateral": Experiment("drive lateral", (Drive(Step.LATERAL),)),
         "several speeds": Experiment(
-            "drive straight and rotation at half and at a quarter of the speed too",
-            tuple(
-                Drive(step, variant, speed)
-                for step in (Step.STRAIGHT, Step.ROTATION)
-                for variant, speed in (("half", 0.5), ("quarter", 0.25))
-            ),
+            "drive steering_left, steering_right and straight slowly too",
+            tuple(Drive(step, "slow") for step in (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT)),
         ),
         "on a slope": Experiment(
-            "drive straight and rotation on a floor inclined by two degrees",
-            (Drive(Step.STRAIGHT, "slope"), Drive(Step.ROTATION, "slope")),
+            "drive straight and rotation on a floor inclined by two degrees, with that slope in the model (--model)",
+            (Drive(Step.STRAIGHT), Drive(Step.ROTATION)),
             (make_effect(EffectName.SLOPE, "chassis", {"angle": 0.035}),),
         ),
         "known payload": Experiment(
@@ -120,8 +119,8 @@ def ideal_record(drives: Sequence[Drive], vehicle: VehicleDescription, seed: int
 
 
 def _segment(drive: Drive, vehicle: VehicleDescription, generator: np.random.Generator) -> Segment:
-    spec = EXCITATIONS[drive.step]
-    series = _series(spec, drive.speed, generator)
+    spec = drive.spec
+    series = _series(spec, generator)
     per_period = round(spec.period / SAMPLE_TIME)
     time = np.linspace(0.0, PERIODS * spec.period, PERIODS * per_period, endpoint=False)
     motion = series.evaluate(time)
@@ -130,18 +129,18 @@ def _segment(drive: Drive, vehicle: VehicleDescription, generator: np.random.Gen
         if spec.mode is None
         else _on_the_floor(spec, spec.mode, motion, vehicle, drive.payload)
     )
-    if drive.dither and spec.mode is not None:
-        torques = torques + _dither(spec.mode, alpha, time, vehicle, generator)
+    if drive.dither:
+        torques = torques + dither_torques(time, spec.period, vehicle)
     period = np.repeat(np.arange(PERIODS), per_period)
     extra = {PAYLOAD: np.full(len(time), drive.payload)} if drive.payload else {}
     return make_segment(Segment(drive.name, 0.0, time, torques, beta, alpha, period, extra=extra), "ideal")
 
 
-def _series(spec: StepSpec, speed: float, generator: np.random.Generator) -> FourierSeries:
+def _series(spec: StepSpec, generator: np.random.Generator) -> FourierSeries:
     series = series_of(resting_projection(spec.harmonics) @ generator.normal(size=2 * spec.harmonics), spec.period)
     position, velocity, acceleration = series.evaluate(np.linspace(0, spec.period, 400))
     limits = zip((spec.stroke, spec.speed, spec.acceleration), (position, velocity, acceleration), strict=True)
-    return series.scaled(0.9 * speed * min(limit / float(np.abs(values).max()) for limit, values in limits))
+    return series.scaled(0.9 * min(limit / float(np.abs(values).max()) for limit, values in limits))
 
 
 def _lifted(motion: tuple[Array, Array, Array], vehicle: VehicleDescription) -> tuple[Array, Array, Array]:
@@ -168,16 +167,6 @@ def _on_the_floor(
     loaded = vehicle.prior.values + payload * (np.array(PARAMETER_NAMES) == "m_ch")
     torques = dynamics.feed_forward(mode, alpha, velocities, accelerations, loaded, vehicle.geometry)
     return alpha, position[:, None] * column, torques
-
-
-def _dither(
-    mode: Mode, alpha: Array, time: Array, vehicle: VehicleDescription, generator: np.random.Generator
-) -> Array:
-    """Torques (N, 4) that move nothing: a tone of its own along every direction that H_kᵀ B does not see."""
-    matrix = dynamics.projected_input(mode, alpha[:1], vehicle.geometry)[0]
-    silent = np.linalg.svd(matrix)[2][len(matrix) :]
-    tones = np.sin(2 * np.pi * np.outer(time, generator.uniform(0.5, 3.0, len(silent))))
-    return np.asarray(np.sqrt(2) * DITHER * vehicle.limits.rated_torque * tones @ silent)
 
 
 def _turn(vehicle: VehicleDescription) -> Segment:

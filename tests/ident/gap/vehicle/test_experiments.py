@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ident.gap.vehicle.experiments import driven_steps, hidden_effects
-from ident.gap.vehicle.ideal import FOUR, ideal_record
+from ident.campaign.steps import DIAGNOSTIC as STEPS
+from ident.gap.vehicle.experiments import Driven, driven_steps, hidden_effects
+from ident.gap.vehicle.ideal import DIAGNOSTIC, FOUR, ideal_record
 from ident.records.record import PAYLOAD, Record, Segment
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.effects import EffectName
+from ident.vehicle.effects import EffectName, make_effect
 
 FOUR_STEPS = dict.fromkeys((drive.name for drive in FOUR), 0.0)
 
@@ -24,7 +25,7 @@ def loaded(segment: Segment, name: str, mass: float) -> Segment:
     ("suffix", "load", "seen"), [("_loaded", 0.1, True), ("", 0.1, True), ("_loaded", 0.0, False), ("", 0.04, False)]
 )
 def test_a_load_is_known_by_its_mass_and_not_by_the_name_of_its_step(suffix: str, load: float, seen: bool) -> None:
-    driven = FOUR_STEPS | {f"straight{suffix}": load, f"rotation{suffix}": load}
+    driven = Driven(FOUR_STEPS | {f"straight{suffix}": load, f"rotation{suffix}": load})
     assert (EffectName.TORQUE_GAIN not in hidden_effects(driven)) is seen
 
 
@@ -32,9 +33,20 @@ def test_the_heaviest_load_of_a_step_counts(prototype: VehicleDescription) -> No
     mass = prototype.prior["m_ch"]
     straight = next(segment for segment in ideal_record(FOUR, prototype).segments if segment.step == "straight")
     records = [Record([loaded(straight, "straight", weight * mass)], "one") for weight in (0.1, 0.2, 0.0)]
-    assert driven_steps(records, mass) == {"straight": pytest.approx(0.2)}
+    assert driven_steps(records, mass).loads == {"straight": pytest.approx(0.2)}
 
 
 def test_steps_without_a_load_are_known_by_name() -> None:
-    assert EffectName.TORQUE_GAIN not in hidden_effects(FOUR_STEPS | {"straight_dither": 0.0, "rotation_dither": 0.0})
-    assert EffectName.TORQUE_GAIN in hidden_effects(FOUR_STEPS | {"straight_dither": 0.0})
+    assert EffectName.TORQUE_GAIN not in hidden_effects(Driven(FOUR_STEPS | {"straight_dither": 0.0}))
+    assert EffectName.TORQUE_GAIN in hidden_effects(Driven(FOUR_STEPS | {"straight_slow": 0.0}))
+
+
+@pytest.mark.parametrize(("angle", "seen"), [(0.035, True), (0.01, False), (None, False)])
+def test_a_slope_must_be_steep_and_known_to_show_the_centre_of_mass(angle: float | None, seen: bool) -> None:
+    given = () if angle is None else (make_effect(EffectName.SLOPE, "chassis", {"angle": angle}),)
+    assert (EffectName.COM_OFFSET not in hidden_effects(Driven(FOUR_STEPS, given))) is seen
+
+
+def test_a_diagnostic_campaign_drives_every_experiment_that_needs_no_other_floor() -> None:
+    for experiment in DIAGNOSTIC.values():
+        assert {drive.name for drive in experiment.drives} <= set(STEPS)
