@@ -8,7 +8,6 @@ import sys
 import uuid
 import zipfile
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
 from importlib.metadata import version
@@ -24,7 +23,6 @@ from fmu.interface import MODEL_IDENTIFIER, Interface, with_indicators
 from fmu.platforms import PLATFORMS, Platform
 from fmu.source import Model, ModelSource, make_model
 from fmu.variables import Inputs
-from ident.errors import UserError
 
 INDICATORS: Final = 4
 """Event indicators of the model, one for each condition of (9)."""
@@ -99,23 +97,6 @@ def fmu_sources(model: Model, interface: Interface, version: FmiVersion, token: 
     """All C files of an FMU, the headers of FMI excepted, as the standard wants it."""
     core = {name: text.encode() for name, text in model.files.items()}
     return core | wrapper_sources(interface.table, version, token)
-
-
-def write_fmu(content: bytes, path: Path) -> None:
-    """Write the file whole or not at all.
-
-    Raises:
-        UserError: the place cannot be written.
-    """
-    part = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_bytes(content)
-        part.replace(path)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink()
-        raise UserError(f"{path} cannot be written: {error.strerror}.", "Name another file (-o).") from error
 
 
 def _interface(source: ModelSource, model: Model, inputs: Inputs) -> Interface:

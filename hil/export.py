@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from fmu.compiling import check_platforms, find_compiler
-from fmu.packaging import Order, build_fmu, write_fmu
+from fmu.packaging import Order, build_fmu
 from fmu.platforms import Platform
 from fmu.source import ModelSource
 from hil.campaign.folder import open_run
@@ -20,6 +20,7 @@ from ident.vehicle.description import load_vehicle
 from ident.vehicle.effect_text import read_effects
 from ident.vehicle.parameters import read_parameters
 from ident.vehicle.quantities import read_toml
+from ident.writing import write_whole
 
 
 @dataclass(frozen=True)
@@ -81,5 +82,5 @@ def export_run(run: Path, out: Path, order: Order, console: Console, model: Path
             bars.advance(task)
 
         content = build_fmu(source, order, compiler, done)
-    write_fmu(content, out)
+    write_whole(content, out)
     return Exported(out, len(content), time.monotonic() - start)

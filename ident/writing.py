@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+from contextlib import suppress
 from pathlib import Path
 
 from ident.errors import UserError
@@ -18,8 +18,8 @@ def refuse_folder(path: Path) -> None:
         raise UserError(f"{path} is a folder.", "Name the file to write, in it or elsewhere.")
 
 
-def write_whole(text: str, path: Path) -> None:
-    """Write a text; a reader of `path` sees the old file or the new one, never half of it.
+def write_whole(content: str | bytes, path: Path) -> None:
+    """Write a file; a reader of `path` sees the old one or the new one, never half of it.
 
     Raises:
         UserError: it cannot be written, or is a folder.
@@ -28,7 +28,9 @@ def write_whole(text: str, path: Path) -> None:
     part = path.with_name(f".{path.name}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
+        part.replace(path)
     except OSError as error:
+        with suppress(OSError):
+            part.unlink()
         raise UserError(f"{path} cannot be written: {error.strerror}.", "Name a place that can be written.") from error

@@ -12,7 +12,7 @@ import typer
 
 from hil.campaign.folder import network_file_of
 from hil.exam.cases import Composition
-from hil.exam.folder import ExamFolder, write_atomically
+from hil.exam.folder import ExamFolder
 from hil.exam.score_figures import confusion_svg, reliability_svg
 from hil.exam.score_report import score_exam, score_json, score_markdown, summary_lines
 from hil.exam.scoring import removable
@@ -20,6 +20,7 @@ from hil.exam.sizes import SIZES_FILE, load_rows, load_sizes, replaced, table_te
 from hil.network import load_network
 from hil.workflow import progress
 from ident.errors import UserError
+from ident.writing import write_whole
 from quasiomni.application import app, console
 from quasiomni.options import load_emulation
 
@@ -105,7 +106,7 @@ def calibrate(
     with _bar("measuring") as shown:
         rows = calibrate("prototype", cycle, jobs, shown, effect or EVERY)
     rows = rows if kept is None else replaced(kept, rows)
-    write_atomically(out, table_text(rows).encode())
+    write_whole(table_text(rows), out)
     console.print(f"Written: {out}")
 
 
@@ -121,7 +122,7 @@ def score_command(folder: FolderArgument) -> None:
         ("reliability.svg", reliability_svg(report.score.bins)),
         ("confusion.svg", confusion_svg(report.score.confusion, report.score.wished)),
     ):
-        write_atomically(folder / name, text.encode())
+        write_whole(text, folder / name)
     console.print(f"Written: {folder / 'score.md'}, score.json, reliability.svg, confusion.svg", soft_wrap=True)
 
 

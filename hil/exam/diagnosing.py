@@ -14,7 +14,7 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any, Final
 
-from hil.exam.folder import RECORDS, ExamFolder, read_exam, write_atomically
+from hil.exam.folder import RECORDS, ExamFolder, read_exam
 from hil.exam.record_bytes import record_from_bytes
 from hil.exam.workers import run_all
 from ident.errors import UserError
@@ -23,6 +23,7 @@ from ident.gap.vehicle.diagnose import VehicleDiagnosis, diagnose_vehicle
 from ident.vehicle.description import load_vehicle
 from ident.vehicle.effects import EffectName
 from ident.vehicle.extended import read_model
+from ident.writing import write_whole
 
 FORBIDDEN: Final = ("emulator", "pybullet")
 """Packages that would know the answers."""
@@ -105,7 +106,7 @@ def diagnose_exam(
     for done, (identifier, content) in enumerate(
         run_all(diagnose_case, tasks, jobs=jobs, scheduler=scheduler), len(asked) - len(left) + 1
     ):
-        write_atomically(folder.diagnosis(identifier, removed is not None), content)
+        write_whole(content, folder.diagnosis(identifier, removed is not None))
         progress(done, len(asked))
 
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from typing import Any, Final
 
 from hil.exam.cases import Case, case_from_json
 from ident.errors import UserError
+from ident.writing import write_whole
 
 SCHEMA: Final = "quasiomni.exam/2"
 RECORDS: Final = ("fit", "confirm")
@@ -96,7 +96,7 @@ class Exam:
 def write_exam(folder: ExamFolder, exam: Exam) -> None:
     """Write the manifest."""
     content = {"schema": SCHEMA, **vars(exam)}
-    write_atomically(folder.manifest, json.dumps(content, indent=1).encode())
+    write_whole(json.dumps(content, indent=1), folder.manifest)
 
 
 def read_exam(folder: ExamFolder) -> Exam:
@@ -147,11 +147,3 @@ def open_answer(folder: ExamFolder, expected: str | None) -> list[Case]:
     if expected is not None and answer_hash(content) != expected:
         raise UserError(f"{folder.answer} is not the answer that was sealed.", "Restore it, or seal the exam again.")
     return [case_from_json(entry) for entry in json.loads(zlib.decompress(content))["cases"]]
-
-
-def write_atomically(path: Path, content: bytes) -> None:
-    """A file that is either whole or not there."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.part")
-    part.write_bytes(content)
-    os.replace(part, path)

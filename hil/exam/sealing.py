@@ -26,7 +26,6 @@ from hil.exam.folder import (
     open_answer,
     read_exam,
     sealed,
-    write_atomically,
     write_exam,
 )
 from hil.exam.plans import ExamPlans, plan_exam, plans_from_text, plans_text
@@ -37,6 +36,7 @@ from hil.network import load_network
 from ident.errors import UserError
 from ident.vehicle.description import find_data_file, load_vehicle
 from ident.vehicle.effects import EffectName, make_effect
+from ident.writing import write_whole
 
 Progress = Callable[[int, int], None]
 """Called with cases done and cases in all."""
@@ -93,7 +93,7 @@ def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
     progress(done, len(cases))
     for identifier, contents in run_all(drive_case, tasks, jobs=order.jobs, scheduler=order.scheduler):
         if isinstance(contents, str):
-            write_atomically(folder.undriven(identifier), contents.encode())
+            write_whole(contents, folder.undriven(identifier))
         else:
             _write_records(folder, identifier, contents)
         done += 1
@@ -104,7 +104,7 @@ def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
 def _write_records(folder: ExamFolder, identifier: str, contents: tuple[bytes, bytes]) -> None:
     for which, content in zip(RECORDS, contents, strict=True):
         path = folder.record(identifier, which)
-        write_atomically(path, content)
+        write_whole(content, path)
         os.utime(path, _EPOCH)
 
 
@@ -143,7 +143,7 @@ def _draw(folder: ExamFolder, order: SealingOrder, table: SizeTable) -> None:
     cases = draw_cases(table, order.composition, order.seed, np.random.default_rng(order.seed))
     plans = _draw_plans(order, cycle)
     answer = sealed(cases, secrets.token_bytes(16))
-    write_atomically(folder.answer, answer)
+    write_whole(answer, folder.answer)
     shutil.copyfile(find_data_file("ident.vehicle", order.prototype), folder.vehicle)
     shutil.copyfile(MODEL_FILE, folder.model)
     identifiers = tuple(case.identifier for case in cases)

@@ -14,7 +14,7 @@ import pytest
 
 from fmu.compiling import HEADERS, Compiler, check_platforms, compile_libraries, find_compiler, universal_binary
 from fmu.description import FmiVersion
-from fmu.packaging import Order, build_fmu, write_fmu
+from fmu.packaging import Order, build_fmu
 from fmu.platforms import PLATFORMS, host_platform, parse_platforms
 from fmu.source import ModelSource
 from fmu.units import unit_of
@@ -216,11 +216,3 @@ def test_every_platform_is_built_and_warm_in_less_than_five_seconds(
         universal = name == "binaries/darwin64/quasiomni.dylib"
         assert content.startswith(b"\xca\xfe\xba\xbe" if universal else MAGIC[Path(name).suffix])
         assert b"fmi2DoStep" in content or b"fmi3DoStep" in content
-
-
-def test_a_file_that_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
-    """A folder has the name of the file."""
-    (tmp_path / "platform.fmu").mkdir()
-    with pytest.raises(UserError, match="cannot be written"):
-        write_fmu(b"content", tmp_path / "platform.fmu")
-    assert [path.name for path in tmp_path.iterdir()] == ["platform.fmu"]

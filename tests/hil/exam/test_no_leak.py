@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from hil.exam.cases import Case
-from hil.exam.folder import Exam, ExamFolder, answer_hash, open_answer, read_exam, sealed, write_atomically, write_exam
+from hil.exam.folder import Exam, ExamFolder, answer_hash, open_answer, read_exam, sealed, write_exam
 from hil.exam.record_bytes import record_bytes, record_from_bytes
 from ident.errors import UserError
 from ident.records.record import Record, Segment
+from ident.writing import write_whole
 
 
 def some_record(seed: int, samples: int = 500) -> Record:
@@ -52,9 +53,9 @@ def test_a_record_comes_back_bit_by_bit_without_its_commands() -> None:
 
 def test_the_answer_opens_only_as_it_was_sealed(cases: list[Case], tmp_path: Path) -> None:
     folder, content = ExamFolder(tmp_path), sealed(cases, b"salt")
-    write_atomically(folder.answer, content)
+    write_whole(content, folder.answer)
     assert open_answer(folder, answer_hash(content)) == cases
-    write_atomically(folder.answer, sealed(cases[::-1], b"salt"))
+    write_whole(sealed(cases[::-1], b"salt"), folder.answer)
     with pytest.raises(UserError, match="not the answer that was sealed"):
         open_answer(folder, answer_hash(content))
 
@@ -67,7 +68,7 @@ def test_a_manifest_survives_being_written(tmp_path: Path) -> None:
 
 def test_an_exam_of_another_version_is_refused(tmp_path: Path) -> None:
     folder = ExamFolder(tmp_path)
-    write_atomically(folder.manifest, b'{"schema": "quasiomni.exam/1", "plans": "one"}')
+    write_whole('{"schema": "quasiomni.exam/1", "plans": "one"}', folder.manifest)
     with pytest.raises(UserError, match="exam/1, not") as refused:
         read_exam(folder)
     assert "seal the exam again" in refused.value.remedy

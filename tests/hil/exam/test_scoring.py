@@ -17,11 +17,12 @@ import pytest
 from hil.exam import score_names as names
 from hil.exam.answers import Alone, Answer, Said, chance, permuted, read_answers, said_from
 from hil.exam.cases import Case, Injected, Kind
-from hil.exam.folder import Exam, ExamFolder, answer_hash, sealed, write_atomically, write_exam
+from hil.exam.folder import Exam, ExamFolder, answer_hash, sealed, write_exam
 from hil.exam.identity import Identities, Identity
 from hil.exam.score_figures import confusion_svg, reliability_svg
 from hil.exam.score_report import ScoreReport, score_json, score_markdown, summary_lines
 from hil.exam.scoring import removal_rates, score
+from ident.writing import write_whole
 
 Truthful = Callable[[Case], Answer]
 
@@ -318,10 +319,10 @@ def test_an_answer_is_judged_by_the_excitation_that_its_case_drove(tmp_path: Pat
     folder = ExamFolder(tmp_path)
     case = Case("a", Kind.EFFECT, (Injected("torque_bias", "drive_fl", "bias", 0.01),), 1.0, 1, 1)
     content = sealed([case], b"salt")
-    write_atomically(folder.answer, content)
+    write_whole(content, folder.answer)
     write_exam(folder, Exam("prototype", 0.002, ("first", "second"), ("a",), answer_hash(content)))
     said = {"verdict": "none", "effects": [], "invisible": [], "gap": {"closed": None}}
-    write_atomically(folder.diagnosis("a"), json.dumps(said).encode())
+    write_whole(json.dumps(said), folder.diagnosis("a"))
     alike = {("torque_bias@drive_fl", True): ["asymmetric_coulomb@wheel_fl"]}
     (answer,) = read_answers(folder, [Identities({}), Identities(alike)])
     assert answer.identity.names == {"torque_bias", "asymmetric_coulomb"}
