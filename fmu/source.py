@@ -41,8 +41,8 @@ class ModelSource:
         for effect, count in Counter(str(effect) for effect in self.effects).items():
             if count > 1:
                 raise DataFileError(
-                    f"{effect} is there {count} times, with numbers that do not add up to one.",
-                    "Leave one entry of it in the file of parameters.",
+                    f"{effect} is there {count} times; the parameters of an FMU are named by effect and place.",
+                    "Write one entry of it into the file of parameters, or diagnose again with a model that has none.",
                 )
 
     @property

@@ -15,7 +15,6 @@ from fmu.source import ModelSource
 from hil.campaign.folder import open_run
 from hil.workflow import progress, provenance_of
 from ident.errors import DataFileError
-from ident.vehicle.combining import combined
 from ident.vehicle.description import load_vehicle
 from ident.vehicle.effect_text import read_effects
 from ident.vehicle.parameters import read_parameters
@@ -55,12 +54,12 @@ def source_of_files(parameters: Path, vehicle: Path, provenance: dict[str, str])
     """The model of a file of parameters, with the effects in it, and a vehicle file.
 
     Raises:
-        DataFileError: a file is missing or malformed, or has an effect twice that cannot be one.
+        DataFileError: a file is missing or malformed, or has an effect twice.
     """
     return ModelSource(
         vehicle=load_vehicle(vehicle),
         parameters=read_parameters(parameters),
-        effects=combined(read_effects(read_toml(parameters), str(parameters))),
+        effects=read_effects(read_toml(parameters), str(parameters)),
         provenance=provenance,
         documents={"parameters.toml": parameters.read_bytes(), "vehicle.toml": vehicle.read_bytes()},
     )

@@ -28,6 +28,7 @@ from ident.campaign.steps import DRIVING_ORDER
 from ident.errors import CampaignError, DataFileError
 from ident.estimate.identify import KnownInertia
 from ident.vehicle.description import VehicleDescription, load_vehicle
+from ident.writing import write_whole
 
 SCHEMA: Final = "quasiomni.run/1"
 
@@ -135,9 +136,7 @@ def _write_run(run: Run, vehicle_file: Path) -> None:
     shutil.copyfile(run.network.path, folder.network)
     for eds in {node.eds for node in run.network.nodes}:
         shutil.copyfile(eds, folder.network.parent / eds.name)
-    temporary = folder.manifest.with_suffix(".tmp")
-    temporary.write_text(json.dumps(_manifest(run), indent=1), encoding="utf-8")
-    temporary.replace(folder.manifest)
+    write_whole(json.dumps(_manifest(run), indent=1), folder.manifest)
 
 
 def open_run(path: Path) -> Run:

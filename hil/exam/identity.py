@@ -150,7 +150,7 @@ def identities(problem: Problem) -> Identities:
             for cause in group
             for positive in (True, False)
         },
-        hidden_effects(Driven(dict.fromkeys((block.step for block in problem.blocks), 0.0))),
+        hidden_effects(Driven(dict.fromkeys((block.step for block in problem.blocks), (0.0,)))),
     )
 
 

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.gap.chance import chances
 from ident.gap.diagnosis import Verdict
 from ident.gap.findings import Cause, Findings
 from ident.gap.fitted import Fitted
@@ -108,7 +109,7 @@ class Judgement:
 
     def _verdict(self) -> Verdict:
         if not self.found.variants:
-            return Verdict.UNKNOWN if self._predictable() or self._repeating() > 1 else Verdict.NONE
+            return Verdict.UNKNOWN if self._predictable() or self._surely_repeating() else Verdict.NONE
         unexplained = self._predictable() and self._explained() < self.limits.explained
         strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
         another = self._sizeless(self._strongest) or self._outside(self._strongest)
@@ -184,11 +185,22 @@ class Judgement:
 
     def _repeating(self) -> float:
         """What the model leaves and repeats in every record, over the noise, in units of what may."""
+        return max(self._excesses().values(), default=0.0)
+
+    def _surely_repeating(self) -> bool:
+        """Whether that is more than may be, in a coordinate in which it is no accident of the noise."""
+        large = {label for label, excess in self._excesses().items() if excess > 1}
+        found = chances(self.rows, self.fitted.floors, self.fitted.after.blocks) if large else {}
+        return any(found[label] * len(found) < self.limits.chance for label in large)
+
+    def _excesses(self) -> Mapping[str, float]:
+        """The same by coordinate."""
         creeping = {block.label for block, _ in self.rows.blocks if block.tolerance > 0}
         stricter = self.found.variants and self._measurable()
         usual = self.limits.beside if stricter else self.limits.repeating
-        limits = {label: self.limits.creeping if label in creeping else usual for label in self._lasts}
-        return max((size / limits[label] for label, size in self._lasts.items()), default=0.0)
+        return {
+            label: size / (self.limits.creeping if label in creeping else usual) for label, size in self._lasts.items()
+        }
 
     @cached_property
     def _lasts(self) -> Mapping[str, float]:

@@ -13,6 +13,7 @@ class Limits:
         deviations: by which a smooth function must predict the confirming rows for there to be a remainder.
         size: rms of what repeats, over the noise, that it must have somewhere; ignored without repeats.
         repeating: the same, above which there is a remainder whether or not it can be predicted.
+        chance: probability that noise alone makes it that large in some coordinate, above which that is no remainder.
         beside: the same beside effects that are named, where the held-out gap can be measured.
         creeping: the same of rows with a tolerance, whose noise is that.
         foreign: the same of rows that the model says nothing of; where no effect acts, `nearly` pardons it.
@@ -39,6 +40,7 @@ class Limits:
     deviations: float = 3.0
     size: float = 0.25
     repeating: float = 0.5
+    chance: float = 0.05
     beside: float = 0.35
     creeping: float = 1.5
     foreign: float = 1.0

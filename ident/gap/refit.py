@@ -238,8 +238,9 @@ class _Model:
         starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
         sums = np.add.reduceat(scores, starts, axis=0)
         freedom = len(starts) / max(len(starts) - 1, 1)
-        prior = scaled[len(stretch) :]
-        robust = inverse @ (freedom * sums.T @ sums + prior.T @ prior) @ inverse
+        # Squares, so that what rows hardly split gets no negative variance by rounding.
+        spread, held = sums @ inverse, scaled[len(stretch) :] @ inverse
+        robust = freedom * spread.T @ spread + held.T @ held
         lift = np.sqrt(np.maximum(np.diag(inverse) / np.maximum(np.diag(robust), np.finfo(float).tiny), 1.0))
         return np.asarray(robust * np.outer(lift, lift) / np.outer(scale, scale))
 

@@ -72,7 +72,7 @@ class AxisSignals:
 
     def named(self, word: str) -> str:
         """A word with the axis' name behind it, as in channels and results: `position_1`, or `position` alone."""
-        return channel_of(word, self.name)
+        return _channel(word, self.name)
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def axis_record_from_channels(channels: Channels, source: str, kind: AxisKind = 
             is no SI unit of an axis.
     """
     _refuse_incomplete(channels.values, source)
-    needed = ["time", *(channel_of(part, axis) for axis in _axis_names(channels.values) for part in _PARTS)]
+    needed = ["time", *(_channel(part, axis) for axis in _axis_names(channels.values) for part in _PARTS)]
     _refuse_unequal({name: channels.values[name] for name in (*needed, "period") if name in channels.values}, source)
     values = {name: numbers(name, channels.values[name], source) for name in needed}
     refuse_short(len(values["time"]), source)
@@ -160,9 +160,9 @@ def axis_record_from_channels(channels: Channels, source: str, kind: AxisKind = 
         AxisSignals(
             name=name,
             kind=_kind_of(name, channels.units, source, kind),
-            position=values[channel_of("position", name)],
-            effort=values[channel_of("effort", name)],
-            assumed=not any(channel_of(part, name) in channels.units for part in _PARTS),
+            position=values[_channel("position", name)],
+            effort=values[_channel("effort", name)],
+            assumed=not any(_channel(part, name) in channels.units for part in _PARTS),
         )
         for name in _axis_names(values)
     )
@@ -170,7 +170,7 @@ def axis_record_from_channels(channels: Channels, source: str, kind: AxisKind = 
     return AxisRecord(axes, uniform_sample_time(values["time"], source), values["time"], period, source)
 
 
-def channel_of(quantity: str, axis: str) -> str:
+def _channel(quantity: str, axis: str) -> str:
     """Name of the channel that holds a quantity of an axis, whose own name may be empty."""
     return f"{quantity}_{axis}" if axis else quantity
 
@@ -182,7 +182,7 @@ def _axis_names(values: Mapping[str, Any]) -> list[str]:
 
 def _refuse_incomplete(values: Mapping[str, Any], source: str) -> None:
     names = _axis_names(values)
-    wanted = ["time", *(["position"] if not names else []), *(channel_of("effort", name) for name in names or [""])]
+    wanted = ["time", *(["position"] if not names else []), *(_channel("effort", name) for name in names or [""])]
     missing = [name for name in wanted if name not in values]
     if missing:
         raise RecordError(
@@ -200,13 +200,13 @@ def _refuse_unequal(values: Mapping[str, NDArray[Any]], source: str) -> None:
 
 def _kind_of(name: str, units: Mapping[str, str], source: str, default: AxisKind) -> AxisKind:
     """The kind whose units the file states; units left out may be any."""
-    stated = [units.get(channel_of(quantity, name)) for quantity in ("position", "effort")]
+    stated = [units.get(_channel(quantity, name)) for quantity in ("position", "effort")]
     if stated == [None, None]:
         return default
     for kind in AxisKind:
         if all(unit in (None, expected) for unit, expected in zip(stated, kind.value, strict=True)):
             return kind
-    channels = f"{channel_of('position', name)} and {channel_of('effort', name)}"
+    channels = f"{_channel('position', name)} and {_channel('effort', name)}"
     raise RecordError(
         f"{source}: {channels} are in {stated[0]!r} and {stated[1]!r}.",
         "Give a linear axis in 'm' and 'N', a rotary one in 'rad' and 'Nm'.",

@@ -43,7 +43,7 @@ def _shortened(causes: Sequence[str], room: int) -> list[str]:
     """The first of them, and how many more there are where room lacks."""
     if len(causes) <= room:
         return list(causes)
-    shown = max(room - 1, 0)
+    shown = room - 1
     return [*causes[:shown], f"  and {len(causes) - shown} more (--report FILE shows them)"]
 
 

@@ -1,9 +1,9 @@
-"""Several entries of one effect at one place as one: what a model has of it, and what was found of it beyond that."""
+"""What a model has of an effect and what was found beside that, as one effect."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from ident.vehicle.effects import EFFECTS, Effect, EffectName, make_effect
 
 Array = NDArray[np.float64]
+Numbers = tuple[dict[str, float], dict[str, float]]
+"""Values and standard deviations by parameter."""
 
 _POLAR: Final[Mapping[EffectName, tuple[str, str]]] = MappingProxyType(
     {
@@ -28,68 +30,66 @@ _SUMS: Final[Mapping[EffectName, tuple[str, ...]]] = MappingProxyType(
 )
 """Parameters that add up, where that is not the size alone. Coefficients of friction of one floor do not."""
 
+AGREE: Final = 3.0
+"""Standard deviations by which two estimates of one number may differ."""
 
-def combined(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """The same effects, those of one name and place as one where their equations add up to one.
 
-    What does not add up must be equal: two ripples of one order are a ripple, two Stribeck frictions that fall off at
-    other rates stay two. A later entry is what was found beside an earlier one, which was taken as it is: how sure the
-    sum is, the later one says.
+def combined(known: Sequence[Effect], found: Sequence[Effect]) -> tuple[Effect, ...]:
+    """The known effects with what was found beside them: added to the one of its name and place, or behind them.
+
+    What does not add up, the rate at which Stribeck friction falls off or the order of a ripple, must agree with the
+    known one, and is then taken from there; otherwise both stay. The known numbers are what others were measured from:
+    how sure a sum is, what was found says.
     """
-    found: list[Effect] = []
-    for effect in effects:
-        place = next((index for index, other in enumerate(found) if _are_one(other, effect)), None)
+    effects = list(known)
+    for effect in found:
+        place = next((index for index, other in enumerate(known) if _are_one(other, effect)), None)
         if place is None:
-            found.append(effect)
+            effects.append(effect)
         else:
-            found[place] = _sum(found[place], effect)
-    return tuple(found)
+            effects[place] = _sum(effects[place], effect)
+    return tuple(effects)
 
 
-def _are_one(first: Effect, second: Effect) -> bool:
-    if (first.name, first.where) != (second.name, second.where):
+def _are_one(known: Effect, found: Effect) -> bool:
+    if (known.name, known.where) != (found.name, found.where):
         return False
-    adding = _POLAR.get(first.name) or _added(first.name)
-    return bool(adding) and all(first[name] == second[name] for name in first.parameters if name not in adding)
+    adding = _adding(known.name)
+    return bool(adding) and all(_agree(known, found, name) for name in known.parameters if name not in adding)
 
 
-def _added(name: EffectName) -> tuple[str, ...]:
-    return _SUMS.get(name, (EFFECTS[name].size.name,))
+def _adding(name: EffectName) -> tuple[str, ...]:
+    return _POLAR.get(name) or _SUMS.get(name, (EFFECTS[name].size.name,))
 
 
-def _sum(first: Effect, second: Effect) -> Effect:
-    sum_of: Callable[..., tuple[dict[str, float], dict[str, float]]] = (
-        _vector_sum if first.name in _POLAR else _plain_sum
-    )
-    kept = {name: first[name] for name in first.parameters}
-    spread = {name: quantity.std for name, quantity in first.parameters.items()}
-    values, std = sum_of(first, second)
-    return make_effect(first.name, first.where, kept | values, spread | std)
+def _agree(known: Effect, found: Effect, parameter: str) -> bool:
+    std = math.hypot(known.parameters[parameter].std, found.parameters[parameter].std)
+    return abs(known[parameter] - found[parameter]) <= AGREE * std
 
 
-def _plain_sum(first: Effect, second: Effect) -> tuple[dict[str, float], dict[str, float]]:
-    names = _added(first.name)
-    values = {name: first[name] + second[name] for name in names}
-    return values, {name: second.parameters[name].std for name in names}
+def _sum(known: Effect, found: Effect) -> Effect:
+    values, std = _vector_sum(known, found) if known.name in _POLAR else _plain_sum(known, found)
+    kept = {name: known[name] for name in known.parameters}
+    spread = {name: quantity.std for name, quantity in known.parameters.items()}
+    return make_effect(known.name, known.where, kept | values, spread | std)
 
 
-def _vector_sum(first: Effect, second: Effect) -> tuple[dict[str, float], dict[str, float]]:
-    names = _POLAR[first.name]
-    (known, _), (found, covariance) = (_cartesian(effect, names) for effect in (first, second))
-    total = known + found
+def _plain_sum(known: Effect, found: Effect) -> Numbers:
+    names = _adding(known.name)
+    return {name: known[name] + found[name] for name in names}, {name: found.parameters[name].std for name in names}
+
+
+def _vector_sum(known: Effect, found: Effect) -> Numbers:
+    size, bearing = _POLAR[known.name]
+    length, angle = found[size], found[bearing]
+    along, across = _axes(angle)
+    std, turn = found.parameters[size].std, length * found.parameters[bearing].std
+    covariance = std**2 * np.outer(along, along) + turn**2 * np.outer(across, across)
+    total = length * along + known[size] * _axes(known[bearing])[0]
     length, angle = float(np.hypot(*total)), float(np.arctan2(total[1], total[0]))
     along, across = _axes(angle)
-    std = (math.sqrt(along @ covariance @ along), math.sqrt(across @ covariance @ across))
-    turn = min(std[1] / length, math.pi) if length else math.pi
-    return dict(zip(names, (length, angle), strict=True)), dict(zip(names, (std[0], turn), strict=True))
-
-
-def _cartesian(effect: Effect, names: tuple[str, str]) -> tuple[Array, Array]:
-    """A vector (2,) and its covariance (2, 2)."""
-    length, angle = (effect[name] for name in names)
-    std, turn = (effect.parameters[name].std for name in names)
-    along, across = _axes(angle)
-    return length * along, std**2 * np.outer(along, along) + (length * turn) ** 2 * np.outer(across, across)
+    std, turn = math.sqrt(along @ covariance @ along), math.sqrt(across @ covariance @ across)
+    return {size: length, bearing: angle}, {size: std, bearing: min(turn / length, math.pi) if length else math.pi}
 
 
 def _axes(angle: float) -> tuple[Array, Array]:

@@ -143,7 +143,8 @@ def added_forces(terms: Sequence[EffectTerm], state: State, parameters: Expressi
     for term in terms:
         if term.name in _FORCES:
             total += _FORCES[term.name](term, state, masses)
-    return total + _tilted_centre(terms, state, masses)
+    centre = _centre_of_mass(terms)
+    return total + _off_centre(centre, state, masses) + _tilted(terms, centre, state, masses)
 
 
 def shaft_torques(terms: Sequence[EffectTerm], reported: Expression, beta: Expression) -> Expression:
@@ -228,14 +229,6 @@ def _drag(term: EffectTerm, state: State, masses: Masses) -> Expression:
     return ca.vertcat(term["coefficient"] * speed * velocity, ca.SX.zeros(7))
 
 
-def _com_offset(term: EffectTerm, state: State, masses: Masses) -> Expression:
-    """What a centre of mass at (x, y) changes, C_ch being about the centre of mass."""
-    offset = ca.vertcat(term["x"], term["y"])
-    change = _acceleration_at(offset, state) - _acceleration_at(ca.SX.zeros(2), state)
-    moment = _cross(offset, _acceleration_at(offset, state))
-    return masses.own * ca.vertcat(change, moment, ca.SX.zeros(6))
-
-
 def _payload(term: EffectTerm, state: State, masses: Masses) -> Expression:
     del masses
     linear = term["mass"] * _acceleration_at(ca.SX.zeros(2), state)
@@ -287,15 +280,26 @@ def _eccentricity(term: EffectTerm, state: State, masses: Masses) -> Expression:
     return rows
 
 
-def _tilted_centre(terms: Sequence[EffectTerm], state: State, masses: Masses) -> Expression:
-    """Weight along the floor, acting at the centre of mass."""
+def _centre_of_mass(terms: Sequence[EffectTerm]) -> Expression:
+    """Where m_ch has its centre (2,); offsets add up first, for the inertia that they make goes by the square."""
+    return sum((ca.vertcat(term["x"], term["y"]) for term in _of(terms, EffectName.COM_OFFSET)), ca.SX.zeros(2))
+
+
+def _off_centre(centre: Expression, state: State, masses: Masses) -> Expression:
+    """What a centre of mass off the centre changes, C_ch being about the centre of mass."""
+    change = _acceleration_at(centre, state) - _acceleration_at(ca.SX.zeros(2), state)
+    moment = _cross(centre, _acceleration_at(centre, state))
+    return masses.own * ca.vertcat(change, moment, ca.SX.zeros(6))
+
+
+def _tilted(terms: Sequence[EffectTerm], centre: Expression, state: State, masses: Masses) -> Expression:
+    """Weight along the floor: of the vehicle at its centre of mass, of loads at the centre of the chassis."""
     rows = ca.SX.zeros(9)
     for slope in _of(terms, EffectName.SLOPE):
         bearing = slope["direction"] - state.heading
         uphill = GRAVITY * ca.sin(slope["angle"]) * ca.vertcat(ca.cos(bearing), ca.sin(bearing))
         rows[:2] += masses.loaded * uphill
-        for centre in _of(terms, EffectName.COM_OFFSET):
-            rows[2] += masses.own * _cross(ca.vertcat(centre["x"], centre["y"]), uphill)
+        rows[2] += masses.own * _cross(centre, uphill)
     return rows
 
 
@@ -320,7 +324,6 @@ _FORCES: Final[Mapping[EffectName, Callable[[EffectTerm, State, Any], Expression
         EffectName.ASYMMETRIC_COULOMB: _at_joints(_asymmetric_coulomb),
         EffectName.ASYMMETRIC_VISCOUS: _at_joints(_asymmetric_viscous),
         EffectName.QUADRATIC_DRAG: _drag,
-        EffectName.COM_OFFSET: _com_offset,
         EffectName.PAYLOAD: _payload,
         EffectName.SCRUB: _scrub,
         EffectName.STEERING_UNIT_MASS: _steering_unit_mass,

@@ -71,7 +71,7 @@ def extended_model(
         names = [entry.name for entry in candidate.parameters]
         values, std = (dict(zip(names, numbers.tolist(), strict=True)) for numbers in (part.values, part.std))
         effects.append(make_effect(EffectName(candidate.effect), candidate.where, values, std))
-    return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), combined((*given, *effects)))
+    return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), combined(given, effects))
 
 
 def plain_model(

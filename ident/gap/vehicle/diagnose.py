@@ -89,7 +89,8 @@ def diagnose_vehicle(
     findings = judge(fitted, confirming, seed=seed)
     invisible = tuple(str(name) for name in effects if name in hidden or name in findings.invisible)
     findings = replace(findings, invisible=invisible)
-    return VehicleDiagnosis(findings, next_experiment(findings, driven), (fitted, confirming))
+    advice = next_experiment(findings, driven.only({block.step for block in fitted.blocks}))
+    return VehicleDiagnosis(findings, advice, (fitted, confirming))
 
 
 def _problem(

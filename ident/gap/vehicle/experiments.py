@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 from ident.gap.findings import Findings
@@ -15,7 +15,7 @@ from ident.records.record import Record, base_step
 from ident.vehicle.effects import Effect, EffectName
 
 LIGHTEST: Final = 0.09
-"""Mass of a known load over the vehicle's from which it counts as the tenth that the experiment asks for [-]."""
+"""Difference of known loads, over the vehicle's mass, that counts as the tenth that the experiment asks for [-]."""
 
 SMALLEST: Final = 0.5
 """Size of an effect that the model has, over the one that the experiment asks for, from which it counts [-]."""
@@ -26,19 +26,23 @@ class Driven:
     """What a diagnosis is made from.
 
     Attributes:
-        loads: steps by name, with the heaviest known load of each over the mass of the vehicle [-].
+        loads: steps by name, with the known loads that each was driven with over the mass of the vehicle [-].
         given: effects that the model has.
     """
 
-    loads: Mapping[str, float]
+    loads: Mapping[str, Collection[float]]
     given: Sequence[Effect] = ()
+
+    def only(self, steps: Collection[str]) -> Driven:
+        """The same without other steps."""
+        return replace(self, loads={step: loads for step, loads in self.loads.items() if step in steps})
 
 
 def driven_steps(records: Iterable[Record], mass: float, given: Sequence[Effect] = ()) -> Driven:
     """What records hold of a vehicle of some mass [kg], judged by a model with some effects."""
-    loads: dict[str, float] = {}
+    loads: dict[str, set[float]] = {}
     for segment in (segment for record in records for segment in record.segments):
-        loads[segment.step] = max(loads.get(segment.step, 0.0), segment.payload / mass)
+        loads.setdefault(segment.step, set()).add(segment.payload / mass)
     return Driven(loads, given)
 
 
@@ -98,19 +102,19 @@ def _open(driven: Driven) -> list[str]:
 
 def _is_done(experiment: Experiment, driven: Driven) -> bool:
     known = all(any(_is_at_least(effect, asked) for effect in driven.given) for asked in experiment.given)
-    drives = (any(_is(drive, step, load) for step, load in driven.loads.items()) for drive in experiment.drives)
-    return known and all(drives)
+    return known and all(_is_driven(drive, driven) for drive in experiment.drives)
 
 
 def _is_at_least(effect: Effect, asked: Effect) -> bool:
     return (effect.name, effect.where) == (asked.name, asked.where) and abs(effect.size) >= SMALLEST * asked.size
 
 
-def _is(drive: Drive, step: str, load: float) -> bool:
-    """Whether a step is that drive: by its load where the drive has one, whatever it is called, else by its name."""
-    if drive.payload:
-        return base_step(step) is drive.step and load >= LIGHTEST
-    return step.startswith(drive.name)
+def _is_driven(drive: Drive, driven: Driven) -> bool:
+    """With a load: whether the motion was driven with and without one, whatever its steps are called; else by name."""
+    if not drive.payload:
+        return any(step.startswith(drive.name) for step in driven.loads)
+    loads = [load for step, those in driven.loads.items() if base_step(step) is drive.step for load in those]
+    return max(loads, default=0.0) - min(loads, default=0.0) >= LIGHTEST
 
 
 def _seen(effect: str, sights: Mapping[str, Sight]) -> bool:

@@ -94,9 +94,9 @@ DIAGNOSTIC: Final[Mapping[str, Experiment]] = MappingProxyType(
             tuple(Drive(step, "slow") for step in (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT)),
         ),
         "on a slope": Experiment(
-            "drive straight and rotation on a floor inclined by two degrees, with that slope in the model (--model)",
+            "drive straight and rotation on a floor inclined by one degree, with that slope in the model (--model)",
             (Drive(Step.STRAIGHT), Drive(Step.ROTATION)),
-            (make_effect(EffectName.SLOPE, "chassis", {"angle": 0.035}),),
+            (make_effect(EffectName.SLOPE, "chassis", {"angle": 0.0175}),),
         ),
         "known payload": Experiment(
             "drive straight and rotation with a load of known mass, a tenth of the vehicle or more (--payload)",

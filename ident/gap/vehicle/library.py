@@ -29,17 +29,19 @@ class Shape:
         angle: of the first of them, where the pair is a size and a direction or phase; two columns then.
         simple: whether the angle zero is tried alone too, with one column: the other may show next to nothing.
         tried: values of nonlinear parameters.
+        curved: whether the rows are not linear far from zero.
     """
 
     linear: tuple[str, ...]
     angle: str | None = None
     simple: bool = False
     tried: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    curved: bool = False
 
     @property
     def is_linear(self) -> bool:
         """Whether the columns are all there is."""
-        return self.angle is None and not self.tried
+        return self.angle is None and not self.tried and not self.curved
 
 
 SHAPES: Final[Mapping[EffectName, Shape]] = MappingProxyType(
@@ -49,7 +51,7 @@ SHAPES: Final[Mapping[EffectName, Shape]] = MappingProxyType(
         EffectName.ASYMMETRIC_VISCOUS: Shape(("imbalance",)),
         EffectName.QUADRATIC_DRAG: Shape(("coefficient",)),
         EffectName.SLOPE: Shape(("angle",), angle="direction", simple=True),
-        EffectName.COM_OFFSET: Shape(("x", "y")),
+        EffectName.COM_OFFSET: Shape(("x", "y"), curved=True),
         EffectName.PAYLOAD: Shape(("mass", "inertia")),
         EffectName.TORQUE_GAIN: Shape(("error",)),
         EffectName.TORQUE_BIAS: Shape(("bias",)),

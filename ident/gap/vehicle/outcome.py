@@ -78,7 +78,7 @@ def outcomes(sources: Iterable[Source], model: ExtendedModel, geometry: Geometry
         runs = _runs(source, model)
         if runs is not None:
             groups.setdefault(runs.simulated_with, []).append(runs)
-    return [outcome for (mode, *_), runs in groups.items() for outcome in _simulated(runs, mode, model, geometry)]
+    return [outcome for key, runs in groups.items() for outcome in _simulated(runs, *key, model, geometry)]
 
 
 def _runs(source: Source, model: ExtendedModel) -> _Runs | None:
@@ -92,7 +92,9 @@ def _runs(source: Source, model: ExtendedModel) -> _Runs | None:
     return _Runs(source, inputs, repeat, place)
 
 
-def _simulated(group: Sequence[_Runs], mode: Mode, model: ExtendedModel, geometry: Geometry) -> Iterable[Outcome]:
+def _simulated(
+    group: Sequence[_Runs], mode: Mode, sample_time: float, load: float, model: ExtendedModel, geometry: Geometry
+) -> Iterable[Outcome]:
     inputs = np.concatenate([runs.inputs for runs in group])
     read = Readings(inputs[..., SLICES["alpha_rate"]], inputs[..., SLICES["beta_rate"]])
     recorded = _velocities(mode, inputs, read, geometry)
@@ -102,7 +104,6 @@ def _simulated(group: Sequence[_Runs], mode: Mode, model: ExtendedModel, geometr
         inputs[:, 0, SLICES["beta"]],
         recorded[:, 0],
     )
-    _, sample_time, load = group[0].simulated_with
     simulation = Simulation(_loaded(model, load), mode, geometry)
     run = simulation.run_from_readings(start, read, inputs[:, :, SLICES["torques"]], sample_time)
     differences = (_velocities(mode, inputs, run.readings, geometry) - recorded)[:, 1:]

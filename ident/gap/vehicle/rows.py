@@ -284,14 +284,22 @@ def _rows(channel: Channel, spec: RowsOfStep, z: _Inputs, p: Expression, terms: 
     return ca.vertcat(*(rows[names.index(name)] for name in spec.coordinates))
 
 
+def _asked_for(rows: Expression, torques: Expression) -> Expression:
+    """The torques nearest to the measured ones for which the rows hold.
+
+    Measured ones carry the noise of the rows: a column of them would cancel it, and be fitted to do that.
+    """
+    driving = ca.jacobian(rows, torques)
+    return torques - driving.T @ ca.solve(driving @ driving.T, rows)
+
+
 def _linearise(rows: Expression, z: _Inputs, p: Expression, units: Sequence[UnitTerm]) -> Vectorised:
     symbols = ca.vertcat(*(unit.symbol for unit in units))
     nothing, zero = ca.SX.zeros(symbols.shape[0]), ca.SX.zeros(p.shape[0])
     plain = ca.substitute(rows, symbols, nothing)
-    table = ca.horzcat(
-        ca.substitute(plain, p, zero),
-        ca.jacobian(plain, p),
-        ca.substitute(ca.jacobian(rows, symbols), symbols, nothing),
-    )
+    columns = ca.substitute(ca.jacobian(rows, symbols), symbols, nothing)
+    if ca.depends_on(columns, z.torques):
+        columns = ca.substitute(columns, z.torques, _asked_for(plain, z.torques))
+    table = ca.horzcat(ca.substitute(plain, p, zero), ca.jacobian(plain, p), columns)
     inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON, p]
     return Vectorised(ca.Function("rows", inputs, [ca.cse(ca.sparsify(table))]))

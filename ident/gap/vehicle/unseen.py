@@ -29,8 +29,8 @@ def unseen_gaps(
 ) -> tuple[Unseen, ...]:
     """Gap by channel without and with the causes, both models fitted to `fit` alone, or to its fitted part.
 
-    Empty where nothing moves in what took no part. Lane changes stand by themselves: nothing repeats in them, and in
-    their curves wheels creep as no model here does.
+    Channels are left out in which nothing repeats that would measure the noise. Lane changes stand by themselves:
+    nothing repeats in them, and in their curves wheels creep as no model here does.
 
     Args:
         findings: of the diagnosis.
@@ -38,6 +38,9 @@ def unseen_gaps(
         confirm: those that confirmed; none: the part of `fit` that did, and lane changes in it.
         vehicle: of the records.
         given: effects of the model that was judged.
+
+    Raises:
+        RecordError: a record has no step that the model describes.
     """
     plain = plain_model(findings, vehicle.prior, given=given, held_out=True)
     extended = extended_model(findings, vehicle.prior, given=given, held_out=True) if findings.causes else plain

@@ -91,6 +91,23 @@ def test_payload_adds_to_the_mass_and_to_what_the_wheels_can_hold(plain: Any) ->
     assert ratio == pytest.approx(1 + 400.0 / plain.vehicle.prior["m_ch"], rel=1e-3)
 
 
+def test_a_payload_presses_on_all_wheels_alike_wherever_the_centre_of_mass_is(extended: Any) -> None:
+    """Wheels that slide sideways brake by what rests on them, the vehicle's weight at its centre of mass."""
+    ahead, prior = 0.2, extended.vehicle.prior
+
+    def turning(load: float) -> float:
+        """Torque about the centre of the chassis, of contacts that all slide sideways at once."""
+        instance = extended.new(y_dot=5.0, payload=load)
+        instance.set_parameter("com_offset.chassis.x", ahead)
+        rates = rates_of(instance)
+        inertia = sum(prior[name] for name in ("C_ch", "C_l", "C_r")) + prior["m_ch"] * ahead**2
+        return inertia * rates["gamma_dot"] + prior["m_ch"] * ahead * rates["y_dot"]
+
+    expected = -extended.vehicle.limits.floor_friction * prior["m_ch"] * GRAVITY * ahead
+    assert turning(0.0) == pytest.approx(expected, rel=1e-2)
+    assert turning(300.0) == pytest.approx(expected, rel=1e-2)
+
+
 def test_a_larger_wheel_rolls_further(extended: Any) -> None:
     instance = extended.new(**ROLLING)
     instance.set_parameter("wheel_radius.wheel_fl.error", 0.01)

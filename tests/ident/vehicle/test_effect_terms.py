@@ -176,11 +176,19 @@ def test_a_motor_gives_what_gain_bias_and_ripple_make_of_the_report(vehicle: Veh
 def test_the_weight_on_an_eccentric_wheel_does_the_work_of_lifting_it(
     state: terms.State, vehicle: VehicleDescription
 ) -> None:
-    """Power of the force is the rate of N (r + e cos(β + φ)), by differences."""
+    """Power of the force is the rate of N (r + e cos(β + φ)), by differences; a load is lifted too."""
     e, phase, beta = 2e-4, 0.3, np.asarray(state.beta, dtype=float)
     values = {"amplitude": e, "phase": phase}
-    force = forces(EffectName.WHEEL_ECCENTRICITY, "wheel_fr", state, vehicle, **values)
-    weight, step = vehicle.prior["m_ch"] * terms.GRAVITY / 4, 1e-6
+    effects = [
+        terms.term_of(make_effect(EffectName.WHEEL_ECCENTRICITY, "wheel_fr", values)),
+        terms.term_of(make_effect(EffectName.PAYLOAD, "chassis", {"mass": 60.0})),
+    ]
+    both, load = (
+        number(terms.added_forces(those, state, vehicle.prior.values), vehicle.geometry)
+        for those in (effects, effects[1:])
+    )
+    force = both - load
+    weight, step = (vehicle.prior["m_ch"] + 60.0) * terms.GRAVITY / 4, 1e-6
     height = [weight * e * np.cos(beta[2] + turn + phase) for turn in (-step, step)]
     assert force[7] == pytest.approx((height[1] - height[0]) / (2 * step), rel=1e-6)
     assert np.count_nonzero(force) == 1

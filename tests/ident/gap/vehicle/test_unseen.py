@@ -11,10 +11,11 @@ import pytest
 from ident.estimate.filters import Processing
 from ident.gap.vehicle.closing import extended_model
 from ident.gap.vehicle.diagnose import diagnose_vehicle
-from ident.gap.vehicle.ideal import DIAGNOSTIC
+from ident.gap.vehicle.ideal import DIAGNOSTIC, Drive, ideal_record
+from ident.gap.vehicle.outcome import outcomes
 from ident.gap.vehicle.sources import DIAGNOSED, Source, sources_of
 from ident.gap.vehicle.unseen import later_part, unseen_gaps
-from ident.records.record import Record, Segment
+from ident.records.record import Record, Segment, Step
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EffectName, make_effect
 from ident.vehicle.extended import ExtendedModel
@@ -131,3 +132,22 @@ def test_without_any_repeat_there_is_no_noise_to_measure_in(prototype: VehicleDe
     once = replace(fit, segments=[replace(s, period=np.full(len(s), -1)) for s in fit.segments])
     findings = diagnose_vehicle([once], [], prototype).findings
     assert {one.channel for one in unseen_gaps(findings, [once], [], prototype)} <= {"kinematic"}
+
+
+def test_segments_of_one_mode_with_other_loads_are_simulated_with_their_own(prototype: VehicleDescription) -> None:
+    """Without noise what was driven comes out again, with 80 kg aboard and without."""
+    record = ideal_record([Drive(Step.STRAIGHT), *DIAGNOSTIC["known payload"].drives], prototype)
+    sources = sources_of(record, prototype.geometry, DIAGNOSED, Processing(), as_recorded=True)
+    found = {
+        (one.step, one.coordinate): one for one in outcomes(sources, ExtendedModel(prototype.prior), prototype.geometry)
+    }
+    assert set(found) == {("straight", "x"), ("straight_loaded", "x"), ("rotation_loaded", "gamma")}
+    for one in found.values():
+        assert np.abs(one.differences).max() < 0.01
+    silent = replace(record, segments=[replace(segment, extra={}) for segment in record.segments])
+    sources = sources_of(silent, prototype.geometry, DIAGNOSED, Processing(), as_recorded=True)
+    off = {
+        (one.step, one.coordinate): one for one in outcomes(sources, ExtendedModel(prototype.prior), prototype.geometry)
+    }
+    assert np.abs(off["straight_loaded", "x"].differences).max() > 0.02
+    np.testing.assert_allclose(off["straight", "x"].differences, found["straight", "x"].differences, atol=1e-12)
