@@ -33,7 +33,7 @@ def chances(rows: Rows, floors: Array, models: Sequence[Array]) -> Mapping[str, 
         repeats, count = kept.samples.shape
         if repeats >= 2 and count:
             free = _independent(kept, block.target - model)
-            ratio = repeats * float(np.mean(kept.mean(block.target - model) ** 2)) / floor**2
+            ratio = repeats * float(np.mean((kept.mean(block.target - model) / floor) ** 2))
             logs.setdefault(block.label, []).append(float(stats.f.logsf(ratio, free, free * (repeats - 1))))
     return {label: float(stats.chi2.sf(-2 * sum(those), 2 * len(those))) for label, those in logs.items()}
 

@@ -241,8 +241,11 @@ class _Model:
         # Squares, so that what rows hardly split gets no negative variance by rounding.
         spread, held = sums @ inverse, scaled[len(stretch) :] @ inverse
         robust = freedom * spread.T @ spread + held.T @ held
-        lift = np.sqrt(np.maximum(np.diag(inverse) / np.maximum(np.diag(robust), np.finfo(float).tiny), 1.0))
-        return np.asarray(robust * np.outer(lift, lift) / np.outer(scale, scale))
+        found, least = np.diag(robust).copy(), np.diag(inverse)
+        lift = np.sqrt(np.maximum(np.divide(least, found, out=np.ones_like(found), where=found > 0), 1.0))
+        robust *= np.outer(lift, lift)
+        np.fill_diagonal(robust, np.maximum(found, least))
+        return np.asarray(robust / np.outer(scale, scale))
 
 
 def _unknown(

@@ -14,7 +14,7 @@ from ident.gap.linear import rms
 from ident.gap.problem import Block, Channel, Nominal, Problem
 from ident.gap.vehicle import rows
 from ident.gap.vehicle.candidates import candidate_of, causes_of, seen_together, slid_by_any
-from ident.gap.vehicle.context import MODEL_COLUMNS, Context, make_context, table_of
+from ident.gap.vehicle.context import MODEL_COLUMNS, Context, fitted_parameters, make_context, table_of
 from ident.gap.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
 from ident.gap.vehicle.library import TermCause
 from ident.gap.vehicle.moments import apart_from_moments
@@ -58,6 +58,8 @@ def build_problem(
     found = [sources_of(record, lengths, steps, processing) for record in records]
     sources = [source for each in found for source in apart_from_moments(each, lengths, processing)]
     context = make_context(sources, vehicle, model, given, processing)
+    if model and EffectName.TORQUE_GAIN in effects:
+        context = replace(context, asked=fitted_parameters(sources, vehicle, context))
     causes = causes_of(tuple(effects), model is not None)
     units = [unit for cause in causes if isinstance(cause, TermCause) for v in cause.variants for unit in v.units]
     tables = [table_of(source, context, units) for source in sources]

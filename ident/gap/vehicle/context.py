@@ -50,6 +50,7 @@ class Context:
         parameters: p (11,) at which columns are taken.
         known: the same, by which effects with a memory tell the forces inside the vehicle; a refit does not move them,
             for rows that hardly show a parameter (B_w) let it go anywhere.
+        asked: p (11,) by which the rows ask for torques: the model's, or the fit's where the model's may be wrong.
         formulas: the equations, effects that are given in them.
         given: effects with a memory that are part of the model too.
         kept: rows of every source for the parameters asked for last.
@@ -59,6 +60,7 @@ class Context:
     processing: Processing
     parameters: Array
     known: Array
+    asked: Array
     formulas: rows.Formulas
     given: tuple[tuple[TransformCause | SlidingCause, Array], ...] = ()
     kept: dict[int, tuple[bytes, Array]] = field(default_factory=dict)
@@ -114,9 +116,10 @@ def make_context(
     """Context of some sources; without a model, parameters are fitted to them."""
     terms = _formulas(tuple(_frozen(term_of(effect)) for effect in given if effect.name in TERMS))
     memories = tuple(_memory(effect) for effect in given if effect.name not in TERMS)
-    context = Context(vehicle.geometry, processing, vehicle.prior.values, vehicle.prior.values, terms, memories)
+    guess = vehicle.prior.values
+    context = Context(vehicle.geometry, processing, guess, guess, guess, terms, memories)
     values = model.values if model else fitted_parameters(sources, vehicle, context)
-    return replace(context, parameters=values, known=values)
+    return replace(context, parameters=values, known=values, asked=values)
 
 
 def fitted_parameters(sources: Sequence[Source], vehicle: VehicleDescription, context: Context) -> Array:
@@ -149,7 +152,7 @@ def table_of(source: Source, context: Context, units: Sequence[rows.UnitTerm]) -
         plain = context.filtered(context.plain(source), source)
         return np.concatenate([plain, np.zeros((*plain.shape[:2], MODEL_COLUMNS - 1 + len(units)))], axis=2)
     function = context.formulas.linearised(source.channel, source.spec, units)
-    entries = function.entries(context.inputs(source), *context.constants)
+    entries = function.entries(context.inputs(source), *context.constants, context.asked)
     return function.matrices(context.filtered(entries.T, source).T)
 
 

@@ -5,7 +5,8 @@ Both are written as what must be zero: with p the parameters, θ the effects' nu
     dynamic    H_k′ᵀ (Θ′ p′ + f - B u′)                               generalized force
     kinematic  (1 - A_ch′ A_ch′⁺) (A_α α̇′ + A_β′ β̇), longitudinal rows   velocity
 
-so that baseline, target and the columns of effects are derivatives of one expression.
+so that baseline, target and the columns of effects are derivatives of one expression; gains of drives apart, whose
+columns have torques without the noise of the rows (docs/adr/0024).
 """
 
 from __future__ import annotations
@@ -251,12 +252,15 @@ class Formulas:
         self._linearised: dict[tuple[Channel, RowsOfStep, tuple[UnitTerm, ...]], Vectorised] = {}
 
     def linearised(self, channel: Channel, spec: RowsOfStep, units: Sequence[UnitTerm]) -> Vectorised:
-        """(z, geometry, ε, p) -> (N, rows, 12 + units): the rows at p = 0, then ∂/∂p, then ∂/∂unit."""
+        """(z, geometry, ε, p, p₀) -> (N, rows, 12 + units): the rows at p = 0, then ∂/∂p, then ∂/∂unit.
+
+        In columns of gains stand the torques that the rows ask for by p₀, where motors share a row.
+        """
         key = (channel, spec, tuple(units))
         if key not in self._linearised:
             z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
             rows = _rows(channel, spec, z, p, [*(unit.term for unit in units), *self._given])
-            self._linearised[key] = _linearise(rows, z, p, units)
+            self._linearised[key] = _linearise(rows, z, p, units, shared=spec.mode is not None)
         return self._linearised[key]
 
     def exact(self, channel: Channel, spec: RowsOfStep, name: EffectName | None = None, where: str = "") -> Vectorised:
@@ -293,13 +297,17 @@ def _asked_for(rows: Expression, torques: Expression) -> Expression:
     return torques - driving.T @ ca.solve(driving @ driving.T, rows)
 
 
-def _linearise(rows: Expression, z: _Inputs, p: Expression, units: Sequence[UnitTerm]) -> Vectorised:
+def _linearise(rows: Expression, z: _Inputs, p: Expression, units: Sequence[UnitTerm], *, shared: bool) -> Vectorised:
+    """`shared`: whether a row is driven by several motors."""
+    asking = ca.SX.sym("asking", p.shape[0])
     symbols = ca.vertcat(*(unit.symbol for unit in units))
     nothing, zero = ca.SX.zeros(symbols.shape[0]), ca.SX.zeros(p.shape[0])
     plain = ca.substitute(rows, symbols, nothing)
     columns = ca.substitute(ca.jacobian(rows, symbols), symbols, nothing)
-    if ca.depends_on(columns, z.torques):
-        columns = ca.substitute(columns, z.torques, _asked_for(plain, z.torques))
+    gains = [index for index, unit in enumerate(units) if unit.term.name is EffectName.TORQUE_GAIN]
+    if gains and shared and ca.depends_on(columns, z.torques):
+        asked = _asked_for(ca.substitute(plain, p, asking), z.torques)
+        columns[:, gains] = ca.substitute(columns[:, gains], z.torques, asked)
     table = ca.horzcat(ca.substitute(plain, p, zero), ca.jacobian(plain, p), columns)
-    inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON, p]
+    inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON, p, asking]
     return Vectorised(ca.Function("rows", inputs, [ca.cse(ca.sparsify(table))]))

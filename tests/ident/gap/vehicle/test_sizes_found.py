@@ -16,7 +16,7 @@ from ident.records.record import Record, Segment
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.effects import EFFECTS, Effect, EffectName, make_effect
 from ident.vehicle.extended import ExtendedModel
-from ident.vehicle.parameters import COULOMB_EPSILON
+from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES, Parameters
 
 Drives = Callable[..., tuple[Record, Record]]
 
@@ -92,6 +92,29 @@ def test_an_effect_that_has_grown_is_one_effect_of_its_whole_size(
     (whole,) = extended_model(findings, prototype.prior, given=model.effects).effects
     assert whole.size == pytest.approx(size, rel=0.05)
     assert whole.parameters[EFFECTS[half.name].size.name].std < 0.1 * size
+
+
+@pytest.mark.parametrize("friction", [None, 1.0, 1.5])
+def test_wheels_in_the_air_tell_the_gain_of_a_drive_whatever_the_model_says_of_their_friction(
+    friction: float | None, prototype: VehicleDescription, drives: Drives
+) -> None:
+    """A fifth more torque than is reported; friction that is half as large again in the model, or no model."""
+
+    def strong(segment: Segment) -> Segment:
+        return replace(segment, motor_torques=segment.motor_torques / np.array([1.2, 1, 1, 1]))
+
+    fit, confirm = drives(prototype, strong, DIAGNOSTIC["wheels lifted"].drives)
+    model = None
+    if friction is not None:
+        names = np.isin(PARAMETER_NAMES, ("d_vw", "d_cw"))
+        values = prototype.prior.values * np.where(names, friction, 1.0)
+        std = np.abs(values) * np.where(names, max(friction - 1, 0.005), 0.005)
+        model = ExtendedModel(Parameters(values, std))
+    gains = (EffectName.TORQUE_GAIN,)
+    (gain,) = diagnose_vehicle([fit], [confirm], prototype, model, effects=gains).findings.causes
+    assert gain.candidate.key == "torque_gain@drive_fl"
+    assert gain.part.values[0] == pytest.approx(0.2, abs=0.004 + 2.5 * gain.part.std[0])
+    assert gain.part.std[0] < 0.015
 
 
 def test_dither_tells_the_gain_of_a_drive_though_its_torque_is_as_noisy_as_the_rows(
