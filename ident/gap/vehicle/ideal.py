@@ -17,6 +17,7 @@ from ident.campaign.steps import EXCITATIONS, StepSpec
 from ident.records.record import PAYLOAD, Record, Segment, Step, make_segment
 from ident.vehicle import dynamics, kinematics
 from ident.vehicle.description import VehicleDescription
+from ident.vehicle.effect_terms import GRAVITY
 from ident.vehicle.effects import Effect, EffectName, make_effect
 from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import PARAMETER_NAMES
@@ -27,6 +28,8 @@ SAMPLE_TIME: Final = 0.004
 PERIODS: Final = 2
 TURN_TIME: Final = 6.0
 """Of half a turn on the spot [s]."""
+INCLINED: Final = 0.0175
+"""Slope [rad] on which friction still holds a vehicle without brakes."""
 PAYLOAD_MASS: Final = 80.0
 """Of a known load [kg], a tenth of the vehicle; half as much leaves too little of a drive's gain."""
 
@@ -41,6 +44,7 @@ class Drive:
         dither: whether the motors work against each other too.
         turned: whether the vehicle is turned by half a turn before.
         payload: mass of a known load [kg].
+        slope: angle by which the floor rises ahead [rad]; for steps that begin at heading zero.
     """
 
     step: Step
@@ -48,6 +52,7 @@ class Drive:
     dither: bool = False
     turned: bool = False
     payload: float = 0.0
+    slope: float = 0.0
 
     @property
     def name(self) -> str:
@@ -95,8 +100,8 @@ DIAGNOSTIC: Final[Mapping[str, Experiment]] = MappingProxyType(
         ),
         "on a slope": Experiment(
             "drive straight and rotation on a floor inclined by one degree, with that slope in the model (--model)",
-            (Drive(Step.STRAIGHT), Drive(Step.ROTATION)),
-            (make_effect(EffectName.SLOPE, "chassis", {"angle": 0.0175}),),
+            (Drive(Step.STRAIGHT, slope=INCLINED), Drive(Step.ROTATION, slope=INCLINED)),
+            (make_effect(EffectName.SLOPE, "chassis", {"angle": INCLINED}),),
         ),
         "known payload": Experiment(
             "drive straight and rotation with a load of known mass, a tenth of the vehicle or more (--payload)",
@@ -125,9 +130,7 @@ def _segment(drive: Drive, vehicle: VehicleDescription, generator: np.random.Gen
     time = np.linspace(0.0, PERIODS * spec.period, PERIODS * per_period, endpoint=False)
     motion = series.evaluate(time)
     alpha, beta, torques = (
-        _lifted(motion, vehicle)
-        if spec.mode is None
-        else _on_the_floor(spec, spec.mode, motion, vehicle, drive.payload)
+        _lifted(motion, vehicle) if spec.mode is None else _on_the_floor(spec, spec.mode, motion, vehicle, drive)
     )
     if drive.dither:
         torques = torques + dither_torques(time, spec.period, vehicle)
@@ -152,7 +155,7 @@ def _lifted(motion: tuple[Array, Array, Array], vehicle: VehicleDescription) -> 
 
 
 def _on_the_floor(
-    spec: StepSpec, mode: Mode, motion: tuple[Array, Array, Array], vehicle: VehicleDescription, payload: float
+    spec: StepSpec, mode: Mode, motion: tuple[Array, Array, Array], vehicle: VehicleDescription, drive: Drive
 ) -> tuple[Array, Array, Array]:
     """Angles by the constant column of H_k that these steps drive, torques by (21)."""
     position, velocity, acceleration = motion
@@ -164,8 +167,12 @@ def _on_the_floor(
     velocities[:, row], accelerations[:, row] = velocity, acceleration
     if mode is Mode.ALIGNMENT:
         alpha[:, row] += position
-    loaded = vehicle.prior.values + payload * (np.array(PARAMETER_NAMES) == "m_ch")
+    loaded = vehicle.prior.values + drive.payload * (np.array(PARAMETER_NAMES) == "m_ch")
     torques = dynamics.feed_forward(mode, alpha, velocities, accelerations, loaded, vehicle.geometry)
+    if drive.slope and "x" in names:
+        weight = (vehicle.prior["m_ch"] + drive.payload) * GRAVITY * np.sin(drive.slope)
+        driven = dynamics.projected_input(mode, alpha[:1], vehicle.geometry)[0]
+        torques = torques + np.linalg.pinv(driven)[:, names.index("x")] * weight
     return alpha, position[:, None] * column, torques
 
 
