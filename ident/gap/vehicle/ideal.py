@@ -44,7 +44,7 @@ class Drive:
         dither: whether the motors work against each other too.
         turned: whether the vehicle is turned by half a turn before.
         payload: mass of a known load [kg].
-        slope: angle by which the floor rises ahead [rad]; for steps that begin at heading zero.
+        slope: angle by which the floor rises ahead [rad]; for straight and rotation that begin at heading zero.
     """
 
     step: Step

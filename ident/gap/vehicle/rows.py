@@ -6,7 +6,7 @@ Both are written as what must be zero: with p the parameters, θ the effects' nu
     kinematic  (1 - A_ch′ A_ch′⁺) (A_α α̇′ + A_β′ β̇), longitudinal rows   velocity
 
 so that baseline, target and the columns of effects are derivatives of one expression; gains of drives apart, whose
-columns have torques without the noise of the rows (docs/adr/0024).
+columns have torques without the noise of the rows where motors share one (docs/adr/0024).
 """
 
 from __future__ import annotations

@@ -60,8 +60,11 @@ def test_a_perfect_vehicle_leaves_nothing(vehicle: VehicleDescription) -> None:
 LOADED = DIAGNOSTIC["known payload"].drives
 
 
-def test_a_known_load_is_part_of_the_model(vehicle: VehicleDescription) -> None:
-    for block in problem_of(ideal_record(LOADED, vehicle), vehicle).blocks:
+@pytest.mark.parametrize("experiment", ["known payload", "on a slope"])
+def test_what_is_known_of_load_and_floor_is_part_of_the_model(experiment: str, vehicle: VehicleDescription) -> None:
+    driven, gains = DIAGNOSTIC[experiment], (EffectName.TORQUE_GAIN,)
+    record = ideal_record(driven.drives, vehicle)
+    for block in build_problem([record], vehicle, vehicle.prior, given=driven.given, effects=gains).blocks:
         if block.channel is Channel.DYNAMIC:
             left = (block.target - of_the_model(block) @ vehicle.prior.values)[block.moving]
             assert np.abs(left).max() < 3e-3 * np.abs(block.target).max(), block.label

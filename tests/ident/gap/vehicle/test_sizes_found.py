@@ -94,6 +94,13 @@ def test_an_effect_that_has_grown_is_one_effect_of_its_whole_size(
     assert whole.parameters[EFFECTS[half.name].size.name].std < 0.1 * size
 
 
+def rough(prototype: VehicleDescription, friction: float) -> ExtendedModel:
+    """A model whose wheels have so many times their friction, and which knows that it may."""
+    names = np.isin(PARAMETER_NAMES, ("d_vw", "d_cw"))
+    values = prototype.prior.values * np.where(names, friction, 1.0)
+    return ExtendedModel(Parameters(values, np.abs(values) * np.where(names, max(friction - 1, 0.005), 0.005)))
+
+
 @pytest.mark.parametrize("friction", [None, 1.0, 1.5])
 def test_wheels_in_the_air_tell_the_gain_of_a_drive_whatever_the_model_says_of_their_friction(
     friction: float | None, prototype: VehicleDescription, drives: Drives
@@ -104,12 +111,7 @@ def test_wheels_in_the_air_tell_the_gain_of_a_drive_whatever_the_model_says_of_t
         return replace(segment, motor_torques=segment.motor_torques / np.array([1.2, 1, 1, 1]))
 
     fit, confirm = drives(prototype, strong, DIAGNOSTIC["wheels lifted"].drives)
-    model = None
-    if friction is not None:
-        names = np.isin(PARAMETER_NAMES, ("d_vw", "d_cw"))
-        values = prototype.prior.values * np.where(names, friction, 1.0)
-        std = np.abs(values) * np.where(names, max(friction - 1, 0.005), 0.005)
-        model = ExtendedModel(Parameters(values, std))
+    model = None if friction is None else rough(prototype, friction)
     gains = (EffectName.TORQUE_GAIN,)
     (gain,) = diagnose_vehicle([fit], [confirm], prototype, model, effects=gains).findings.causes
     assert gain.candidate.key == "torque_gain@drive_fl"
@@ -117,8 +119,9 @@ def test_wheels_in_the_air_tell_the_gain_of_a_drive_whatever_the_model_says_of_t
     assert gain.part.std[0] < 0.015
 
 
+@pytest.mark.parametrize("friction", [None, 1.5])
 def test_dither_tells_the_gain_of_a_drive_though_its_torque_is_as_noisy_as_the_rows(
-    prototype: VehicleDescription, drives: Drives
+    friction: float | None, prototype: VehicleDescription, drives: Drives
 ) -> None:
     """A torque that is fitted to a sum that it is part of takes the noise of the sum away, if it may."""
 
@@ -126,7 +129,9 @@ def test_dither_tells_the_gain_of_a_drive_though_its_torque_is_as_noisy_as_the_r
         return replace(segment, motor_torques=segment.motor_torques / np.array([1.08, 1, 1, 1]))
 
     fit, confirm = drives(prototype, strong, DIAGNOSTIC["torque dither"].drives)
-    (gain,) = diagnose_vehicle([fit], [confirm], prototype).findings.causes
+    model = None if friction is None else rough(prototype, friction)
+    gains = (EffectName.TORQUE_GAIN,)
+    (gain,) = diagnose_vehicle([fit], [confirm], prototype, model, effects=gains).findings.causes
     assert gain.candidate.key == "torque_gain@drive_fl"
     (error,), (std,) = gain.part.values, gain.part.std
     assert error == pytest.approx(0.08, abs=0.003 + 2 * std)
