@@ -14,7 +14,7 @@ from typing import Final
 import casadi as ca
 
 from fmu.model.symbols import Symbols
-from ident.vehicle.effect_terms import GRAVITY, EffectTerm
+from ident.vehicle.effect_terms import GRAVITY, EffectTerm, centre_of_mass
 from ident.vehicle.effects import EffectName
 from ident.vehicle.symbolic import CORNERS, Expression
 
@@ -25,8 +25,8 @@ _LEAST_LOAD: Final = 1e-3
 def static_loads(p: Symbols, terms: Sequence[EffectTerm]) -> Expression:
     """Loads of the contacts (4,) [N] on a level floor at rest; `com_offset` shifts m_ch, no payload."""
     load = sum((term["mass"] for term in terms if term.name is EffectName.PAYLOAD), ca.SX(0))
-    ahead = sum((term["x"] for term in terms if term.name is EffectName.COM_OFFSET), ca.SX(0))
-    left = sum((term["y"] for term in terms if term.name is EffectName.COM_OFFSET), ca.SX(0))
+    centre = centre_of_mass(terms)
+    ahead, left = centre[0], centre[1]
     shares = [1 + front * 2 * ahead / p["wheelbase"] + side * 2 * left / p["track_width"] for front, side in CORNERS]
     quarters = [ca.fmax(p["m_ch"] * share + load, _LEAST_LOAD * p["m_ch"]) for share in shares]
     return GRAVITY / 4 * ca.vertcat(*quarters)

@@ -32,8 +32,9 @@ def chances(rows: Rows, floors: Array, models: Sequence[Array]) -> Mapping[str, 
     for (block, kept), floor, model in zip(rows.blocks, floors.tolist(), models, strict=True):
         repeats, count = kept.samples.shape
         if repeats >= 2 and count:
-            free = _independent(kept, block.target - model)
-            ratio = repeats * float(np.mean((kept.mean(block.target - model) / floor) ** 2))
+            residual = block.target - model
+            free = _independent(kept, residual)
+            ratio = repeats * float(np.mean((kept.mean(residual) / floor) ** 2))
             logs.setdefault(block.label, []).append(float(stats.f.logsf(ratio, free, free * (repeats - 1))))
     return {label: float(stats.chi2.sf(-2 * sum(those), 2 * len(those))) for label, those in logs.items()}
 

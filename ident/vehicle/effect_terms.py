@@ -143,8 +143,13 @@ def added_forces(terms: Sequence[EffectTerm], state: State, parameters: Expressi
     for term in terms:
         if term.name in _FORCES:
             total += _FORCES[term.name](term, state, masses)
-    centre = _centre_of_mass(terms)
+    centre = centre_of_mass(terms)
     return total + _off_centre(centre, state, masses) + _tilted(terms, centre, state, masses)
+
+
+def centre_of_mass(terms: Sequence[EffectTerm]) -> Expression:
+    """Where m_ch has its centre (2,); offsets add up first, for the inertia that they make goes by the square."""
+    return sum((ca.vertcat(term["x"], term["y"]) for term in _of(terms, EffectName.COM_OFFSET)), ca.SX.zeros(2))
 
 
 def shaft_torques(terms: Sequence[EffectTerm], reported: Expression, beta: Expression) -> Expression:
@@ -278,11 +283,6 @@ def _eccentricity(term: EffectTerm, state: State, masses: Masses) -> Expression:
     quarter = masses.loaded * GRAVITY / 4
     rows[_FIRST_WHEEL + wheel] = -quarter * term["amplitude"] * ca.sin(state.beta[wheel] + term["phase"])
     return rows
-
-
-def _centre_of_mass(terms: Sequence[EffectTerm]) -> Expression:
-    """Where m_ch has its centre (2,); offsets add up first, for the inertia that they make goes by the square."""
-    return sum((ca.vertcat(term["x"], term["y"]) for term in _of(terms, EffectName.COM_OFFSET)), ca.SX.zeros(2))
 
 
 def _off_centre(centre: Expression, state: State, masses: Masses) -> Expression:

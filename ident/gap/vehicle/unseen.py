@@ -44,7 +44,7 @@ def unseen_gaps(
     """
     plain = plain_model(findings, vehicle.prior, given=given, held_out=True)
     extended = extended_model(findings, vehicle.prior, given=given, held_out=True) if findings.causes else plain
-    part: Callable[[Source], Source] = _whole if confirm else later_part
+    part = None if confirm else later_part
     found = compared(confirm or fit, vehicle, plain, extended, part=part, repeated=fit)
     return tuple(
         Unseen(name, str(channel), gap)
@@ -64,10 +64,6 @@ def later_part(source: Source) -> Source:
     guard = guard_of(Processing().cutoff, source.sample_time)
     parts = [part_of(moving, source.period, guard, confirming=True) for moving in source.moving]
     return replace(source, moving=tuple(moving for moving, _ in parts), period=parts[0][1])
-
-
-def _whole(source: Source) -> Source:
-    return source
 
 
 def _changes_lane(step: str) -> bool:

@@ -101,22 +101,30 @@ def rough(prototype: VehicleDescription, friction: float) -> ExtendedModel:
     return ExtendedModel(Parameters(values, np.abs(values) * np.where(names, max(friction - 1, 0.005), 0.005)))
 
 
+def gain_found(
+    gain: float, experiment: str, friction: float | None, prototype: VehicleDescription, drives: Drives
+) -> tuple[float, float]:
+    """Gain of the first drive with its standard deviation, by a model with some friction of the wheels, or none."""
+
+    def strong(segment: Segment) -> Segment:
+        return replace(segment, motor_torques=segment.motor_torques / np.array([1 + gain, 1, 1, 1]))
+
+    fit, confirm = drives(prototype, strong, DIAGNOSTIC[experiment].drives)
+    model = None if friction is None else rough(prototype, friction)
+    gains = (EffectName.TORQUE_GAIN,)
+    (cause,) = diagnose_vehicle([fit], [confirm], prototype, model, effects=gains).findings.causes
+    assert cause.candidate.key == "torque_gain@drive_fl"
+    return float(cause.part.values[0]), float(cause.part.std[0])
+
+
 @pytest.mark.parametrize("friction", [None, 1.0, 1.5])
 def test_wheels_in_the_air_tell_the_gain_of_a_drive_whatever_the_model_says_of_their_friction(
     friction: float | None, prototype: VehicleDescription, drives: Drives
 ) -> None:
     """A fifth more torque than is reported; friction that is half as large again in the model, or no model."""
-
-    def strong(segment: Segment) -> Segment:
-        return replace(segment, motor_torques=segment.motor_torques / np.array([1.2, 1, 1, 1]))
-
-    fit, confirm = drives(prototype, strong, DIAGNOSTIC["wheels lifted"].drives)
-    model = None if friction is None else rough(prototype, friction)
-    gains = (EffectName.TORQUE_GAIN,)
-    (gain,) = diagnose_vehicle([fit], [confirm], prototype, model, effects=gains).findings.causes
-    assert gain.candidate.key == "torque_gain@drive_fl"
-    assert gain.part.values[0] == pytest.approx(0.2, abs=0.004 + 2.5 * gain.part.std[0])
-    assert gain.part.std[0] < 0.015
+    error, std = gain_found(0.2, "wheels lifted", friction, prototype, drives)
+    assert error == pytest.approx(0.2, abs=0.004 + 2.5 * std)
+    assert std < 0.015
 
 
 @pytest.mark.parametrize("friction", [None, 1.5])
@@ -124,15 +132,6 @@ def test_dither_tells_the_gain_of_a_drive_though_its_torque_is_as_noisy_as_the_r
     friction: float | None, prototype: VehicleDescription, drives: Drives
 ) -> None:
     """A torque that is fitted to a sum that it is part of takes the noise of the sum away, if it may."""
-
-    def strong(segment: Segment) -> Segment:
-        return replace(segment, motor_torques=segment.motor_torques / np.array([1.08, 1, 1, 1]))
-
-    fit, confirm = drives(prototype, strong, DIAGNOSTIC["torque dither"].drives)
-    model = None if friction is None else rough(prototype, friction)
-    gains = (EffectName.TORQUE_GAIN,)
-    (gain,) = diagnose_vehicle([fit], [confirm], prototype, model, effects=gains).findings.causes
-    assert gain.candidate.key == "torque_gain@drive_fl"
-    (error,), (std,) = gain.part.values, gain.part.std
+    error, std = gain_found(0.08, "torque dither", friction, prototype, drives)
     assert error == pytest.approx(0.08, abs=0.003 + 2 * std)
     assert std < 0.01
