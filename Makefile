@@ -1,4 +1,5 @@
-# Two commands matter: `make demo` and `make test`. Each makes its own .venv and installs what it needs.
+# Two commands matter: `make demo` and `make test`. Each makes the same .venv and installs what it needs: the demo the
+# emulator alone, everything else all extras. Versions are those of constraints.txt.
 
 # PyBullet has ready wheels for CPython 3.11 on Linux; on another Python it is compiled, which takes many minutes.
 PYTHON := $(firstword $(shell for name in python3.11 python3; do \
@@ -7,17 +8,22 @@ ifeq ($(PYTHON),)
 PYTHON := python3
 endif
 BIN := .venv/bin
+PIP := -m pip --disable-pip-version-check
+ALL := .[emulator,records,dbc,ziglang,cosim,exam,cluster,test]
 
-.PHONY: demo test test-all bench check clean
+.PHONY: demo test test-all bench check constraints clean
 
-demo: .venv/installed
+demo: .venv/demo
 	$(BIN)/quasiomni demo
 
+# Tests start hundreds of processes: each would compile all modules again where the environment forbids keeping them.
+test test-all: export PYTHONDONTWRITEBYTECODE =
+
 test: .venv/installed
-	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow and not bench"
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --timeout 300 -m "not slow and not bench"
 
 test-all: .venv/installed
-	$(BIN)/python -m pytest -n auto --dist loadfile -m "not bench"
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "not bench"
 
 bench: .venv/installed
 	$(BIN)/python -m pytest -m bench -s
@@ -28,12 +34,29 @@ check: .venv/installed
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# The newest versions that the lower bounds of pyproject.toml allow; `make test` then says whether they work.
+constraints:
+	rm -rf .venv-constraints
+	$(PYTHON) -m venv .venv-constraints
+	.venv-constraints/bin/python $(PIP) install --quiet '$(ALL)'
+	sed -n '/^#/p' constraints.txt > .venv-constraints/constraints.txt
+	.venv-constraints/bin/python $(PIP) freeze --exclude quasiomni >> .venv-constraints/constraints.txt
+	mv .venv-constraints/constraints.txt constraints.txt
+	rm -rf .venv-constraints
+
 clean:
 	rm -rf .venv runs
 
-.venv/installed: pyproject.toml
+.venv/made:
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit("Python 3.11 or newer is needed, this is %d.%d." % v[:2] if v < (3, 11) else 0)'
 	@$(PYTHON) -c 'import sys; v = sys.version_info; v[:2] == (3, 11) or print("No Python 3.11 found: PyBullet has no wheel for %d.%d and will be compiled (10 to 30 minutes, needs a C++ compiler)." % v[:2])'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[emulator,records,dbc,ziglang,cosim,cluster,test]'
 	@touch $@
+
+.venv/demo: .venv/made pyproject.toml constraints.txt
+	$(BIN)/python $(PIP) install --quiet --constraint constraints.txt --editable '.[emulator]'
+	@touch $@
+
+.venv/installed: .venv/made pyproject.toml constraints.txt
+	$(BIN)/python $(PIP) install --quiet --constraint constraints.txt --editable '$(ALL)'
+	@touch $@ .venv/demo

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Self
+from typing import Self
 
 from emulator.prototype import Prototype
 from emulator.rigid_bodies import RigidBody
-
-GRAVITY: Final = 9.80665
-"""Standard gravity [m/s^2]; CGPM 1901."""
+from ident.vehicle.quantities import GRAVITY
 
 
 @dataclass(frozen=True)

@@ -35,13 +35,13 @@ class Encoder:
     def __init__(self, data: EncoderData, side: int, angles: SteeringAngles, disturbances: Disturbances) -> None:
         self.counts_per_revolution = data.counts_per_revolution
         self._scale = data.directions[side] * data.counts_per_revolution / math.tau
-        self._zero = data.zero_position
+        self._zero = data.zero_positions[side]
         self._side = side
         self._angles = angles
         self._disturbances = disturbances
 
     def position(self) -> int:
-        """Position value [increments], unsigned 32 bit; `zero_position` with the wheels straight."""
+        """Position value [increments], unsigned 32 bit; `zero_positions` with the wheels straight."""
         exact = self._scale * self._angles.steering_angle(self._side)
         dither = self._disturbances.steering_dither[self._side]
         return wrap_unsigned(self._zero + round(exact + dither))

@@ -87,8 +87,7 @@ class PowerStage:
         ratio = peak_torque / rated_torque
         self._peak_torque = _PEAK_SHARE * peak_torque
         self._copper = 3.0 * data.phase_resistance * (rated_current / rated_torque) ** 2
-        time_constant = -data.overload_time / math.log1p(-THERMAL_LIMIT / ratio**2)
-        self._heating = -math.expm1(-step / time_constant)
+        self._heating = -math.expm1(-step / _time_constant(data.overload_time, ratio))
         self._limits = (data.peak_time, data.stall_time)
         self._at_peak = self._stalled = 0.0
         self._energy = self._supply_energy
@@ -158,3 +157,9 @@ class PowerStage:
 
     def _energy_at(self, voltage: float) -> float:
         return 0.5 * self._capacitance * voltage**2
+
+
+def _time_constant(overload_time: float, ratio: float) -> float:
+    """tau of the thermal load [s]; a motor whose peak torque is about the rated one never gets too hot."""
+    share = THERMAL_LIMIT / ratio**2
+    return -overload_time / math.log1p(-share) if share < 1.0 else overload_time

@@ -13,7 +13,7 @@ from ident.errors import DataFileError
 from ident.vehicle.description import find_data_file
 from ident.vehicle.geometry import WHEELS, Geometry, read_geometry
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters, read_parameters
-from ident.vehicle.quantities import read_quantities, read_toml, require_table
+from ident.vehicle.quantities import read_quantities, read_toml, refuse_unknown, require_table
 
 SIDES: Final = ("left", "right")
 """Order of the steering encoders."""
@@ -88,12 +88,12 @@ class EncoderData:
 
     Attributes:
         counts_per_revolution: increments per turn.
-        zero_position: reading with the wheels straight, increments.
+        zero_positions: reading with the wheels straight per side (left, right), increments.
         directions: +1 or -1 per side (left, right): sign of counts when the front wheel turns left.
     """
 
     counts_per_revolution: int
-    zero_position: int
+    zero_positions: tuple[int, ...]
     directions: tuple[int, ...]
 
 
@@ -143,6 +143,7 @@ class Prototype:
 
     Attributes:
         name: of the prototype.
+        path: file that describes it.
         geometry: lengths, gear ratio, steering stops.
         truth: the eleven parameters an identification should find.
         body: outer shape of the chassis.
@@ -150,9 +151,12 @@ class Prototype:
         floor_friction: adhesion between wheel and floor [-].
         tyre: radial compliance of the wheels.
         drive, power_stage, encoder, noise: data sheets.
+        solver_sweeps: of an engine that relaxes its contacts step by step: so many are enough for this vehicle. Wheels
+            that are light beside what steers them need more.
     """
 
     name: str
+    path: Path
     geometry: Geometry
     truth: Parameters
     body: Body
@@ -163,6 +167,7 @@ class Prototype:
     power_stage: PowerStageData
     encoder: EncoderData
     noise: NoiseData
+    solver_sweeps: int = 50
 
 
 def load_prototype(name_or_path: str | Path = "prototype") -> Prototype:
@@ -175,11 +180,30 @@ def load_prototype(name_or_path: str | Path = "prototype") -> Prototype:
     document = read_toml(path)
     geometry = read_geometry(require_table(document, "geometry", path), path)
     truth = read_parameters(path, "truth")
-    _require_positive({name: truth[name] for name in PARAMETER_NAMES}, "truth", path)
     tables = {name: _read_table(document, name, path) for name in TABLE_UNITS}
+    refuse_unknown(document, ("name", "description", "geometry", "truth", *TABLE_UNITS), f"{path}:")
+    return build_prototype(str(document.get("name", path.stem)), geometry, truth, tables, path)
+
+
+def build_prototype(
+    name: str, geometry: Geometry, truth: Parameters, tables: Mapping[str, Mapping[str, float]], path: Path
+) -> Prototype:
+    """A prototype from the numbers of TABLE_UNITS, table by table.
+
+    Args:
+        name: of the prototype.
+        geometry, truth: lengths, and the parameters an identification should find.
+        tables: the values, in the units of TABLE_UNITS.
+        path: file named in errors.
+
+    Raises:
+        DataFileError: the numbers describe a vehicle that cannot be.
+    """
+    _require_positive({name: truth[name] for name in PARAMETER_NAMES}, "truth", path)
     body = Body(**tables["body"])
     return Prototype(
-        name=str(document.get("name", path.stem)),
+        name=name,
+        path=path,
         geometry=geometry,
         truth=truth,
         body=body,
@@ -188,9 +212,9 @@ def load_prototype(name_or_path: str | Path = "prototype") -> Prototype:
         ),
         floor_friction=tables["floor"]["friction"],
         tyre=Tyre(**tables["tyre"]),
-        drive=_drive(tables["drive"], path),
-        power_stage=_power_stage(tables["power_stage"], path),
-        encoder=_encoder(tables["steering_encoder"], path),
+        drive=_drive(dict(tables["drive"]), path),
+        power_stage=_power_stage(dict(tables["power_stage"]), path),
+        encoder=_encoder(dict(tables["steering_encoder"]), path),
         noise=NoiseData(**tables["noise"]),
     )
 
@@ -259,6 +283,6 @@ def _encoder(table: dict[str, float], path: Path) -> EncoderData:
     where = f"{path}: steering_encoder"
     return EncoderData(
         counts_per_revolution=_whole(table, "counts_per_revolution", where),
-        zero_position=_whole(table, "zero_position", where),
+        zero_positions=(_whole(table, "zero_position", where),) * len(SIDES),
         directions=_directions(table, SIDES, where),
     )

@@ -9,11 +9,12 @@ from types import TracebackType
 from typing import Final, Self
 
 from emulator.drive import Drive
+from emulator.effects import Wanted, inject
 from emulator.effects.assembly import Mechanics
 from emulator.effects.bodies import load_payload
-from emulator.effects.injection import AnyEffect, inject
 from emulator.encoder import Encoder
-from emulator.engine import DEFAULT_SOLVER, Engine, SolverSettings
+from emulator.engine.choice import ENGINES, EngineName
+from emulator.engine.protocol import MakeEngine
 from emulator.noise import Disturbances
 from emulator.prototype import Prototype
 
@@ -57,7 +58,7 @@ class EmulatedVehicle:
         gui: show the vehicle in a window.
         noise_scale: factor on every random source; 0 switches noise off.
         engine_step: [s].
-        solver: settings of the engine's constraint solver.
+        make_engine: what makes the physics engine.
         effects: that it has beyond its prototype file.
 
     Attributes:
@@ -80,13 +81,13 @@ class EmulatedVehicle:
         gui: bool = False,
         noise_scale: float = 1.0,
         engine_step: float = 1e-3,
-        solver: SolverSettings = DEFAULT_SOLVER,
-        effects: Sequence[AnyEffect] = (),
+        make_engine: MakeEngine = ENGINES[EngineName.PYBULLET],
+        effects: Sequence[Wanted] = (),
     ) -> None:
         injection = inject(prototype, effects, engine_step)
         self._built = injection.built
         prototype = injection.built.prototype
-        self.engine = Engine(prototype, step_size=engine_step, gui=gui, settings=solver, built=injection.built)
+        self.engine = make_engine(injection.built, step_size=engine_step, gui=gui)
         self._mechanics = Mechanics(injection, self.engine)
         self._noise = Disturbances(prototype, seed=seed, scale=noise_scale, step=engine_step)
         ratio = prototype.geometry.gear_ratio
@@ -143,6 +144,17 @@ class EmulatedVehicle:
         """
         self.engine.build(replace(self._built, prototype=load_payload(self._built.prototype, mass, 0.0)))
         self.lower()
+
+    def wet(self, wheel: int, coefficient: float) -> None:
+        """Let a wheel (fl, rl, fr, rr: 0 to 3) roll on ground with another coefficient of friction [-].
+
+        Placing the vehicle anew (jack-stand, floor) gives it dry ground again.
+        """
+        self.engine.set_ground(wheel, coefficient)
+
+    def dry(self, wheel: int) -> None:
+        """Give a wheel the ground back that it had before."""
+        self.engine.set_ground(wheel, None)
 
     def ground_truth(self) -> GroundTruth:
         """The true state now."""

@@ -16,19 +16,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hil.bench.closed_loop import Tracking, track_lane_change
+from hil.bench.truth import truth_of
 from hil.campaign.folder import network_file_of
-from hil.closed_loop import Tracking, track_lane_change
 from hil.exam.driving import drive
 from hil.network import load_network
-from hil.truth import truth_of
 from ident.campaign.plan import Plan, make_plan
-from ident.gap.vehicle.closing import channel_gaps, extended_model, plain_model
-from ident.gap.vehicle.diagnose import diagnose_vehicle
+from ident.diagnosis.vehicle.closing import channel_gaps, extended_model, plain_model
+from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
+from ident.effects import Effect
+from ident.effects.extended import ExtendedModel
+from ident.effects.text import parse_effect
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription, load_vehicle
-from ident.vehicle.effect_text import parse_effect
-from ident.vehicle.effects import Effect
-from ident.vehicle.extended import ExtendedModel
 
 FOUR = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION)
 FIRST_SEED = 1001

@@ -134,13 +134,15 @@ def _keep(place: Path, unit: str, sources: Mapping[str, bytes]) -> str:
     if not folder.is_dir():
         place.mkdir(parents=True, exist_ok=True)
         made = Path(tempfile.mkdtemp(dir=place))
-        for name in names:
-            (made / name).write_bytes(sources[name])
         try:
+            for name in names:
+                (made / name).write_bytes(sources[name])
             made.rename(folder)
         except OSError:
-            # Another build has put the same content there in the meantime.
             shutil.rmtree(made)
+            if not folder.is_dir():
+                raise
+            # Another build has put the same content there in the meantime.
     return f"{digest}/{unit}"
 
 

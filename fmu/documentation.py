@@ -9,8 +9,8 @@ import jinja2
 
 from fmu.source import ModelSource
 from fmu.variables import Causality, Inputs, Variable, VariableTable
+from ident.effects import Effect
 from ident.report.digits import unit_text
-from ident.vehicle.effects import Effect
 
 
 @dataclass(frozen=True)

@@ -5,39 +5,12 @@ They are in the table only where the effect is: a vehicle without them has the m
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
 
-from ident.vehicle.effects import DRIVES, ENCODERS, STEERING, Effect, EffectName
+from ident.plant.memories import Memories
+from ident.plant.symbols import SIDES
 from ident.vehicle.geometry import WHEELS
-
-SIDES: Final = ("l", "r")
-"""Letters of the steering sides in the names of the table."""
-
-_SPRINGS: Final = (EffectName.BACKLASH, EffectName.ELASTICITY)
-
-
-@dataclass(frozen=True)
-class Memories:
-    """Which parts have effects with states of their own, in the order of the states.
-
-    Attributes:
-        couplings: steering sides (0 left, 1 right) whose rear unit hangs on the front one by a spring.
-        gears: wheels (0 to 3) whose motor turns on its own.
-        drives: wheels whose torque acts later.
-        encoders: steering sides whose angle is reported later.
-    """
-
-    couplings: tuple[int, ...]
-    gears: tuple[int, ...]
-    drives: tuple[int, ...]
-    encoders: tuple[int, ...]
-
-    @property
-    def flexible(self) -> bool:
-        """Whether there is a spring."""
-        return bool(self.couplings or self.gears)
 
 
 @dataclass(frozen=True)
@@ -54,29 +27,15 @@ class AddedState:
     nominal: float
 
 
-def memories_of(effects: Sequence[Effect]) -> Memories:
-    """What of the effects has states."""
-
-    def places(where: Sequence[str], *names: EffectName) -> tuple[int, ...]:
-        found = {effect.where for effect in effects if effect.name in names}
-        return tuple(index for index, place in enumerate(where) if place in found)
-
-    return Memories(
-        couplings=places(STEERING, *_SPRINGS),
-        gears=places(DRIVES, *_SPRINGS),
-        drives=places(DRIVES, EffectName.TIME_DELAY),
-        encoders=places(ENCODERS, EffectName.TIME_DELAY),
-    )
-
-
 def coupled_states(memories: Memories) -> list[AddedState]:
     """One of the two states of each, which the equations couple to the rates."""
     return [coupled for coupled, _ in _pairs(memories)]
 
 
 def other_states(memories: Memories) -> list[AddedState]:
-    """The other of the two states of each."""
-    return [other for _, other in _pairs(memories)]
+    """The other of the two states of each, then the time since the start of the campaign."""
+    elapsed = [AddedState("elapsed", "Time since the start of the campaign", "s", 100.0)] if memories.elapsed else []
+    return [*(other for _, other in _pairs(memories)), *elapsed]
 
 
 def _pairs(memories: Memories) -> Iterator[tuple[AddedState, AddedState]]:

@@ -6,31 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from fmu.effect_states import Memories, memories_of
 from fmu.variables import DEGREES, Block, Causality, Inputs, Variability, Variable
+from ident.effects import EFFECTS, Effect, terms_of
+from ident.effects.base import Sign
+from ident.plant.contact import CREEP_STIFFNESS
+from ident.plant.drives import DRIVE_GAIN, DRIVE_INTEGRAL_GAIN, DRIVE_UNWIND_TIME
+from ident.plant.memories import Memories, memories_of
+from ident.plant.modes import MODE_TOLERANCE
+from ident.plant.springs import DAMPING_RATIO, MOTOR_SHARE, STIFFEST
+from ident.plant.stiction import STICK_TIME
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.effects import CHASSIS, EFFECTS, WHEEL_PLACES, Effect, EffectName
 from ident.vehicle.geometry import GEOMETRY_UNITS, WHEELS
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_UNITS, Parameters
-from ident.vehicle.springs import DAMPING_RATIO, MOTOR_SHARE, STIFFEST
-
-DRIVE_GAIN: Final = 0.5
-"""Proportional gain of the drives' speed loops before anyone tunes them, motor torque per wheel rate [Nm s/rad]."""
-
-DRIVE_INTEGRAL_GAIN: Final = 2.0
-"""Integral gain of the drives' speed loops before anyone tunes them [Nm/rad]."""
-
-DRIVE_UNWIND_TIME: Final = 0.05
-"""In which the integral of a speed loop follows a torque at its limit [s]."""
-
-CREEP_STIFFNESS: Final = 1e7
-"""Contact force per slip velocity [N s/m]: under 100 N a wheel slips by 10 micrometres a second."""
-
-STICK_TIME: Final = 0.06
-"""How long motion below stiction goes on before it is held [s]; chosen in docs/adr/0008."""
-
-MODE_TOLERANCE: Final = 0.02
-"""Of the steering angles in (9), as `ident.vehicle.modes.detect_mode` has it [rad]."""
 
 _DYNAMIC: Final = {
     "C_l": "Inertia of both units of the left side about their steering axes",
@@ -45,8 +32,6 @@ _DYNAMIC: Final = {
     "d_cw": "Coulomb friction of one wheel drive, at the wheel",
     "B_w": "Inertia of one wheel drive, at the wheel",
 }
-
-_NEVER_NEGATIVE: Final = (EffectName.BACKLASH, EffectName.ELASTICITY)
 
 _GEOMETRY: Final = {
     "wheelbase": "Between front and rear steering axes (l)",
@@ -71,7 +56,7 @@ def parameter_rows(
     ]
     drives = _drives(vehicle) if inputs is Inputs.SPEED else []
     of_effects = [row for effect in effects for row in _effect_parameters(effect)]
-    springs = _springs(memories_of(effects))
+    springs = _springs(memories_of(terms_of(effects)))
     limits = _friction_limits(vehicle, effects)
     return dynamic + geometry + _regularisation() + limits + drives + springs + of_effects
 
@@ -105,8 +90,8 @@ def _regularisation() -> list[Variable]:
 def _friction_limits(vehicle: VehicleDescription, effects: Sequence[Effect]) -> list[Variable]:
     limits = {f"friction_limit_{wheel}": vehicle.limits.floor_friction for wheel in WHEELS}
     for effect in effects:
-        if effect.name is EffectName.SLIP:
-            limits.update(dict.fromkeys(parameters_of(effect, "friction"), effect.size))
+        replaced = EFFECTS[effect.name].stands_for.get(effect.where, ())
+        limits.update({name: effect.size for name in replaced if name in limits})
     text = "Largest contact force of wheel {} over its load"
     return [_positive(name, text.format(name.rpartition("_")[2]), "1", limit) for name, limit in limits.items()]
 
@@ -144,24 +129,22 @@ def effect_parameter(effect: Effect, parameter: str) -> str:
 
 
 def parameters_of(effect: Effect, parameter: str) -> tuple[str, ...]:
-    """Names in the table that a parameter of an effect has: its own, or the friction limits that `slip` is."""
-    if effect.name is not EffectName.SLIP:
-        return (effect_parameter(effect, parameter),)
-    wheels = WHEELS if effect.where in CHASSIS else (WHEELS[WHEEL_PLACES.index(effect.where)],)
-    return tuple(f"friction_limit_{wheel}" for wheel in wheels)
+    """Names in the table that a parameter of an effect has: its own, or those that it stands for."""
+    return EFFECTS[effect.name].stands_for.get(effect.where) or (effect_parameter(effect, parameter),)
 
 
 def _effect_parameters(effect: Effect) -> list[Variable]:
-    if effect.name is EffectName.SLIP:
+    kind = EFFECTS[effect.name]
+    if kind.stands_for:
         return []
-    spec = EFFECTS[effect.name]
     return [
         _parameter(
             effect_parameter(effect, entry.name),
             f"{effect}: {entry.meaning}",
-            spec.unit(entry.name, effect.where),
+            kind.unit(entry.name, effect.where),
             effect[entry.name],
-            minimum=0.0 if effect.name in _NEVER_NEGATIVE else None,
+            minimum=0.0 if entry.positive or (kind.sign is Sign.NOT_NEGATIVE and entry is kind.size) else None,
+            positive=entry.positive,
         )
-        for entry in spec.parameters
+        for entry in kind.parameters
     ]

@@ -10,9 +10,9 @@ from fmu.model.generate import generate_core
 from fmu.parameter_rows import parameters_of
 from fmu.table import neutral_effects, variable_table
 from fmu.variables import Inputs, VariableTable
+from ident.effects import Effect
 from ident.errors import DataFileError
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.effects import Effect
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 

@@ -8,21 +8,28 @@ from typing import Final
 
 from fmu.effect_states import (
     AddedState,
-    Memories,
     coupled_states,
-    memories_of,
     other_states,
 )
 from fmu.parameter_rows import parameter_rows
 from fmu.variables import DEGREES, Block, Causality, Inputs, Variability, Variable, VariableTable, numbered
+from ident.effects import EFFECTS, Effect, make_effect, terms_of
+from ident.plant.memories import Memories, memories_of
+from ident.plant.places import GROUPS
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.effect_terms import TERMS
-from ident.vehicle.effects import ALL_WHEELS, EFFECTS, Effect, EffectName, make_effect
 from ident.vehicle.geometry import WHEELS
 from ident.vehicle.parameters import Parameters
 
 _SIDES: Final = {"l": "left", "r": "right"}
-_PER_SECOND: Final = {"m": "m/s", "rad": "rad/s", "m/s": "m/s^2", "rad/s": "rad/s^2", "1": "1/s", "Nm": "Nm/s"}
+_PER_SECOND: Final = {
+    "s": "1",
+    "m": "m/s",
+    "rad": "rad/s",
+    "m/s": "m/s^2",
+    "rad/s": "rad/s^2",
+    "1": "1/s",
+    "Nm": "Nm/s",
+}
 
 _STICTION: Final = {
     "stick": "Creep of {} that its friction remembers, over epsilon times stick_time",
@@ -41,7 +48,7 @@ def variable_table(
         effects: each adds its parameters; those of `slip` are start values of the friction limits.
         inputs: motor torques, or wheel speeds with the drives' inner loop.
     """
-    memories = memories_of(effects)
+    memories = memories_of(terms_of(effects))
     states = _states(inputs, memories)
     derivatives = [_derivative(state) for state in states]
     tunable = parameter_rows(vehicle, parameters, effects, inputs)
@@ -142,17 +149,13 @@ def _input(name: str, text: str, unit: str, minimum: float | None = None, maximu
 
 
 def neutral_effects() -> tuple[Effect, ...]:
-    """Every effect that is a term of the equations, at each single place, of size zero.
-
-    A change of a parameter is left out, since the parameters themselves can be tuned, and so is what acts on all
-    wheels at once where each wheel has its own.
-    """
+    """Every effect that a model always has, at each single place, of size zero."""
     return tuple(
-        make_effect(name, where, {EFFECTS[name].size.name: 0.0})
-        for name in TERMS
-        if name is not EffectName.PARAMETER_CHANGE
-        for where in EFFECTS[name].places
-        if where not in ALL_WHEELS
+        make_effect(kind.name, where, kind.neutral())
+        for kind in EFFECTS.values()
+        if kind.always
+        for where in kind.places
+        if where not in GROUPS
     )
 
 

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from ident.plant.drives import Inputs as Inputs
+
 DEGREES: Final = {"rad": "deg", "rad/s": "deg/s"}
 """SI units that people like to read in others."""
 
@@ -44,13 +46,6 @@ class Block(enum.Enum):
     OUTPUT = "y"
     MODE = "mode"
     INDICATOR = "z"
-
-
-class Inputs(enum.StrEnum):
-    """What drives the wheels of an FMU."""
-
-    TORQUE = "torque"
-    SPEED = "speed"
 
 
 @dataclass(frozen=True)

@@ -1,34 +1,119 @@
-"""The command line: the composition root. One module a group of commands; what they do lives in `hil`."""
+"""The command line and the public Python interface: the composition root.
+
+One module a group of commands; what they do lives in `hil`. Names for programs are those of `quasiomni.interface`,
+loaded when they are first asked for.
+"""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-import typer
+if TYPE_CHECKING:
+    import typer
 
-from quasiomni import application
+    from quasiomni.interface import (
+        LeastSquares,
+        Mode,
+        Motion,
+        UserError,
+        WeightedLeastSquares,
+        assess,
+        diagnose,
+        export_fmu,
+        extend,
+        identify,
+        load_vehicle,
+        model_of,
+        open_bench,
+        read_record,
+        simulate,
+    )
 
-__all__ = ["COMMANDS", "app", "main"]
+    app: typer.Typer
+    """All commands."""
 
-COMMANDS: Final[Mapping[str, Sequence[str]]] = {
-    "can": ["can"],
-    "descriptions": ["eds", "dbc", "conformance"],
-    "exam": ["exam"],
-    "fmu": ["fmu", "cosim"],
-    "gap": ["diagnose"],
-    "identification": ["demo", "campaign", "identify", "report"],
-    "safety": ["safety"],
-    "serving": ["emulate"],
+INTERFACE: Final = (
+    *("read_record", "load_vehicle", "identify", "assess", "model_of", "diagnose", "extend", "simulate", "export_fmu"),
+    *("open_bench", "LeastSquares", "WeightedLeastSquares", "Mode", "Motion", "UserError"),
+)
+"""Names for programs."""
+
+__all__ = [
+    "COMMANDS",
+    "LeastSquares",
+    "Mode",
+    "Motion",
+    "UserError",
+    "WeightedLeastSquares",
+    "app",
+    "assess",
+    "diagnose",
+    "export_fmu",
+    "extend",
+    "identify",
+    "load_vehicle",
+    "main",
+    "model_of",
+    "open_bench",
+    "read_record",
+    "simulate",
+]
+
+COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
+    "driving": {
+        "demo": "The whole story on the emulator: boot, four steps, parameters beside the truth, lane change, report.",
+        "campaign": "Drive the identification steps and record every frame; on the emulator, or with --bus on a real "
+        "vehicle.",
+    },
+    "identification": {
+        "identify": "Identify the parameters from recorded frames or records alone; writes parameters.toml and "
+        "report.html.",
+        "report": "Write the HTML report of a run again, from its frames.",
+    },
+    "describing": {
+        "init": "Describe your own vehicle: writes a commented vehicle file and, beside it, network and EDS files.",
+    },
+    "checking": {
+        "check": "Say whether files belong together, and what is assumed. Exit code: 0 they fit, 1 they do not, 2 "
+        "unreadable.",
+    },
+    "gap": {
+        "diagnose": "Say why model and machine disagree: which effect, where, how sure, how much it closes, what to do "
+        "next.",
+    },
+    "fmu": {
+        "fmu": "Package the identified model, with its confirmed effects, as an FMU for co-simulation and model "
+        "exchange.",
+        "cosim": "Replay a record's torques through an FMU, and say how far its motion is from the recorded one.",
+    },
+    "serving": {
+        "emulate": "Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C.",
+    },
+    "can": {"can": "The CAN bus: unmodified SocketCAN programs on it, faults, load."},
+    "descriptions": {
+        "eds": "Write the EDS of every kind of device and the DCF of every node, as configured by the master.",
+        "dbc": "Write a DBC of the network: all frames by name, PDOs in SI units and vehicle signs.",
+        "conformance": "Replay the trace of a conformance test against an emulated drive.",
+    },
+    "safety": {
+        "safety": "Let the master die at speed: is the vehicle at rest, after what time and distance? Exit code 1 if "
+        "not as told.",
+    },
+    "installation": {"doctor": "What is installed here, and what is missing for what. Exit code 1 if something is."},
+    "exam": {"exam": "The withheld exam of the gap diagnosis."},
 }
-"""Module -> the commands and groups of commands that it adds to `app`."""
+"""Module -> the commands and groups of commands that it adds to `app`, each with the first line of its help.
+
+Help and completion name all of them without loading any: together they need half of the mathematics there is.
+"""
 
 
 def main() -> None:
     """Entry point."""
-    load_commands(sys.argv[1:])
+    from quasiomni import application
+
     application.main()
 
 
@@ -42,14 +127,13 @@ def load_commands(words: Sequence[str]) -> None:
         import_module(f"quasiomni.{module}")
 
 
-if TYPE_CHECKING:
-    app: typer.Typer
-    """All commands."""
-
-
-def __getattr__(name: str) -> typer.Typer:
-    """`app`, with all commands in it, for programs that run commands in their own process."""
+def __getattr__(name: str) -> Any:
+    """What is loaded when it is asked for: `app`, with all commands in it, and the names for programs."""
+    if name in INTERFACE:
+        return getattr(import_module("quasiomni.interface"), name)
     if name != "app":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     load_commands(())
+    from quasiomni import application
+
     return application.app

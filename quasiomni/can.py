@@ -11,19 +11,18 @@ from typing import Annotated
 
 import typer
 from rich import box
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
-from hil import control
-from hil.socketcan import build_library, environment, is_served
+from hil.bench import control
+from hil.bus.socketcan import build_library, environment, is_served
 from ident.errors import BusError
 from quasiomni.application import app, console, tell
-from quasiomni.options import NetworkOption, VehicleOption
+from quasiomni.options import DEFAULT_BUS, NetworkOption, VehicleOption
 
 can_app = typer.Typer(help="The CAN bus: unmodified SocketCAN programs on it, faults, load.", no_args_is_help=True)
 app.add_typer(can_app, name="can")
 
-DEFAULT_BUS = "unix:/tmp/can0"
 BusOption = Annotated[str, typer.Option(help="The emulator's bus, as `quasiomni emulate --bus` was given it.")]
 
 
@@ -86,7 +85,7 @@ def kinds() -> None:
     table = Table("fault", "where", "what", "numbers (default)", box=box.SIMPLE_HEAD)
     for kind, one in SPECIFICATIONS.items():
         numbers = "; ".join(f"{name} ({number.default:g}): {number.what}" for name, number in one.parameters.items())
-        table.add_row(kind, one.target, one.what, escape(numbers))
+        table.add_row(kind, one.target, one.what, numbers)
     console.print(table)
     console.print("All take from and to, counted from the injection. Units: s, ms, us, %, /s.", highlight=False)
 
@@ -99,7 +98,7 @@ def load(
     cycle: Annotated[float | None, typer.Option(min=1e-5, help="Another cycle period [s].")] = None,
 ) -> None:
     """Whether a network file's frames fit on a real bus; exit code 1 where they do not."""
-    from hil.bus_schedule import schedule
+    from hil.bus.schedule import schedule
     from hil.campaign.folder import network_file_of
     from hil.network import load_network
     from ident.vehicle.description import load_vehicle
@@ -110,8 +109,8 @@ def load(
     found = schedule(load_network(network or network_file_of(vehicle)), bit_rate, cycle)
     table = Table("COB-ID", "sender", "bytes", "bits", "every", "longest wait", box=box.SIMPLE_HEAD)
     for frame in found.frames:
-        colour = "" if frame.in_time else "[red]"
-        times = f"{frame.period * 1e3:g} ms", f"{colour}{frame.response * 1e3:.2f} ms"
+        response = Text(f"{frame.response * 1e3:.2f} ms", style="" if frame.in_time else "red")
+        times = f"{frame.period * 1e3:g} ms", response
         table.add_row(
             f"{frame.can_id:03X}h", frame.sender, str(frame.length), f"{frame.shortest}-{frame.longest}", *times
         )
@@ -122,7 +121,8 @@ def load(
     )
     if found.late:
         names = ", ".join(f"{frame.can_id:03X}h" for frame in found.late)
-        console.print(f"[red]Cannot work on a real bus: {names} may not be through in time.[/red]", highlight=False)
+        late = f"Cannot work on a real bus: {names} may not be through in time."
+        console.print(late, highlight=False, style="red")
         raise typer.Exit(code=1)
     console.print("Every frame is through before the next one of its kind.", highlight=False)
 

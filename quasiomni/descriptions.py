@@ -7,8 +7,12 @@ from typing import Annotated
 
 import typer
 
+from hil.campaign.folder import network_file_of
 from hil.descriptions import write_dbc, write_device_files
 from hil.network import DEFAULT_NETWORK, load_network
+from hil.network.described import load_described
+from ident.extras import Extra, require
+from ident.writing import refuse_inputs, write_whole
 from quasiomni.application import app, console
 from quasiomni.options import NetworkOption, load_emulation
 
@@ -27,9 +31,18 @@ def eds(
 def dbc(
     out: Annotated[Path, typer.Option(help="File to write, e.g. `vehicle.dbc`.")],
     network: NetworkOption = None,
+    vehicle: Annotated[
+        str | None, typer.Option(help="Vehicle file that gives what the network file leaves to it: gear, rated torque.")
+    ] = None,
 ) -> None:
     """Write a DBC of the network: all frames by name, PDOs in SI units and vehicle signs."""
-    out.write_text(write_dbc(load_network(network or DEFAULT_NETWORK)), encoding="utf-8")
+    require(Extra.DBC, "dbc")
+    if vehicle is None:
+        loaded = load_network(network or DEFAULT_NETWORK)
+    else:
+        loaded = load_described(vehicle, network or network_file_of(vehicle)).network
+    refuse_inputs([out], [loaded.path, *(node.eds for node in loaded.nodes)])
+    write_whole(write_dbc(loaded), out)
     console.print(str(out), highlight=False)
 
 
@@ -43,6 +56,7 @@ def conformance(
     from hil.conformance.emulated import replay_trace
     from hil.conformance.report import write_page
 
+    refuse_inputs([out], [trace])
     verdicts = replay_trace(trace)
     replayed = [verdict for verdict in verdicts if verdict.outcome is not None]
     passed = sum(verdict.passed for verdict in replayed)
@@ -51,7 +65,7 @@ def conformance(
         if not verdict.passed:
             console.print(f"{verdict.case.number} {verdict.case.name}: {verdict}", highlight=False, markup=False)
     if out is not None:
-        out.write_text(write_page(verdicts), encoding="utf-8")
+        write_whole(write_page(verdicts), out)
         console.print(str(out), highlight=False)
     if passed < len(replayed):
         raise typer.Exit(1)

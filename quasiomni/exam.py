@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +9,7 @@ import numpy as np
 import typer
 
 from hil.campaign.folder import network_file_of
+from hil.exam.answer_file import open_cases
 from hil.exam.cases import Composition
 from hil.exam.folder import ExamFolder
 from hil.exam.score_figures import confusion_svg, reliability_svg
@@ -18,11 +17,12 @@ from hil.exam.score_report import score_exam, score_json, score_markdown, summar
 from hil.exam.scoring import removable
 from hil.exam.sizes import SIZES_FILE, load_rows, load_sizes, replaced, table_text
 from hil.network import load_network
-from hil.workflow import progress
 from ident.errors import UserError
+from ident.extras import Extra, require
 from ident.writing import write_whole
-from quasiomni.application import app, console
+from quasiomni.application import app, console, show_next
 from quasiomni.options import load_emulation
+from quasiomni.showing import bar
 
 exam = typer.Typer(no_args_is_help=True, help="The withheld exam of the gap diagnosis.")
 app.add_typer(exam, name="exam")
@@ -30,6 +30,9 @@ app.add_typer(exam, name="exam")
 JobsOption = Annotated[int, typer.Option(min=1, help="Processes on this machine.")]
 SchedulerOption = Annotated[
     str | None, typer.Option(help="Address of a Dask scheduler, e.g. tcp://host:8786. Default: this machine.")
+]
+KeyOption = Annotated[
+    Path | None, typer.Option(help="Key that the exam was sealed with; not needed where it is not sealed.")
 ]
 FolderArgument = Annotated[Path, typer.Argument(help="Folder of the exam.")]
 
@@ -39,7 +42,14 @@ _DEFAULT = Composition()
 @exam.command()
 def seal(
     out: Annotated[Path, typer.Option(help="Folder to write, or to go on with.")],
-    first_seed: Annotated[int, typer.Option(min=1, help="First seed of the noise; two a case.")] = 500000,
+    key: Annotated[
+        Path | None,
+        typer.Option(help="File of the secret, outside --out; written where it is missing. Score asks for it."),
+    ] = None,
+    first_seed: Annotated[
+        int | None,
+        typer.Option(min=1, help="In place of --key: a set to tune on, its cases known to whoever knows the seed."),
+    ] = None,
     effects: Annotated[int, typer.Option(min=0, help="Cases with one effect of the library.")] = _DEFAULT.effects,
     pairs: Annotated[int, typer.Option(min=0, help="Cases with two.")] = _DEFAULT.pairs,
     none: Annotated[int, typer.Option(min=0, help="Cases without any.")] = _DEFAULT.none,
@@ -52,19 +62,25 @@ def seal(
     jobs: JobsOption = 2,
     scheduler: SchedulerOption = None,
 ) -> None:
-    """Draw cases, drive the emulator over CAN, write records and a sealed answer; goes on where it stopped."""
+    """Draw cases from a secret, drive them, write records and the sealed answer; goes on where it stopped."""
     load_emulation()
+    require(Extra.EXAM, "exam seal", () if key is not None else ("pyarrow",))
+    _require_cluster(scheduler)
     from hil.exam.sealing import SealingOrder, seal
 
     composition = Composition(effects, pairs, none, unknown, invisible, excitations)
-    order = SealingOrder(out, "prototype", composition, first_seed, jobs, scheduler)
-    with _bar("sealing") as shown:
+    order = SealingOrder(out, "prototype", composition, key, first_seed, jobs, scheduler)
+    with bar("sealing") as shown:
         sealed = seal(order, load_sizes(sizes), shown)
     undriven = sum(ExamFolder(out).undriven(name).is_file() for name in sealed.identifiers)
     if undriven:
-        console.print(f"[yellow]{undriven} cases stopped the campaign and have no records.[/yellow]")
-    console.print(f"{len(sealed.identifiers)} cases. SHA-256 of the sealed answer: {sealed.answer_hash}")
-    console.print(f"Next: [bold]quasiomni exam diagnose {out}[/bold]")
+        console.print(f"{undriven} cases stopped the campaign and have no records.", style="yellow")
+    console.print(f"{len(sealed.identifiers)} cases. SHA-256 of the answer: {sealed.answer_hash}", highlight=False)
+    if sealed.sealed:
+        console.print(f"Sealed with {key}: keep it, and keep it from whoever diagnoses.", highlight=False)
+    else:
+        console.print(f"Not sealed: all cases follow from seed {first_seed}.", style="yellow", highlight=False)
+    show_next(f"quasiomni exam diagnose {out}")
 
 
 @exam.command()
@@ -73,17 +89,20 @@ def diagnose(
     without_true_candidate: Annotated[
         bool, typer.Option("--without-true-candidate", help="Open the answer; leave each true candidate out.")
     ] = False,
+    key: KeyOption = None,
     jobs: JobsOption = 2,
     scheduler: SchedulerOption = None,
 ) -> None:
     """Diagnose every case from records and nominal model alone; this process cannot import the emulator."""
+    require(Extra.EXAM, "exam diagnose", ("pyarrow",))
+    _require_cluster(scheduler)
     from hil.exam.diagnosing import diagnose_exam
 
     opened = ExamFolder(folder)
-    removed = removable(opened) if without_true_candidate else None
-    with _bar("diagnosing") as shown:
+    removed = removable(open_cases(opened, key)) if without_true_candidate else None
+    with bar("diagnosing") as shown:
         diagnose_exam(opened, jobs=jobs, scheduler=scheduler, progress=shown, removed=removed)
-    console.print(f"Next: [bold]quasiomni exam score {folder}[/bold]")
+    show_next(f"quasiomni exam score {folder}")
 
 
 @exam.command()
@@ -96,14 +115,15 @@ def calibrate(
 ) -> None:
     """Measure what size each effect has in noise units, from pairs of runs that differ by the effect alone."""
     load_emulation()
-    from hil.exam.calibration import EVERY, calibrate
+    from hil.exam.calibration import calibrate
+    from hil.exam.probes import EVERY
 
     strangers = sorted(set(effect or ()) - EVERY)
     if strangers:
         raise UserError(f"No effect is called {strangers[0]}.", f"Name some of {', '.join(sorted(EVERY))}.")
     kept = load_rows(out) if effect else None
     cycle = load_network(network_file_of("prototype")).cycle_period
-    with _bar("measuring") as shown:
+    with bar("measuring") as shown:
         rows = calibrate("prototype", cycle, jobs, shown, effect or EVERY)
     rows = rows if kept is None else replaced(kept, rows)
     write_whole(table_text(rows), out)
@@ -111,9 +131,9 @@ def calibrate(
 
 
 @exam.command("score")
-def score_command(folder: FolderArgument) -> None:
+def score_command(folder: FolderArgument, key: KeyOption = None) -> None:
     """Open the sealed answer and score; writes score.md, score.json, reliability.svg and confusion.svg."""
-    report = score_exam(ExamFolder(folder), np.random.default_rng(0))
+    report = score_exam(ExamFolder(folder), np.random.default_rng(0), key)
     for line in summary_lines(report):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     for name, text in (
@@ -126,12 +146,6 @@ def score_command(folder: FolderArgument) -> None:
     console.print(f"Written: {folder / 'score.md'}, score.json, reliability.svg, confusion.svg", soft_wrap=True)
 
 
-@contextmanager
-def _bar(what: str) -> Iterator[Callable[[int, int], None]]:
-    with progress(console) as bars:
-        task = bars.add_task(what, total=None)
-
-        def shown(done: int, total: int) -> None:
-            bars.update(task, completed=done, total=total, description=f"{what} {done}/{total}")
-
-        yield shown
+def _require_cluster(scheduler: str | None) -> None:
+    if scheduler is not None:
+        require(Extra.CLUSTER, "--scheduler")

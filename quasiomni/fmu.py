@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
+from rich.table import Table
 
 from fmu.description import FmiVersion
 from fmu.packaging import Order
 from fmu.platforms import parse_platforms
 from fmu.variables import Inputs
-from hil.campaign.folder import RunFolder, network_file_of, open_run
-from hil.campaign.reading import read_any
-from hil.cosim import outcome_table, replay, write_plot
-from hil.export import export_run
-from hil.network import load_network
-from hil.workflow import progress
-from ident.records.record import Record
-from ident.vehicle.description import load_vehicle
-from ident.vehicle.geometry import Geometry
+from hil.campaign.folder import sources_of
+from hil.campaign.reading import read_as
+from hil.cosimulation.assessment import refuse_unusable_fmu
+from hil.cosimulation.export import export_run
+from hil.cosimulation.replay import Outcome, replay, write_plot
+from ident.extras import Extra, require
+from ident.report.digits import percent, unit_text
+from ident.writing import refuse_inputs
 from quasiomni.application import app, console
-from quasiomni.options import NetworkOption, VehicleOption
+from quasiomni.options import ForceOption, GivenVehicleOption, NetworkOption, require_readers, tell_native
+from quasiomni.showing import bars
 
 
 @app.command("fmu")
@@ -41,10 +44,17 @@ def build(
     inputs: Annotated[
         Inputs, typer.Option(help="Motor torques, or wheel speeds with the drives' inner loop.")
     ] = Inputs.TORQUE,
+    force: ForceOption = False,
 ) -> None:
     """Package the identified model, with its confirmed effects, as an FMU for co-simulation and model exchange."""
     order = Order(fmi, inputs, parse_platforms(platforms))
-    written = export_run(run, out or run / "platform.fmu", order, console, model)
+    with bars() as shown:
+        task = shown.add_task("compiling", total=None)
+
+        def compiled(compiler: str, done: int, total: int) -> None:
+            shown.update(task, description=f"compiling ({compiler})", completed=done, total=total)
+
+        written = export_run(run, out or run / "platform.fmu", order, model, force=force, compiled=compiled)
     console.print(f"Written: {written.path}, {written.size / 1e3:.0f} kB, in {written.seconds:.1f} s")
 
 
@@ -52,26 +62,37 @@ def build(
 def cosim(
     fmu: Annotated[Path, typer.Argument(help="FMU with torque inputs.")],
     record: Annotated[Path, typer.Option(help="Run folder, log, or CSV, Parquet or MF4 record.")],
-    vehicle: VehicleOption = "prototype",
+    vehicle: GivenVehicleOption = None,
     network: NetworkOption = None,
     out: Annotated[Path | None, typer.Option(help="Plot to write. Default: beside the FMU, NAME.cosim.html.")] = None,
+    force: ForceOption = False,
 ) -> None:
     """Replay a record's torques through an FMU, and say how far its motion is from the recorded one."""
-    read, geometry = _record(record, vehicle, network)
-    with progress(console) as bars:
-        task = bars.add_task("simulating", total=None)
-        outcomes = []
-        for outcome in replay(fmu, read, geometry):
-            outcomes.append(outcome)
-            bars.update(task, description=f"simulated {outcome.step}")
+    require(Extra.COSIM, "cosim")
+    require_readers([record])
     target = out or fmu.with_suffix(".cosim.html")
+    refuse_inputs([target], [fmu, *sources_of(record), None if vehicle is None else Path(vehicle), network])
+    refuse_unusable_fmu(fmu, force=force)
+    read, described = read_as(record, vehicle, network)
+    tell_native(fmu)
+    with bars() as shown:
+        task = shown.add_task("simulating", total=None)
+        outcomes = []
+        for outcome in replay(fmu, read, described.vehicle.geometry):
+            outcomes.append(outcome)
+            shown.update(task, description=f"simulated {outcome.step}")
     write_plot(outcomes, target)
-    console.print(outcome_table(outcomes), f"Written: {target}")
+    console.print(_table(outcomes), f"Written: {target}")
 
 
-def _record(path: Path, vehicle: str, network: Path | None) -> tuple[Record, Geometry]:
-    """A record with the geometry of its vehicle; a run folder knows its own."""
-    if RunFolder(path).manifest.is_file():
-        run = open_run(path)
-        return read_any(path, run.network), run.plan.vehicle.geometry
-    return read_any(path, load_network(network or network_file_of(vehicle))), load_vehicle(vehicle).geometry
+def _table(outcomes: Sequence[Outcome]) -> Table:
+    table = Table(title="Outcome: simulated with the recorded torques, against the recorded velocity")
+    table.add_column("step")
+    table.add_column("velocity")
+    table.add_column("rms", justify="right")
+    table.add_column("unit")
+    table.add_column("difference", justify="right")
+    for outcome in outcomes:
+        rms = float(np.sqrt(np.mean(outcome.measured**2)))
+        table.add_row(outcome.step, outcome.coordinate, f"{rms:.3g}", unit_text(outcome.unit), percent(outcome.nrmse))
+    return table

@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
-from hil.diagnosis import DiagnosisOrder, diagnose_records
-from quasiomni.application import app, console
+from hil.campaign.diagnosing import DiagnosisOrder, diagnose_records, write_answer
+from quasiomni.application import app
+from quasiomni.options import ForceOption, NetworkOption, require_readers
+from quasiomni.showing import say, stages
 
 
 @app.command()
@@ -23,6 +25,7 @@ def diagnose(
     vehicle: Annotated[
         str | None, typer.Option(help="Vehicle file: `prototype`, `compact`, or the path of your own.")
     ] = None,
+    network: NetworkOption = None,
     model: Annotated[
         Path | None, typer.Option(help="parameters.toml of the model that is judged. Default: refitted.")
     ] = None,
@@ -34,8 +37,18 @@ def diagnose(
     extended: Annotated[
         Path | None, typer.Option(help="Write the parameters.toml of the model with the effects named here.")
     ] = None,
+    force: ForceOption = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the surrogates.")] = 1,
 ) -> None:
     """Say why model and machine disagree: which effect, where, how sure, how much it closes, what to do next."""
     given = tuple(records), tuple(confirm or ())
-    diagnose_records(DiagnosisOrder(*given, vehicle, model, axis, seed, json, report, extended), console)
+    require_readers((*records, *given[1]))
+    order = DiagnosisOrder(*given, vehicle, model, axis, seed, json, report, extended, force, network)
+    with stages("diagnosing") as stage:
+        answer = diagnose_records(order, stage)
+    say(answer.summary)
+    written = write_answer(order, answer)
+    if extended is not None and extended not in written:
+        say([f"{extended} is not written: no effect is named."])
+    if written:
+        say([f"Written: {', '.join(map(str, written))}"])

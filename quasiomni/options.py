@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
-from typing import Annotated
+from types import MappingProxyType, ModuleType
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from ident.errors import UserError
-from ident.vehicle.effect_text import parse_effect
-from ident.vehicle.effects import Effect
+from ident.extras import Extra, require
+from ident.vehicle.parameters import Parameters
+from quasiomni.application import errors
+
+if TYPE_CHECKING:
+    from ident.effects import Effect  # loads CasADi, which few commands need
+
+READERS: Final[Mapping[str, str]] = MappingProxyType({".parquet": "pyarrow", ".mf4": "asammdf"})
+"""What reads and writes files with these endings."""
+
+DEFAULT_BUS = "unix:/tmp/can0"
+"""What the emulator serves, and where the commands around it look for it."""
 
 VehicleOption = Annotated[
     str, typer.Option("--vehicle", help="Vehicle file: `prototype`, `compact`, or the path of your own.")
+]
+GivenVehicleOption = Annotated[
+    str | None,
+    typer.Option(
+        "--vehicle",
+        help="Vehicle file: `prototype`, `compact`, or the path of your own. Default: that of the run folder, or the "
+        "prototype.",
+    ),
 ]
 NetworkOption = Annotated[
     Path | None, typer.Option("--network", help="Network file: nodes, units, directions. Default: the vehicle's.")
@@ -35,29 +52,70 @@ EffectOption = Annotated[
 PlantOption = Annotated[
     str | None, typer.Option("--plant", help="`fmu:FILE`: an FMU with torque inputs in place of the physics engine.")
 ]
+ForceOption = Annotated[bool, typer.Option("--force", help="Take a model that was assessed as unusable all the same.")]
 GuiOption = Annotated[bool, typer.Option("--gui", help="Show the emulated vehicle in a window.")]
 
 
 def parse_effects(texts: Sequence[str] | None) -> tuple[Effect, ...]:
     """The effects that were asked for."""
-    return tuple(parse_effect(text) for text in texts or ())
+    if not texts:
+        return ()
+    from ident.effects.text import parse_effect
+
+    return tuple(map(parse_effect, texts))
 
 
-def parse_plant(text: str | None) -> Path | None:
-    """The FMU that was asked for."""
+def parse_plant(text: str | None, *, force: bool) -> Path | None:
+    """The FMU that was asked for; what it needs is here.
+
+    Raises:
+        UserError: the text names no FMU, or its model was assessed as unusable and is not taken by force.
+    """
     if text is None:
         return None
-    from hil.plants import plant_path  # needs the emulator, which a real vehicle's computer does not have
+    require(Extra.EMULATOR, "--plant")
+    require(Extra.COSIM, "--plant")
+    from hil.cosimulation.assessment import (
+        refuse_unusable_fmu,  # needs mathematics that commands around the bus do without
+    )
+    from hil.cosimulation.plant import plant_path  # needs the emulator, which a real vehicle's computer does not have
 
-    return plant_path(text)
+    path = plant_path(text)
+    refuse_unusable_fmu(path, force=force)
+    return path
 
 
 def load_emulation() -> ModuleType:
     """The emulated side, loaded only where it is asked for."""
-    try:
-        from hil import emulation
-    except ImportError as error:
-        raise UserError(
-            f"The emulator is not installed ({error.name}).", "Install it: pip install 'quasiomni[emulator]'."
-        ) from error
+    require(Extra.EMULATOR, "The emulator")
+    from hil.bench import emulation
+
     return emulation
+
+
+def require_readers(paths: Iterable[Path]) -> None:
+    """Refuse records of kinds that cannot be read here, before the first is read.
+
+    Raises:
+        UserError: an extra is missing.
+    """
+    for suffix in sorted({path.suffix.lower() for path in paths} & READERS.keys()):
+        require(Extra.RECORDS, f"A record that ends in {suffix}", (READERS[suffix],))
+
+
+def tell_native(path: Path | None) -> None:
+    """Say what it means to load an FMU, before it is."""
+    if path is not None:
+        errors.print(
+            f"{path.name} is native code of whoever made it, and runs here with your rights.",
+            style="yellow",
+            highlight=False,
+            soft_wrap=True,
+        )
+
+
+def truth_of(prototype: str) -> Parameters:
+    """What the emulated prototype was built with; needs its data file, not the engine."""
+    from hil.bench import truth
+
+    return truth.truth_of(prototype)

@@ -12,6 +12,7 @@ from rich.table import Table
 
 from hil.campaign.folder import network_file_of
 from hil.safety import MasterDeathReport, StopSettings
+from ident.writing import refuse_inputs, write_whole
 from quasiomni.application import app, console
 from quasiomni.options import NetworkOption, SeedOption, load_emulation
 
@@ -32,11 +33,12 @@ def safety(
     load_emulation()
     from hil.safety.emulated import let_master_die
 
+    refuse_inputs([out], [Path(prototype), network])
     settings = StopSettings(speed, abort, quick_stop, fault_reaction, deceleration)
     report = let_master_die(prototype, network or network_file_of(prototype), settings, seed)
     _show(report)
     if out is not None:
-        out.write_text(json.dumps(report.to_json(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        write_whole(json.dumps(report.to_json(), indent=2, ensure_ascii=False) + "\n", out)
     if not report.passed:
         raise typer.Exit(1)
 
@@ -51,6 +53,9 @@ def _show(report: MasterDeathReport) -> None:
     console.print(table)
     for role, state in report.states.items():
         console.print(f"{role}: {state}, error code {report.error_codes[role]:04X}h", highlight=False)
-    console.print("The vehicle is at rest." if report.at_rest else "[bold red]The vehicle still moves.[/bold red]")
+    if report.at_rest:
+        console.print("The vehicle is at rest.")
+    else:
+        console.print("The vehicle still moves.", style="bold red")
     if not report.passed:
-        console.print("[bold red]Not as the option codes and the ramp say.[/bold red]")
+        console.print("Not as the option codes and the ramp say.", style="bold red")

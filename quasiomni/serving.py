@@ -9,15 +9,20 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
+import can
 import typer
+from rich.text import Text
 
+from hil.bench.control import ControlServer, Injection, control_path
+from hil.bus.clock import WallClock
+from hil.bus.unix import UnixHub
 from hil.campaign.folder import network_file_of
-from hil.clock import WallClock
-from hil.control import ControlServer, Injection, control_path
 from hil.network import load_network
 from quasiomni.application import app, console
 from quasiomni.options import (
+    DEFAULT_BUS,
     EffectOption,
+    ForceOption,
     GuiOption,
     NetworkOption,
     PlantOption,
@@ -25,6 +30,7 @@ from quasiomni.options import (
     load_emulation,
     parse_effects,
     parse_plant,
+    tell_native,
 )
 
 
@@ -37,7 +43,9 @@ class Stand(StrEnum):
 
 @app.command()
 def emulate(
-    bus: Annotated[str, typer.Option(help="INTERFACE:CHANNEL to serve, e.g. `unix:/tmp/can0` or `socketcan:can0`.")],
+    bus: Annotated[
+        str, typer.Option(help="INTERFACE:CHANNEL to serve, e.g. `unix:/tmp/can0` or `socketcan:can0`.")
+    ] = DEFAULT_BUS,
     prototype: Annotated[str, typer.Option(help="`prototype`, `compact`, or the path of your own.")] = "prototype",
     network: NetworkOption = None,
     seed: SeedOption = 1,
@@ -61,19 +69,25 @@ def emulate(
     duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
     effect: EffectOption = None,
     plant: PlantOption = None,
+    force: ForceOption = False,
     gui: GuiOption = False,
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
     emulation = load_emulation()
+    fmu = parse_plant(plant, force=force)
     network_file = network or network_file_of(prototype)
     faults = emulation.read_faults(fault or [])
     end = None if duration is None else time.monotonic() + duration
+    tell_native(fmu)
     with (
-        emulation.vehicle(prototype, seed, gui, parse_effects(effect), parse_plant(plant)) as vehicle,
+        emulation.vehicle(prototype, seed, gui, network_file, parse_effects(effect), fmu) as vehicle,
         emulation.server_bus(bus, load_network(network_file)) as opened,
     ):
         if stand is Stand.JACK:
             vehicle.lift()
+        if assumed := emulation.assumed(prototype, network_file):
+            command = f"quasiomni check {prototype}"
+            console.print(Text.assemble(f"{len(assumed)} numbers of it are in no file: ", (command, "bold"), "."))
         console.print(
             f"{plant or prototype} is up on {bus}, {'in lockstep' if lockstep else 'in real time'}. Ctrl-C ends it."
         )
@@ -85,7 +99,15 @@ def emulate(
         with _commands(control, bus, server.faults) as poll, contextlib.suppress(KeyboardInterrupt):
             server.serve(lambda: poll() or (end is not None and time.monotonic() > end))
         served = server.report
+        _say_who_has_lost_frames(opened)
     console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
+
+
+def _say_who_has_lost_frames(bus: can.BusABC) -> None:
+    """Clients that did not read fast enough, of those that are still there."""
+    for listener in bus.listeners if isinstance(bus, UnixHub) else ():
+        if listener.dropped:
+            console.print(f"Process {listener.pid} has lost {listener.dropped} frames that it did not read.")
 
 
 @contextlib.contextmanager

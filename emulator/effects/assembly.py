@@ -10,7 +10,7 @@ from emulator.effects.injection import Injection
 from emulator.effects.laws import Law, Moment
 from emulator.effects.sensors import EncoderFlaws, SensedSteering
 from emulator.effects.transmissions import MOTOR_SHARE, FlexibleGear, coupling_torque, make_spring
-from emulator.engine import Engine
+from emulator.engine.protocol import Engine
 
 _ROLLING: Final = 4
 _FLAWLESS: Final = DriveFlaws()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from emulator.engine import Engine
+from emulator.engine.protocol import Engine
 
 
 @dataclass
@@ -39,41 +39,3 @@ class Law(Protocol):
 
     def __call__(self, moment: Moment) -> None:
         """Add torques, change friction, push the chassis."""
-
-
-@dataclass(frozen=True)
-class JointAxis:
-    """A joint and the sense in which it counts as forward.
-
-    Attributes:
-        joint: index of the engine.
-        sign: +1, or -1 for the rear steering units, which turn against the front ones.
-        share: of the effect at its place that this joint carries.
-    """
-
-    joint: int
-    sign: float
-    share: float
-
-
-_STEERING = (0, 2)
-_ROLLING = 4
-
-
-def joint_axes(where: str) -> tuple[JointAxis, ...]:
-    """The joints of a steering side (half the effect on each unit), of a wheel, or of all wheels."""
-    if where.startswith("steering"):
-        front = _STEERING[where == "steering_right"]
-        return JointAxis(front, 1.0, 0.5), JointAxis(front + 1, -1.0, 0.5)
-    wheels = range(4) if where == "wheels" else (wheel_index(where),)
-    return tuple(JointAxis(_ROLLING + wheel, 1.0, 1.0) for wheel in wheels)
-
-
-def wheel_index(where: str) -> int:
-    """0 to 3 for the ending fl, rl, fr, rr of a place."""
-    return ("fl", "rl", "fr", "rr").index(where.rpartition("_")[2])
-
-
-def side_index(where: str) -> int:
-    """0 or 1 for the ending left, right of a place."""
-    return ("left", "right").index(where.rpartition("_")[2])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from emulator.effects.drives import DelayLine
-from emulator.engine import Engine
+from emulator.engine.protocol import Engine
 
 
 @dataclass(frozen=True)

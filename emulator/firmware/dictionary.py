@@ -17,6 +17,7 @@ from durand.datatypes import DatatypeEnum
 from durand.object_dictionary import ObjectDictionary, Record, Variable
 
 from ident.errors import DataFileError
+from ident.reading import read_text
 
 
 class AbortCode(IntEnum):
@@ -108,8 +109,8 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
         node_id: replaces $NODEID in it.
 
     Raises:
-        OSError: the file cannot be read.
-        DataFileError: an object has a data type, access type or limits that cannot be emulated.
+        DataFileError: the file cannot be read, or an object has a data type, access type or limits that cannot be
+            emulated.
     """
 
     def __init__(self, eds: Path, node_id: int) -> None:
@@ -117,7 +118,7 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
         self._source = eds
         self.mappable: set[tuple[int, int]] = set()
         self._pdo_writers: dict[tuple[int, int], Callable[[int], None]] = {}
-        content = eds.read_text(encoding="utf-8")
+        content = read_text(eds)
         for item in _parse(content, node_id).values():
             # Indices below 20h are the dummy types of the EDS, not objects of the device.
             if item.index >= 0x20:

@@ -10,6 +10,8 @@ from typing import Protocol
 
 from emulator.firmware.dictionary import AbortCode, AbortError, Dictionary
 from ident.errors import DataFileError
+from ident.reading import read_json
+from ident.writing import replace_whole
 
 Values = dict[tuple[int, int], int | bytes]
 """(index, sub-index) -> value."""
@@ -75,7 +77,7 @@ class FolderMemory:
         if not path.exists():
             return {}
         try:
-            document = json.loads(path.read_text(encoding="utf-8"))
+            document = read_json(path)
             saved_by = document["device"]
             values = {_key(name): _value(text) for name, text in document["values"].items()}
         except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
@@ -100,11 +102,7 @@ class FolderMemory:
                 for (index, subindex), value in sorted(values.items())
             },
         }
-        self.folder.mkdir(parents=True, exist_ok=True)
-        path = self._path(node_id)
-        draft = path.with_suffix(".part")
-        draft.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-        draft.replace(path)
+        replace_whole(json.dumps(document, indent=1) + "\n", self._path(node_id))
 
     def _path(self, node_id: int) -> Path:
         return self.folder / f"node_{node_id}.json"

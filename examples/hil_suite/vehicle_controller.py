@@ -11,7 +11,7 @@ from enum import StrEnum
 
 import can
 
-from hil.clock import Clock
+from hil.bus.clock import Clock
 from hil.master import Master, Sample
 from hil.network import Network
 from ident.errors import BusError

@@ -14,10 +14,11 @@ from typing import Any, Final
 
 import casadi as ca
 
-from fmu.model.equations import Equations, equations
+from fmu.model.equations import equations
 from fmu.variables import Block, Inputs, Variable, VariableTable
-from ident.vehicle.effects import Effect
-from ident.vehicle.symbolic import Expression
+from ident.effects import Effect
+from ident.plant.creeping import Equations
+from ident.plant.symbolic import Expression
 
 TOLERANCE: Final = 1e-4
 """Of the solver, where nobody sets one."""

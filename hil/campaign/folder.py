@@ -4,15 +4,16 @@
 |---|---|
 | `run.json` | seed, steps, excitations, what was driven and on which bus |
 | `vehicle.toml` | the vehicle file as used |
-| `network/` | the network file and its EDS files as used |
+| `network/` | the network file and its EDS files as used, so that they can be read again (`carried`) |
 | `frames/NNN_step.blf` | every frame, one file a step, in the order driven |
+| `frames/NNN_step.part.blf` | what there is of a step that was not finished |
+| `frames/NNN_step.unusable.blf` | a step that cannot be used; `--resume` drives it again |
 | `parameters.toml`, `report.html` | results |
 """
 
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,21 +21,43 @@ from typing import Any, Final
 
 import numpy as np
 
-from hil.network import DEFAULT_NETWORK, Network, load_network
+from hil.campaign.carried import (
+    NETWORK_FILE,
+    VEHICLE_FILE,
+    carried_network,
+    carried_vehicle,
+    check_readable,
+    is_carried,
+    refuse_others,
+    write_carried,
+)
+from hil.campaign.lock import refuse_driven
+from hil.frames.recorder import recorded_files
+from hil.network import DEFAULT_NETWORK, Network
+from hil.network.described import Described, load_described
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.optimise import Excitation
 from ident.campaign.plan import Plan, assemble_plan
 from ident.campaign.steps import DRIVING_ORDER
 from ident.errors import CampaignError, DataFileError
 from ident.estimate.identify import KnownInertia
-from ident.vehicle.description import VehicleDescription, load_vehicle
+from ident.reading import read_json
+from ident.vehicle.description import VehicleDescription
 from ident.writing import write_whole
 
 SCHEMA: Final = "quasiomni.run/1"
 
 
 def network_file_of(vehicle: str) -> Path:
-    """The network file shipped for a vehicle, by the vehicle's name or the name of its file."""
+    """The network file of a vehicle: beside its own file, or that shipped under the name of the vehicle or its file.
+
+    Beside `my_vehicle.toml` lies `my_vehicle.network.toml`; beside the vehicle file of a run folder, the folder's own.
+    """
+    beside = (Path(vehicle).with_suffix(".network.toml"), Path(vehicle).parent / "network" / "network.toml")
+    if Path(vehicle).suffix:
+        for path in beside:
+            if path.is_file():
+                return path
     shipped = DEFAULT_NETWORK.with_name(f"{Path(vehicle).stem}.toml")
     return shipped if shipped.is_file() else DEFAULT_NETWORK
 
@@ -53,12 +76,12 @@ class RunFolder:
     @property
     def vehicle(self) -> Path:
         """The vehicle file as used."""
-        return self.path / "vehicle.toml"
+        return self.path / VEHICLE_FILE
 
     @property
     def network(self) -> Path:
-        """The network file as used, its EDS files beside it."""
-        return self.path / "network" / "network.toml"
+        """The network file as used, its EDS files beside or below it."""
+        return self.path / "network" / NETWORK_FILE
 
     @property
     def frames(self) -> Path:
@@ -69,6 +92,11 @@ class RunFolder:
     def parameters(self) -> Path:
         """The result."""
         return self.path / "parameters.toml"
+
+    @property
+    def sources(self) -> tuple[Path, ...]:
+        """What a run is read from: all but its results."""
+        return self.manifest, self.vehicle, *self.network.parent.rglob("*"), *self.frames.glob("*")
 
     @property
     def report(self) -> Path:
@@ -89,6 +117,8 @@ class Run:
         prototype: emulated prototype, empty on a real vehicle.
         known_inertia: B_w where it was given.
         payload: mass of the load of the loaded steps [kg].
+        demo: it is a demo's, which the next one may replace.
+        opened: it was read from its folder, rather than planned.
     """
 
     folder: RunFolder
@@ -99,44 +129,101 @@ class Run:
     prototype: str
     known_inertia: KnownInertia | None
     payload: float = 0.0
+    demo: bool = False
+    opened: bool = False
+
+    @property
+    def emulated(self) -> str:
+        """What the emulator plays: a shipped prototype by name, or the vehicle file that one is derived from.
+
+        A run folder has that file itself, so that it can be moved; one that a demo is about to replace has another's.
+        """
+        own = Path(self.prototype).suffix and self.opened
+        return str(self.folder.vehicle) if own else self.prototype
 
 
-def refuse_used(folder: RunFolder) -> None:
-    """Refuse a folder that a new run would overwrite.
+def sources_of(path: Path) -> tuple[Path, ...]:
+    """The files that are read where a command is given a run folder, a folder of logs, or a file."""
+    if not path.is_dir():
+        return (path,)
+    return (*RunFolder(path).sources, *path.glob("[0-9][0-9][0-9]_*"))
+
+
+def refuse_used(folder: RunFolder, vehicle_file: Path, network_file: Path, *, by_demo: bool = False) -> None:
+    """Refuse a folder in which a new run would overwrite anything; a demo may replace what a demo has left.
 
     Raises:
-        CampaignError: the folder already holds a run.
+        CampaignError: the folder already holds a run or other files of its names, or another process drives into it.
     """
-    if folder.manifest.exists() or any(folder.frames.glob("*")):
-        raise CampaignError(
-            f"{folder.path} already holds a run.", "Go on with it (--resume), or name another folder (--out)."
-        )
+    refuse_driven(folder.path)
+    if by_demo and is_demo(folder):
+        return
+    if _holds_run(folder):
+        raise _used(folder)
+    refuse_others(carried_vehicle(vehicle_file), folder.path)
+    refuse_others(carried_network(network_file), folder.network.parent)
+
+
+def _holds_run(folder: RunFolder) -> bool:
+    return folder.manifest.exists() or any(folder.frames.glob("*"))
+
+
+def _used(folder: RunFolder) -> CampaignError:
+    return CampaignError(
+        f"{folder.path} already holds a run.", "Go on with it (--resume), or name another folder (--out)."
+    )
+
+
+def is_demo(folder: RunFolder) -> bool:
+    """Whether a demo has made the folder; one whose manifest cannot be read is somebody's work."""
+    try:
+        manifest = read_json(folder.manifest)
+    except DataFileError:
+        return False
+    return isinstance(manifest, dict) and manifest.get("demo") is True
 
 
 def create_run(run: Run, vehicle_file: Path) -> None:
-    """Make the folder, copy vehicle and network files, write the manifest last.
+    """Make the folder, carry vehicle and network files into it, read them back, and write the manifest last.
+
+    Whoever creates a run that others may create at the same time does so while `driving` the folder. A demo replaces
+    logs, files and manifest of an earlier demo.
 
     Raises:
-        CampaignError: the folder already holds a run, or cannot be written.
+        CampaignError: the folder already holds a run or other files of these names, or does not read as planned.
+        UserError: it cannot be written.
     """
-    refuse_used(run.folder)
+    folder = run.folder
+    replaced = run.demo and is_demo(folder)
+    if replaced:
+        _delete_logs(folder)
+    elif _holds_run(folder):
+        raise _used(folder)
+    write_carried(carried_vehicle(vehicle_file), folder.path, replace=replaced)
+    write_carried(carried_network(run.network.path), folder.network.parent, replace=replaced)
+    check_readable(folder.vehicle, folder.network, run.plan.vehicle, run.network)
+    write_whole(json.dumps(_manifest(run), indent=1), folder.manifest)
+
+
+def _delete_logs(folder: RunFolder) -> None:
     try:
-        _write_run(run, vehicle_file)
+        for log in recorded_files(folder.frames):
+            log.unlink()
     except OSError as error:
         raise CampaignError(
-            f"{run.folder.path} cannot be made a run folder: {error.strerror or error}.",
-            "Name a folder that can be written (--out), or free some space.",
+            f"The logs of the last demo in {folder.frames} cannot be deleted: {error.strerror}.",
+            "Name another folder (--out).",
         ) from error
 
 
-def _write_run(run: Run, vehicle_file: Path) -> None:
-    folder = run.folder
-    folder.network.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(vehicle_file, folder.vehicle)
-    shutil.copyfile(run.network.path, folder.network)
-    for eds in {node.eds for node in run.network.nodes}:
-        shutil.copyfile(eds, folder.network.parent / eds.name)
-    write_whole(json.dumps(_manifest(run), indent=1), folder.manifest)
+def carries_vehicle(folder: RunFolder, path: Path) -> bool:
+    """Whether a vehicle file is the one that the folder carries."""
+    return is_carried(carried_vehicle(path), folder.path)
+
+
+def carries_network(folder: RunFolder, path: Path) -> bool:
+    """Whether a network file, with its EDS files, is the one that the folder carries."""
+    return is_carried(carried_network(path), folder.network.parent)
 
 
 def open_run(path: Path) -> Run:
@@ -148,15 +235,31 @@ def open_run(path: Path) -> Run:
     folder = RunFolder(path)
     if not folder.manifest.is_file():
         raise DataFileError(f"{path} is no run folder: it has no run.json.", "Name a folder that a campaign wrote.")
-    vehicle, network = load_vehicle(folder.vehicle), load_network(folder.network)
+    described = load_described(folder.vehicle, folder.network)
     try:
-        manifest = json.loads(folder.manifest.read_text(encoding="utf-8"))
-        return _restore(folder, manifest, vehicle, network)
-    except (ValueError, KeyError, TypeError) as error:
+        return _restore(folder, read_json(folder.manifest), described.vehicle, described.network)
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise DataFileError(
             f"{folder.manifest} is damaged: {error!r}.",
             "Identify from its frames instead: quasiomni identify FOLDER/frames --vehicle ... --network ...",
         ) from error
+
+
+def describe(run: Run | None, vehicle: str | None, network: Path | None) -> Described:
+    """The vehicle by the files that are given, else by those of a run, else the prototype.
+
+    Args:
+        run: whose own files hold where others are not given.
+        vehicle: shipped vehicle file by name, or a path.
+        network: network file; where only the vehicle is given, frames of a run are still those of its own network.
+
+    Raises:
+        DataFileError: a file is missing or malformed, or two places disagree.
+    """
+    if run is None:
+        name = vehicle or "prototype"
+        return load_described(name, network or network_file_of(name))
+    return load_described(vehicle or run.folder.vehicle, network or run.folder.network)
 
 
 def _manifest(run: Run) -> dict[str, Any]:
@@ -170,6 +273,7 @@ def _manifest(run: Run) -> dict[str, Any]:
         "periods": plan.periods,
         "cycle": plan.cycle,
         **({"payload": run.payload} if run.payload else {}),
+        **({"demo": True} if run.demo else {}),
         "steps": list(plan.steps),
         "excitations": {step: excitation_entry(excitation) for step, excitation in plan.excitations.items()},
     }
@@ -215,6 +319,8 @@ def _restore(folder: RunFolder, manifest: Mapping[str, Any], vehicle: VehicleDes
         prototype=str(manifest["prototype"]),
         known_inertia=None if inertia is None else KnownInertia(*inertia),
         payload=float(manifest.get("payload", 0.0)),
+        demo=manifest.get("demo") is True,
+        opened=True,
     )
 
 

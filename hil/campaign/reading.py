@@ -9,15 +9,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.campaign.folder import Run, RunFolder, open_run
+from hil.campaign.folder import Run, RunFolder, describe, open_run
 from hil.frames import DecodedLog, decode_log
+from hil.frames.recorder import INTERLUDE, LogFormat, finished_steps, step_of
 from hil.network import Network
-from hil.recorder import INTERLUDE, LogFormat, finished_steps, step_of
+from hil.network.described import Described, differences
 from ident.campaign.plan import Plan
 from ident.campaign.steps import LOADED
 from ident.errors import RecordError
 from ident.records.files import read_record
-from ident.records.record import PAYLOAD, Record, Segment, make_segment
+from ident.records.record import PAYLOAD, Record, Segment, Step, make_segment
 
 
 def read_run(path: Path) -> Record:
@@ -91,6 +92,71 @@ def read_any(path: Path, network: Network) -> Record:
     return read_record(path)
 
 
+def read_as(path: Path, vehicle: str | None, network: Path | None) -> tuple[Record, Described]:
+    """Record from anything that `read_any` takes, with the vehicle that it is of.
+
+    Args:
+        path: run folder, folder of logs, log, or record.
+        vehicle, network: files to take in place of those of a run folder; those of the prototype where there is none.
+
+    Raises:
+        DataFileError, RecordError: there is nothing usable at the path, or a file that is given cannot be used.
+    """
+    run = open_run(path) if RunFolder(path).manifest.is_file() else None
+    described = describe(run, vehicle, network)
+    if run is not None:
+        return read_driven(replace(run, network=described.network)), described
+    return read_any(path, described.network), described
+
+
+def first_run(paths: Sequence[Path]) -> Run | None:
+    """The first run folder among several records, whose vehicle is theirs where none is named.
+
+    Raises:
+        DataFileError: it cannot be read.
+    """
+    folders = [path for path in paths if RunFolder(path).manifest.is_file()]
+    return open_run(folders[0]) if folders else None
+
+
+def read_of(path: Path, vehicle: str | None, network: Path | None, described: Described) -> Record:
+    """One of several records of one vehicle.
+
+    Args:
+        path: anything that `read_any` takes.
+        vehicle, network: files that were named in place of those of run folders.
+        described: the vehicle that all of them are of.
+
+    Raises:
+        DataFileError, RecordError: there is nothing usable at the path, or it is a run of another vehicle.
+    """
+    if not RunFolder(path).manifest.is_file():
+        return read_any(path, described.network)
+    record, own = read_as(path, vehicle, network)
+    if own.vehicle.geometry != described.vehicle.geometry:
+        raise RecordError(
+            f"{path} is a run of another vehicle than {described.vehicle.path}: "
+            f"{'; '.join(differences(described.vehicle, own.vehicle))}.",
+            "Take runs of one vehicle, or say which one it is (--vehicle).",
+        )
+    return record
+
+
+def whole_records(records: Sequence[Record]) -> list[Record]:
+    """Records put together until a step would come twice: the logs of one campaign are one record.
+
+    A step alone says less of its channels than all of them do.
+    """
+    groups: list[list[Record]] = []
+    for record in records:
+        steps = {step for member in groups[-1] for step in member.steps} - {Step.ALIGNMENT} if groups else set()
+        if groups and not steps & set(record.steps):
+            groups[-1].append(record)
+        else:
+            groups.append([record])
+    return [join(group) for group in groups]
+
+
 def join(records: Sequence[Record]) -> Record:
     """All segments of several records behind each other.
 
@@ -125,7 +191,7 @@ def segment_of(step: str, path: Path, log: DecodedLog, network: Network, plan: P
     """The segment of a decoded step; the repeats of its excitation are those of the plan.
 
     Raises:
-        RecordError: a sample breaks the contract of records.
+        RecordError: a sample breaks the contract of records, or the log has not the cycles that were planned.
     """
     return make_segment(
         Segment(
@@ -135,14 +201,26 @@ def segment_of(step: str, path: Path, log: DecodedLog, network: Network, plan: P
             motor_torques=log.motor_torques,
             wheel_angles=log.wheel_angles,
             steering_angles=log.steering_angles,
-            period=_periods(step, len(log.time), plan),
+            period=_periods(step, path, log, plan),
             command_torques=log.command_torques,
         ),
         str(path),
     )
 
 
-def _periods(step: str, samples: int, plan: Plan | None) -> NDArray[np.int64]:
+def _periods(step: str, path: Path, log: DecodedLog, plan: Plan | None) -> NDArray[np.int64]:
+    """Repeat of every row, -1 outside of any. A row belongs to the repeat in which its SYNC was planned.
+
+    A master short of time leaves cycles out and goes on with its plan where it was, so the rows of a log may be more
+    than those planned, and the repeats longer. Rows between two SYNCs that are not next to each other belong to none:
+    thereby the others of a repeat stay in phase with those of its fellows.
+    """
     if plan is None or step not in plan.specs:
-        return np.full(samples, -1, dtype=np.int64)
-    return np.asarray(plan.repeats(step)[:samples], dtype=np.int64)
+        return np.full(len(log.time), -1, dtype=np.int64)
+    planned = np.asarray(plan.repeats(step), dtype=np.int64)
+    if log.cycles != len(planned):
+        raise RecordError(
+            f"{path} holds {log.cycles} cycles, and {step} was planned with {len(planned)}.",
+            "Drive the step again (--resume), or read the log as it is: identify FOLDER/frames.",
+        )
+    return np.where(log.cycle < 0, -1, planned[log.cycle])

@@ -14,18 +14,22 @@ import can
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.bus.clock import Clock
+from hil.bus.realtime import steady_memory
 from hil.campaign.folder import Run
+from hil.campaign.inspection import refusal, reject_unusable
 from hil.campaign.reading import read_run
-from hil.clock import Clock
+from hil.frames import LONGEST_GAP
+from hil.frames.recorder import finished_steps
 from hil.master.master import Master
 from hil.network import Network
-from hil.realtime import steady_memory
-from hil.recorder import finished_steps
+from ident.assessment import Verdict, assess
 from ident.campaign.controller import Controller
 from ident.campaign.reference import Reference
 from ident.campaign.steps import LOADED
-from ident.errors import CampaignError
+from ident.errors import CampaignError, EstimationError
 from ident.estimate.identify import FIT_STEPS, identify
+from ident.faults import find_faults
 from ident.records.record import Step, base_step
 from ident.vehicle.parameters import Parameters
 
@@ -41,8 +45,9 @@ where either does, it is no worse than `ALIGNED`."""
 READINGS = 25
 """Cycles over which the steering is read at standstill: a single reading scatters by half an increment."""
 
-ALIGNMENTS: Final = 6
-"""Attempts at an alignment."""
+ALIGNMENTS: Final = 12
+"""Attempts at an alignment. Each leaves the sides apart by more than `PARALLEL` in four of ten, so that of 6 attempts
+one campaign in fifty drove on with wheels that push each other, and with a friction that its interval does not hold."""
 
 MISALIGNED: Final = 0.01
 """Steering error after the last attempt with which no step is begun [rad]."""
@@ -63,7 +68,7 @@ PROGRESS_CYCLES: Final = 100
 _STANDSTILL: Final = (0.0, 0.0, 0.0, 0.0)
 
 Progress = Callable[[str, int, int], None]
-"""Called with step, cycles driven and cycles to drive."""
+"""Called with step, cycles driven and cycles to drive; an alignment is called `aligning for STEP, attempt N of M`."""
 
 
 class StepRecorder(Protocol):
@@ -74,6 +79,9 @@ class StepRecorder(Protocol):
 
     def step(self, name: str) -> AbstractContextManager[object]:
         """The frames inside belong to this step."""
+
+    def settle(self) -> None:
+        """Return when every finished step is where it can be read."""
 
 
 class Operator(Protocol):
@@ -148,7 +156,8 @@ class CampaignRunner:
 
         Raises:
             BusError: the network fails on the way; the drives are stopped.
-            CampaignError: a coordinate leaves its reference or cannot be aligned; the drives are stopped.
+            CampaignError: a coordinate leaves its reference or cannot be aligned, or a step cannot be used; the drives
+                are stopped.
         """
         finished = {step for step, _ in finished_steps(self._run.folder.frames)}
         # A killed run may have left the vehicle on its stand or loaded, so a resumed one asks for floor and unloading.
@@ -174,7 +183,10 @@ class CampaignRunner:
         return Master(self._bus, self._clock, self._run.network, self._recorder)
 
     def _drive_session(self, steps: Sequence[str]) -> None:
-        """Boot, drive some steps, shut down. Whatever takes long is computed before: enabled drives want a SYNC."""
+        """Boot, drive some steps, shut down, and see whether they can be used. Whatever takes long is computed before
+        or after: enabled drives want a SYNC.
+        """
+        before = set(finished_steps(self._run.folder.frames))
         references = [self._plan.reference(step, self._parameters(step)) for step in steps]
         with steady_memory(), self._master() as master:
             master.boot()
@@ -184,14 +196,19 @@ class CampaignRunner:
                     self._align(master, reference.step)
                 self._drive(master, reference)
         self.overruns += master.overruns
+        self._recorder.settle()
+        driven = [log for log in finished_steps(self._run.folder.frames) if log not in before]
+        if (refused := refusal(reject_unusable(self._run, driven))) is not None:
+            raise refused
 
     def _align(self, master: Master, step: str) -> None:
         target = self._plan.posture(step)
-        for _ in range(ALIGNMENTS):
+        for attempt in range(1, ALIGNMENTS + 1):
             start = _steering_at_rest(master)
             if self._spare_alignments and _aligned(start - target):
                 return
-            self._drive(master, self._plan.alignment(start, step, self._plan.vehicle.prior))
+            alignment = self._plan.alignment(start, step, self._plan.vehicle.prior)
+            self._drive(master, alignment, f"aligning for {step}, attempt {attempt} of {ALIGNMENTS}")
             reached = _steering_at_rest(master)
             if _aligned(reached - target):
                 return
@@ -202,8 +219,8 @@ class CampaignRunner:
                 "Look for a blocked steering unit, or give its friction in the vehicle file's [prior].",
             )
 
-    def _drive(self, master: Master, reference: Reference) -> None:
-        """Drive one reference into a log of its own."""
+    def _drive(self, master: Master, reference: Reference, shown: str = "") -> None:
+        """Drive one reference into a log of its own; shown to people as the step that it is, or as something else."""
         vehicle = self._plan.vehicle
         controller = Controller(
             reference,
@@ -213,27 +230,47 @@ class CampaignRunner:
             peak_torque=vehicle.limits.peak_torque,
         )
         total, torques = len(reference), controller.torques
+        longest = (LONGEST_GAP + 1.5) * self._plan.cycle
         with self._recorder.step(reference.step):
             sample = master.exchange(_STANDSTILL)
             for index in range(total - 1):
+                last = sample.time
                 sample = master.exchange(torques(index, sample.wheel_angles, sample.steering_angles))
+                if sample.time - last > longest:
+                    raise _too_late(reference.step, sample.time - last, self._plan.cycle)
                 if index % PROGRESS_CYCLES == 0:
-                    self._progress(reference.step, index, total)
-        self._progress(reference.step, total, total)
+                    self._progress(shown or reference.step, index, total)
+        self._progress(shown or reference.step, total, total)
 
     def _parameters(self, step: str) -> Parameters:
-        """Feed-forward by the guesses, and for the validation by what the steps before it have shown."""
+        """Feed-forward by the guesses, and for the validation by what the steps before it have shown, where that can
+        be true: a vehicle is not driven by what is not.
+        """
         vehicle = self._plan.vehicle
         if step != Step.LANE_CHANGE or not self._identifiable():
             return vehicle.prior
         record = read_run(self._run.folder.path)
-        result = identify(record, vehicle.geometry, known_inertia=self._run.known_inertia)
+        try:
+            result = identify(record, vehicle.geometry, known_inertia=self._run.known_inertia)
+        except EstimationError:
+            return vehicle.prior
+        if assess(result, record, vehicle, find_faults(record, vehicle)).verdict is Verdict.UNUSABLE:
+            return vehicle.prior
         return Parameters(result.values, np.array([estimate.std for estimate in result.estimates]))
 
     def _identifiable(self) -> bool:
         finished = {step for step, _ in finished_steps(self._run.folder.frames)}
         needed = {str(step) for step in FIT_STEPS if step is not Step.LATERAL}
         return needed <= finished and (self._run.known_inertia is not None or Step.WHEEL_LIFTED in finished)
+
+
+def _too_late(step: str, time: float, cycle: float) -> CampaignError:
+    """Said at once: what is driven after such a gap could not be used."""
+    return CampaignError(
+        f"{step} cannot be used: the master left out {round(time / cycle) - 1} cycles in a row, {LONGEST_GAP} can be "
+        "interpolated.",
+        "Close other programs on this computer, and drive the step again (--resume).",
+    )
 
 
 def _steering_at_rest(master: Master) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from ident.estimate.identify import Identification
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
@@ -28,6 +29,15 @@ TOLERANCES: Final = {
     "B_w": 1.0,
 }
 """What the emulated prototype must be identified to [% of the true value]."""
+
+STATED: Final = 0.95
+"""How often an interval holds the truth, by its own word."""
+
+TOGETHER: Final = (0.935, 0.965)
+"""Between which all parameters' intervals together must hold it."""
+
+CHANCE: Final = 0.01
+"""Below which chance does not explain how rarely a single parameter's intervals hold it."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,26 @@ class Accuracy:
     half_width: float
     covered: int
     runs: int
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How often the intervals of one parameter held the truth.
+
+    Attributes:
+        name: by the paper's symbol.
+        covered: runs whose interval holds the truth.
+        runs: number of runs.
+    """
+
+    name: str
+    covered: int
+    runs: int
+
+    @property
+    def chance(self) -> float:
+        """Probability of so few or fewer, were each interval to hold the truth as often as it states."""
+        return float(stats.binom.cdf(self.covered, self.runs, STATED))
 
 
 @dataclass(frozen=True)
@@ -107,7 +137,22 @@ def accuracy(outcomes: Sequence[Outcome], truth: Parameters) -> list[Accuracy]:
     ]
 
 
-def coverage(rows: Iterable[Accuracy]) -> float:
+def coverage(rows: Iterable[Accuracy | Coverage]) -> float:
     """Share of all parameter-run pairs whose interval holds the truth."""
     listed = list(rows)
     return sum(row.covered for row in listed) / sum(row.runs for row in listed)
+
+
+def coverages(vehicles: Iterable[Iterable[Accuracy]]) -> list[Coverage]:
+    """Coverage of every parameter over all vehicles."""
+    by_parameter = zip(*vehicles, strict=True)
+    return [
+        Coverage(rows[0].name, sum(row.covered for row in rows), sum(row.runs for row in rows)) for rows in by_parameter
+    ]
+
+
+def honest(found: Iterable[Coverage]) -> bool:
+    """Whether intervals keep their word: all together within TOGETHER, none too rarely by more than chance."""
+    listed = list(found)
+    lowest, highest = TOGETHER
+    return lowest <= coverage(listed) <= highest and all(one.chance >= CHANCE for one in listed)

@@ -25,7 +25,7 @@ _OBJECTS = _FIRMWARE + "test_every_object.py"
 _PDO = _FIRMWARE + "test_pdo_mapping.py"
 _EMERGENCIES = _FIRMWARE + "test_emergencies.py"
 _STORAGE = _FIRMWARE + "test_stored_parameters.py"
-_EDS = "tests/hil/test_device_descriptions.py"
+_EDS = "tests/hil/descriptions/test_device_descriptions.py"
 
 OWN_TESTS: Final[Mapping[str, str]] = {
     "1.0": _EDS + "::test_other_readers_load_the_eds",

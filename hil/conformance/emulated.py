@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from emulator.firmware.flywheels import Flywheels
-from hil.bench import LockstepBench
+from hil.bench.lockstep import LockstepBench
 from hil.conformance.cases import STAND_INS
 from hil.conformance.replay import NODE_ID, Replay
 from hil.conformance.report import Verdict, run_cases

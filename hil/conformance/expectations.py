@@ -6,8 +6,7 @@ import struct
 from dataclasses import dataclass
 from enum import Enum, auto
 
-ABORT = 0x80
-"""First byte of an abort."""
+from hil.network.cia import SDO_ABORT
 
 UPLOADED = 2
 """Server command specifier (upper three bits) of the answer to an upload request."""
@@ -55,9 +54,9 @@ class SdoExpectation:
         kind = _kind(self.request)
         if answer == self.answer:
             return True
-        if self.answer[0] == ABORT:
+        if self.answer[0] == SDO_ABORT:
             allowed = self.abort_codes | {abort_code(self.answer)}
-            return (answer[0] == ABORT and abort_code(answer) in allowed) or self._has_more(answer)
+            return (answer[0] == SDO_ABORT and abort_code(answer) in allowed) or self._has_more(answer)
         if kind is Answer.SEGMENT:
             return _agree(answer, self.answer, _SEGMENT)
         if kind is Answer.BLOCK:
@@ -66,7 +65,7 @@ class SdoExpectation:
 
     def decided_by(self, answer: bytes) -> bool:
         """Whether a download has been answered at all, taken or refused."""
-        return self.request[0] >> 5 == 1 and answer[0] in (_DOWNLOADED, ABORT)
+        return self.request[0] >> 5 == 1 and answer[0] in (_DOWNLOADED, SDO_ABORT)
 
     def _same_object_with_its_own_value(self, answer: bytes) -> bool:
         index = struct.unpack_from("<H", self.answer, 1)[0]

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 
 import can
 
-from hil.clock import Clock
+from hil.bus.clock import Clock
 from hil.conformance.expectations import (
-    ABORT,
     OBJECT_MISSING,
     SUBINDEX_MISSING,
     UPLOADED,
@@ -19,13 +18,14 @@ from hil.conformance.expectations import (
     abort_code,
 )
 from hil.conformance.trace import Case, TracedFrame, Way
+from hil.network.cia import SDO_ABORT, Service
 
 NODE_ID = 4
 """Node id of the device in the trace, and of the node under test."""
 
-_SDO_REQUEST, _SDO_ANSWER = 0x600 + NODE_ID, 0x580 + NODE_ID
-_ERROR_CONTROL, _EMERGENCY, _SYNC = 0x700 + NODE_ID, 0x080 + NODE_ID, 0x080
-_FIRST_TPDO = 0x180 + NODE_ID
+_SDO_REQUEST, _SDO_ANSWER = Service.SDO_REQUEST + NODE_ID, Service.SDO_ANSWER + NODE_ID
+_ERROR_CONTROL, _EMERGENCY, _SYNC = Service.HEARTBEAT + NODE_ID, Service.EMERGENCY + NODE_ID, Service.SYNC
+_FIRST_TPDO = Service.TPDO_1 + NODE_ID
 
 _PATIENCE = {_ERROR_CONTROL: 25.0, _SYNC: 12.0, _FIRST_TPDO: 1.5}
 """Longest wait for a frame [s]: the tool's longest heartbeat is 20 s, its longest SYNC period 10 s."""
@@ -46,7 +46,7 @@ _MISSING = (OBJECT_MISSING, SUBINDEX_MISSING)
 
 _SEGMENT_REQUEST, _SEGMENT_MASK = 0x60, 0xEF
 
-_UNANSWERED = (0x80, 0xA1)
+_UNANSWERED = (SDO_ABORT, 0xA1)
 """First bytes of requests without an answer: abort, end of a block upload."""
 
 
@@ -201,15 +201,15 @@ class Replay:
 
     def _note_end_of_upload(self, got: bytes) -> None:
         if self._request[0] & _SEGMENT_MASK == _SEGMENT_REQUEST:
-            self._uploaded = got[0] == ABORT or bool(got[0] & 1)
+            self._uploaded = got[0] == SDO_ABORT or bool(got[0] & 1)
         elif self._request[0] >> 5 == UPLOADED:
             self._uploaded = got[0] >> 5 == UPLOADED and bool(got[0] & 2)
 
     def _is_absent(self, expected: bytes, got: bytes | None) -> bool:
         """Refused because the node has no such object, or goes on with a transfer that was refused so."""
-        if got is None or got[0] != ABORT or not self._initiated:
+        if got is None or got[0] != SDO_ABORT or not self._initiated:
             return False
-        if expected[0] == ABORT and abort_code(expected) in _MISSING:
+        if expected[0] == SDO_ABORT and abort_code(expected) in _MISSING:
             return False
         index, subindex = struct.unpack_from("<HB", self._initiated, 1)
         missing = abort_code(got) in _MISSING or self._request != self._initiated

@@ -12,6 +12,7 @@ from enum import Enum
 from pathlib import Path
 
 from ident.errors import DataFileError
+from ident.reading import read_bounded
 
 _CASE = re.compile(r"### Test case : (?P<number>\d+\.\d+)\s+-\s+Test name : (?P<name>.*?) #+")
 _FRAME = re.compile(
@@ -68,10 +69,7 @@ def read_trace(path: Path) -> tuple[Case, ...]:
     Raises:
         DataFileError: the file cannot be read, or holds no test case.
     """
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        raise DataFileError(f"{path}: {error.strerror}.", "Give the trace of a conformance test.") from error
+    lines = read_bounded(path).decode(errors="replace").splitlines()
     starts = [k for k, line in enumerate(lines) if _CASE.search(line)]
     if not starts:
         raise DataFileError(f"{path} holds no test case.", "Give the trace of a conformance test.")

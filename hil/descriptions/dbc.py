@@ -9,11 +9,12 @@ from types import ModuleType
 from typing import Any, Final
 
 from hil.network import MappedObject, Network, Node, Pdo, PdoDirection
+from hil.network.cia import Index, NmtState, Service
 from ident.errors import UserError
 
 _MASTER: Final = "master"
 
-_NMT_STATES: Final = {0: "boot_up", 4: "stopped", 5: "operational", 127: "pre_operational"}
+_NMT_STATES: Final = {int(state): state.name.lower() for state in NmtState}
 _NMT_COMMANDS: Final = {
     1: "start",
     2: "stop",
@@ -45,14 +46,14 @@ def _rate(node: Node) -> _Unit:
 
 
 _UNITS: Final[Mapping[int, Callable[[Node], _Unit]]] = {
-    0x6004: _angle,
-    0x6064: _angle,
-    0x606C: _rate,
-    0x6071: _torque,
-    0x6074: _torque,
-    0x6077: _torque,
-    0x60B2: _torque,
-    0x60FF: _rate,
+    Index.ENCODER_POSITION: _angle,
+    Index.POSITION_ACTUAL: _angle,
+    Index.VELOCITY_ACTUAL: _rate,
+    Index.TARGET_TORQUE: _torque,
+    Index.TORQUE_DEMAND: _torque,
+    Index.TORQUE_ACTUAL: _torque,
+    Index.TORQUE_OFFSET: _torque,
+    Index.TARGET_VELOCITY: _rate,
 }
 """Object -> its unit on the vehicle: motor shaft torque, wheel or steering angle and rate; others are left raw."""
 
@@ -89,10 +90,10 @@ class _Builder:
         network = self._network
         command = [self._raw("Command", 0, 8, choices=_NMT_COMMANDS), self._raw("Node_id", 8, 8)]
         messages = [
-            self._message(0x000, "NMT", 2, command, _MASTER, "NMT command; node id 0 means all nodes"),
+            self._message(Service.NMT, "NMT", 2, command, _MASTER, "NMT command; node id 0 means all nodes"),
             self._message(network.sync_cob_id, "SYNC", 0, [], _MASTER, "SYNC", network.cycle_period),
         ]
-        messages.append(self._heartbeat(0x700 + network.master_id, _MASTER))
+        messages.append(self._heartbeat(Service.HEARTBEAT + network.master_id, _MASTER))
         for node in network.nodes:
             messages += [self._pdo(node, pdo) for pdo in node.pdos]
             messages += self._services(node)
@@ -106,10 +107,16 @@ class _Builder:
             self._raw("Information", 24, 40),
         ]
         return [
-            self._message(0x080 + node_id, f"{role}_EMCY", 8, emergency, role, "Emergency (CiA 301, CiA 402)"),
-            self._message(0x600 + node_id, f"{role}_SDO_request", 8, self._sdo(), _MASTER, "SDO, client to server"),
-            self._message(0x580 + node_id, f"{role}_SDO_answer", 8, self._sdo(), role, "SDO, server to client"),
-            self._heartbeat(0x700 + node_id, role),
+            self._message(
+                Service.EMERGENCY + node_id, f"{role}_EMCY", 8, emergency, role, "Emergency (CiA 301, CiA 402)"
+            ),
+            self._message(
+                Service.SDO_REQUEST + node_id, f"{role}_SDO_request", 8, self._sdo(), _MASTER, "SDO, client to server"
+            ),
+            self._message(
+                Service.SDO_ANSWER + node_id, f"{role}_SDO_answer", 8, self._sdo(), role, "SDO, server to client"
+            ),
+            self._heartbeat(Service.HEARTBEAT + node_id, role),
         ]
 
     def _sdo(self) -> list[Any]:

@@ -6,27 +6,27 @@ import re
 from collections.abc import Mapping
 
 from hil.network import Network, Node
+from hil.network.cia import CobId, Index
 
 _SECTION = re.compile(r"^\[(?P<name>.+)\]\s*$")
 _OBJECT = re.compile(r"^(?P<index>[0-9A-F]{4})(?:sub(?P<subindex>[0-9A-F]+))?$", re.IGNORECASE)
-_NO_REMOTE = 1 << 30
 
 
 def configured_values(node: Node, network: Network) -> dict[tuple[int, int], int]:
     """(index, sub-index) -> what the master writes to a node before it starts it: PDOs and heartbeats."""
     quantities = node.quantities
     timeout = round(quantities["heartbeat_timeout"].value * 1000.0)
-    values = {
-        (0x1016, 1): network.master_id << 16 | timeout,
-        (0x1017, 0): round(quantities["heartbeat_period"].value * 1000.0),
+    values: dict[tuple[int, int], int] = {
+        (Index.CONSUMER_HEARTBEAT_TIME, 1): network.master_id << 16 | timeout,
+        (Index.PRODUCER_HEARTBEAT_TIME, 0): round(quantities["heartbeat_period"].value * 1000.0),
     }
-    sync = node.object_dictionary.get_variable(0x1005)
+    sync = node.object_dictionary.get_variable(Index.SYNC_COB_ID)
     if sync is not None and sync.default != network.sync_cob_id:
-        values[0x1005, 0] = network.sync_cob_id
+        values[Index.SYNC_COB_ID, 0] = network.sync_cob_id
     for pdo in node.pdos:
         present = node.object_dictionary.get_variable(pdo.communication_index, 1)
         default = 0 if present is None else present.default or 0
-        values[pdo.communication_index, 1] = default & _NO_REMOTE | pdo.cob_id(node.node_id)
+        values[pdo.communication_index, 1] = default & CobId.NO_REMOTE | pdo.cob_id(node.node_id)
         values[pdo.communication_index, 2] = pdo.transmission_type
         values[pdo.mapping_index, 0] = len(pdo.objects)
         for subindex, item in enumerate(pdo.objects, start=1):
@@ -34,8 +34,8 @@ def configured_values(node: Node, network: Network) -> dict[tuple[int, int], int
     return values
 
 
-def write_dcf(node: Node, network: Network) -> str:
-    """The DCF of a node.
+def write_dcf(node: Node, network: Network, eds_name: str | None = None) -> str:
+    """The DCF of a node; `eds_name` is what it calls its EDS file, None for the name that this has.
 
     Raises:
         OSError: its EDS file cannot be read.
@@ -46,13 +46,13 @@ def write_dcf(node: Node, network: Network) -> str:
         header = _SECTION.match(line)
         lines.append(line)
         if header is not None:
-            lines += _added(header["name"], node, values)
+            lines += _added(header["name"], eds_name or node.eds.name, node, values)
     return "\n".join([*lines, "", *_commissioning(node, network)]) + "\n"
 
 
-def _added(section: str, node: Node, values: Mapping[tuple[int, int], int]) -> list[str]:
+def _added(section: str, eds_name: str, node: Node, values: Mapping[tuple[int, int], int]) -> list[str]:
     if section == "FileInfo":
-        return [f"LastEDS={node.eds.name}"]
+        return [f"LastEDS={eds_name}"]
     name = _OBJECT.match(section)
     if name is None:
         return []

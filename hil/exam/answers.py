@@ -13,11 +13,11 @@ from typing import Any, Final
 import numpy as np
 
 from hil.exam.cases import Case, Injected, Kind
-from hil.exam.folder import ExamFolder, open_answer, read_exam
+from hil.exam.folder import ExamFolder
 from hil.exam.identity import Identities, Identity
 from hil.exam.statistics import Z95
+from ident.diagnosis.vehicle.library import DRIFTS, SHAPES
 from ident.errors import UserError
-from ident.gap.vehicle.library import DRIFTS, SHAPES
 
 CONFIDENT: Final = 0.5
 """Probability from which on a single name counts as a confident one."""
@@ -35,7 +35,7 @@ _VERDICTS: Final = MappingProxyType({Kind.NONE: "none", Kind.INVISIBLE: "none", 
 
 @dataclass(frozen=True)
 class Alone:
-    """What a name closes of the removable held-out gap in place of the answer: `ident.gap.alone`.
+    """What a name closes of the removable held-out gap in place of the answer: `ident.diagnosis.alone`.
 
     Attributes:
         name: of the effect.
@@ -249,13 +249,20 @@ class Answer:
         return MappingProxyType({name: value for name, value in wrong.items() if math.isfinite(value)})
 
 
-def read_answers(folder: ExamFolder, known: Sequence[Identities], *, removed: bool = False) -> list[Answer]:
-    """The answers of the diagnosing side beside the truth; `known` are the identities of every pair of campaigns.
+def read_answers(
+    folder: ExamFolder, cases: Sequence[Case], known: Sequence[Identities], *, removed: bool = False
+) -> list[Answer]:
+    """The answers of the diagnosing side beside the truth.
+
+    Args:
+        folder: of the exam.
+        cases: from its answer.
+        known: identities of every pair of campaigns.
+        removed: the answers with the true candidate removed.
 
     Raises:
-        UserError: there is no exam, no diagnosis, or the sealed answer is another one.
+        UserError: there is no diagnosis.
     """
-    cases = open_answer(folder, read_exam(folder).answer_hash)
     said = {
         case.identifier: said_from(json.loads(path.read_text(encoding="utf-8")))
         for case in cases

@@ -8,18 +8,19 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
+from emulator.effects import INJECTORS
+from hil.bench.truth import truth_of
 from hil.exam.driving import drive
 from hil.exam.noise_units import Noise, SizeInNoise, noise_of, size_in_noise
 from hil.exam.plans import plan_exam
-from hil.exam.probes import IDLE, KINEMATIC, SHARES, SIGNED, THRESHOLDS, Probe, all_probes
+from hil.exam.probes import EVERY, IDLE, SHARES, Probe, all_probes
 from hil.exam.quiet import drive_quietly
 from hil.exam.sealing import effect_of
 from hil.exam.sizes import EffectSize
 from hil.exam.workers import run_all
-from hil.truth import truth_of
 from ident.campaign.plan import Plan
+from ident.diagnosis.vehicle.library import DRIFTS
 from ident.errors import UserError
-from ident.gap.vehicle.library import DRIFTS
 from ident.records.record import Record
 from ident.vehicle.description import load_vehicle
 from ident.vehicle.geometry import Geometry
@@ -45,9 +46,6 @@ AIM: Final = 1.5
 
 APPROACHES: Final = 4
 """Drives at most that look for the size of `AIM`."""
-
-EVERY: Final = frozenset(str(probe.name) for probe in all_probes())
-"""Names of all effects that have a size."""
 
 Points = tuple[tuple[float, float], ...]
 """(size, noise units), ascending in noise units."""
@@ -81,7 +79,7 @@ def calibrate(
         progress: called with effects measured and in all.
         names: of the effects.
     """
-    probes = [probe for probe in all_probes() if probe.name in names]
+    probes = [probe for probe in all_probes(load_vehicle(prototype)) if probe.name in names]
     stand_ins = {_key(probe): probe for probe in probes}
     tasks = [(prototype, cycle, probe) for probe in stand_ins.values()]
     measured: dict[tuple[str, str], tuple[str, Points]] = {}
@@ -95,7 +93,7 @@ def calibrate(
 def measure(prototype: str, cycle: float, probe: Probe) -> tuple[tuple[str, str], str, Points]:
     """Key of a probe, the channel that shows it and its points there, no points where none does; runs in a worker."""
     bench = _bench(prototype, cycle)
-    shares = (*SHARES, IDLE) if probe.name in THRESHOLDS else SHARES
+    shares = (*SHARES, IDLE) if INJECTORS[probe.name].threshold else SHARES
     found = {size: units for share in shares if (units := _units(probe, size := _of_share(probe, share), bench))}
     channel = _shown_in(probe, list(found.values()))
     if channel is None:
@@ -144,7 +142,7 @@ def _units(probe: Probe, size: float, bench: Bench) -> SizeInNoise | None:
 
 def _of_share(probe: Probe, share: float) -> float:
     """A low friction coefficient is a large slip; all else is large when it is large."""
-    return probe.largest / share if probe.name == "slip" else probe.largest * share
+    return probe.largest / share if INJECTORS[probe.name].threshold else probe.largest * share
 
 
 def _row(probe: Probe, channel: str, points: Points) -> EffectSize:
@@ -156,7 +154,7 @@ def _row(probe: Probe, channel: str, points: Points) -> EffectSize:
         channel=channel,
         points=points,
         largest=probe.largest,
-        signed=probe.name in SIGNED,
+        signed=INJECTORS[probe.name].signed,
         known=probe.known,
     )
 
@@ -164,7 +162,7 @@ def _row(probe: Probe, channel: str, points: Points) -> EffectSize:
 def _shown_in(probe: Probe, measured: Sequence[SizeInNoise]) -> str | None:
     """The channel that shows the effect best at the first size; None where it shows too little at any."""
     channels = ["drift"] if probe.name in DRIFTS else ["torque"]
-    if probe.name in KINEMATIC:
+    if INJECTORS[probe.name].breaks_rolling:
         channels.append("kinematic")
     best = max(channels, key=lambda name: float(getattr(measured[0], name)))
     return best if any(getattr(units, best) >= VISIBLE for units in measured) else None
@@ -174,7 +172,7 @@ def _points(probe: Probe, measured: Mapping[float, float]) -> Points:
     """Clear points in ascending order, and the foot that a threshold rises from."""
     clear = sorted(((size, units) for size, units in measured.items() if units > CLEAR), key=lambda point: point[1])
     idle = [size for size, units in measured.items() if units <= CLEAR]
-    if probe.name not in THRESHOLDS or not idle:
+    if not INJECTORS[probe.name].threshold or not idle:
         return tuple(clear)
     foot = min(idle, key=lambda size: abs(math.log(size / clear[0][0])))
     return ((foot, NEGLIGIBLE), *clear)

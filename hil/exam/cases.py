@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -112,14 +112,21 @@ class Composition:
         return min(self.excitations, self.total)
 
 
-def draw_cases(table: SizeTable, composition: Composition, seed: int, generator: np.random.Generator) -> list[Case]:
+def draw_cases(
+    table: SizeTable,
+    composition: Composition,
+    noise: Callable[[int], int],
+    generator: np.random.Generator,
+    names: np.random.Generator | None = None,
+) -> list[Case]:
     """Cases in shuffled order.
 
     Args:
         table: what size each effect has in noise units.
         composition: how many of which kind.
-        seed: first of the seeds of the noise; two a case.
+        noise: seed by number of a case; with the next one it is that case's alone.
         generator: of everything that is drawn.
+        names: of the identifiers, which everybody sees; None: the same.
 
     Raises:
         UserError: the table has no effect of a kind that is asked for.
@@ -132,12 +139,11 @@ def draw_cases(table: SizeTable, composition: Composition, seed: int, generator:
         *_hidden(table.invisible, composition.invisible, generator),
     ]
     order = generator.permutation(len(questions))
-    identifiers = _identifiers(len(questions), generator)
+    identifiers = _identifiers(len(questions), names or generator)
     cases = []
     for number, (position, identifier) in enumerate(zip(order.tolist(), identifiers, strict=True)):
         kind, effects, noise_units = questions[position]
-        noise, excitation = seed + SEEDS_PER_CASE * number, number % composition.driven
-        cases.append(Case(identifier, kind, effects, noise_units, noise, excitation))
+        cases.append(Case(identifier, kind, effects, noise_units, noise(number), number % composition.driven))
     return cases
 
 

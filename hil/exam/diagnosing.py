@@ -17,12 +17,12 @@ from typing import Any, Final
 from hil.exam.folder import RECORDS, ExamFolder, read_exam
 from hil.exam.record_bytes import record_from_bytes
 from hil.exam.workers import run_all
+from ident.diagnosis.alone import closed_alone
+from ident.diagnosis.names import EffectName
+from ident.diagnosis.vehicle.diagnose import VehicleDiagnosis, diagnose_vehicle
+from ident.effects.extended import read_model
 from ident.errors import UserError
-from ident.gap.alone import closed_alone
-from ident.gap.vehicle.diagnose import VehicleDiagnosis, diagnose_vehicle
 from ident.vehicle.description import load_vehicle
-from ident.vehicle.effects import EffectName
-from ident.vehicle.extended import read_model
 from ident.writing import write_whole
 
 FORBIDDEN: Final = ("emulator", "pybullet")
@@ -80,11 +80,14 @@ def diagnose_exam(
         removed: candidate that is taken out of the library, by case; all of them are left in without.
 
     Raises:
-        UserError: there is no exam, or it has no records yet.
+        UserError: there is no exam, or it has no records yet; or candidates are to be removed from a sealed one before
+            all of its cases have been diagnosed with all of them.
     """
     forbid_emulator()
     exam = read_exam(folder)
     there = [identifier for identifier in exam.identifiers if folder.complete(identifier)]
+    if removed is not None and exam.sealed:
+        refuse_undiagnosed(folder, there)
     if not there:
         raise UserError(
             f"{folder.path} holds no records yet.", "Seal first: quasiomni exam seal goes on where it stopped."
@@ -108,6 +111,20 @@ def diagnose_exam(
     ):
         write_whole(content, folder.diagnosis(identifier, removed is not None))
         progress(done, len(asked))
+
+
+def refuse_undiagnosed(folder: ExamFolder, identifiers: Sequence[str]) -> None:
+    """Refuse to leave true candidates out while some answers are missing: which cases have one shows afterwards.
+
+    Raises:
+        UserError: one of the cases has no answer yet.
+    """
+    missing = sum(not folder.diagnosis(identifier).is_file() for identifier in identifiers)
+    if missing:
+        raise UserError(
+            f"{missing} cases of {folder.path} are not diagnosed yet, and leaving true candidates out tells of them.",
+            f"Diagnose all of them first: quasiomni exam diagnose {folder.path}.",
+        )
 
 
 def diagnose_case(

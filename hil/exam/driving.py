@@ -9,16 +9,15 @@ from pathlib import Path
 import can
 import numpy as np
 
-from emulator.effects.injection import AnyEffect
-from emulator.prototype import load_prototype
+from emulator.effects import Wanted
 from emulator.vehicle import EmulatedVehicle
-from hil.bench import LockstepBench
+from hil.bench.emulation import BenchOperator
+from hil.bench.lockstep import LockstepBench
+from hil.bench.prototypes import load_emulated
 from hil.campaign.folder import Run, RunFolder, network_file_of
 from hil.campaign.reading import segment_of
 from hil.campaign.runner import CampaignRunner
-from hil.emulation import BenchOperator
 from hil.frames import FrameTable, decode_frames
-from hil.network import load_network
 from ident.campaign.plan import Plan
 from ident.records.record import Record, Step
 
@@ -51,8 +50,11 @@ class FramesInMemory:
         finally:
             self._frames = None
 
+    def settle(self) -> None:
+        """Nothing is ever on its way to a disk."""
 
-def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[AnyEffect]) -> Record:
+
+def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[Wanted]) -> Record:
     """Record of a plan driven by a vehicle with effects.
 
     The alignments between the steps are no part of it: how many there were depends on the effect.
@@ -66,11 +68,12 @@ def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[AnyEffect]) -
     Raises:
         UserError: the vehicle cannot have the effects, or cannot drive with them.
     """
-    network = load_network(network_file_of(prototype))
+    emulated = load_emulated(prototype, network_file_of(prototype))
+    network = emulated.network
     run = Run(RunFolder(Path(_SOURCE)), plan, network, seed, "", prototype, None)
     frames = FramesInMemory()
     with (
-        EmulatedVehicle(load_prototype(prototype), seed=seed, effects=effects) as vehicle,
+        EmulatedVehicle(emulated.prototype, seed=seed, effects=effects) as vehicle,
         LockstepBench(vehicle, network.path) as bench,
     ):
         CampaignRunner(

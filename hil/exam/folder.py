@@ -2,28 +2,26 @@
 
 | entry | what |
 |---|---|
-| `exam.json` | identifiers in shuffled order, excitations, hash of the answer |
+| `exam.json` | identifiers in shuffled order, excitations, whether it is sealed, hash of the answer |
 | `vehicle.toml`, `model.toml` | what is known of the vehicle, and the model to be judged |
 | `cases/ID.fit.parquet`, `cases/ID.confirm.parquet` | the records, all of one size and date |
-| `sealed/answer.bin` | the answer; `exam score` opens it |
+| `truth/answer.json` | the answer, encrypted; `exam score` opens it with the key, which lies elsewhere |
+| `truth/ID.json` | why a case could not be driven, encrypted as well |
 | `diagnoses/ID.json` | answers of the diagnosing side |
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
-import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from hil.exam.cases import Case, case_from_json
 from ident.errors import UserError
+from ident.reading import read_json
 from ident.writing import write_whole
 
-SCHEMA: Final = "quasiomni.exam/2"
+SCHEMA: Final = "quasiomni.exam/3"
 RECORDS: Final = ("fit", "confirm")
 
 
@@ -50,8 +48,8 @@ class ExamFolder:
 
     @property
     def answer(self) -> Path:
-        """The sealed answer."""
-        return self.path / "sealed" / "answer.bin"
+        """The answer."""
+        return self.path / "truth" / "answer.json"
 
     def record(self, identifier: str, which: str) -> Path:
         """One of the RECORDS of a case."""
@@ -62,8 +60,8 @@ class ExamFolder:
         return all(self.record(identifier, which).is_file() for which in RECORDS)
 
     def undriven(self, identifier: str) -> Path:
-        """Why a case could not be driven; sealed with the answer."""
-        return self.path / "sealed" / f"{identifier}.txt"
+        """Why a case could not be driven; sealed as the answer is."""
+        return self.path / "truth" / f"{identifier}.json"
 
     def diagnosis(self, identifier: str, removed: bool = False) -> Path:
         """What the diagnosing side answered; with the true candidate removed, or with all."""
@@ -83,19 +81,35 @@ class Exam:
         cycle: T_s [s].
         plans: the pairs of campaigns that the cases drive, as JSON texts.
         identifiers: of the cases, in shuffled order.
-        answer_hash: SHA-256 of the sealed answer.
+        first_seed: that everything follows from, in an exam that is not sealed; None: it is.
+        salt: of everything derived from the key, hexadecimal; empty where it is not sealed.
+        key: fingerprint of the key; empty where it is not sealed.
+        answer_hash: SHA-256 of the file of the answer.
     """
 
     prototype: str
     cycle: float
     plans: tuple[str, ...]
     identifiers: tuple[str, ...]
-    answer_hash: str
+    first_seed: int | None
+    salt: str
+    key: str
+    answer_hash: str = ""
+
+    @property
+    def sealed(self) -> bool:
+        """Whether the answer takes a key."""
+        return self.first_seed is None
+
+    def context(self, what: str) -> bytes:
+        """What a sealed text belongs to: all of the manifest but the hash of the answer, and what it is."""
+        known = {name: value for name, value in vars(self).items() if name != "answer_hash"}
+        return json.dumps([SCHEMA, known, what], sort_keys=True).encode()
 
 
 def write_exam(folder: ExamFolder, exam: Exam) -> None:
     """Write the manifest."""
-    content = {"schema": SCHEMA, **vars(exam)}
+    content = {"schema": SCHEMA, "sealed": exam.sealed, **vars(exam)}
     write_whole(json.dumps(content, indent=1), folder.manifest)
 
 
@@ -105,45 +119,19 @@ def read_exam(folder: ExamFolder) -> Exam:
     Raises:
         UserError: there is none, or another version wrote it.
     """
-    try:
-        content: dict[str, Any] = json.loads(folder.manifest.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UserError(
-            f"{folder.path} holds no exam: {error}.", "Seal one first: quasiomni exam seal --out FOLDER."
-        ) from error
-    if (schema := content.pop("schema", None)) != SCHEMA:
+    if not folder.manifest.is_file():
+        raise UserError(f"{folder.path} holds no exam.", "Seal one first: quasiomni exam seal --out FOLDER.")
+    content = read_json(folder.manifest)
+    schema = content.pop("schema", None) if isinstance(content, dict) else None
+    if schema != SCHEMA:
         raise UserError(
             f"{folder.manifest} has the schema {schema}, not {SCHEMA}.",
             "Go on with the version that sealed it, or seal the exam again into another folder.",
         )
-    return Exam(**{**content, "plans": tuple(content["plans"]), "identifiers": tuple(content["identifiers"])})
-
-
-def sealed(cases: Sequence[Case], salt: bytes) -> bytes:
-    """The answer, not to be read by accident; the salt keeps its hash from being guessed."""
-    content = {"salt": salt.hex(), "cases": [case.as_json() for case in cases]}
-    return zlib.compress(json.dumps(content).encode(), 9)
-
-
-def answer_hash(content: bytes) -> str:
-    """What is published of the answer."""
-    return hashlib.sha256(content).hexdigest()
-
-
-def open_answer(folder: ExamFolder, expected: str | None) -> list[Case]:
-    """Open the sealed answer.
-
-    Args:
-        folder: of the exam.
-        expected: hash that was published; None while sealing.
-
-    Raises:
-        UserError: there is no answer, or it is not the one that was sealed.
-    """
+    content.pop("sealed", None)
     try:
-        content = folder.answer.read_bytes()
-    except OSError as error:
-        raise UserError(f"{folder.answer} cannot be read: {error.strerror}.", "Seal the exam again.") from error
-    if expected is not None and answer_hash(content) != expected:
-        raise UserError(f"{folder.answer} is not the answer that was sealed.", "Restore it, or seal the exam again.")
-    return [case_from_json(entry) for entry in json.loads(zlib.decompress(content))["cases"]]
+        return Exam(**{**content, "plans": tuple(content["plans"]), "identifiers": tuple(content["identifiers"])})
+    except (KeyError, TypeError) as error:
+        raise UserError(
+            f"{folder.manifest} is damaged: {error!r}.", "Restore it from a copy: without it nothing is scored."
+        ) from error

@@ -20,17 +20,17 @@ from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.plans import plans_from_text
 from ident.campaign.plan import Plan
 from ident.campaign.reference import STEERING_LOOPS, sample_times
-from ident.gap.linear import least_squares, orthonormal
-from ident.gap.problem import Candidate, Problem
-from ident.gap.rows import Column, make_rows
-from ident.gap.vehicle.build import build_problem
-from ident.gap.vehicle.experiments import Driven, hidden_effects
-from ident.gap.vehicle.library import DRIFTS, ONE_SIDED
-from ident.gap.vehicle.visibility import RANK, VISIBLE, row_noise
+from ident.diagnosis.linear import least_squares, orthonormal
+from ident.diagnosis.problem import Candidate, Problem
+from ident.diagnosis.rows import Column, make_rows
+from ident.diagnosis.vehicle.build import build_problem
+from ident.diagnosis.vehicle.experiments import Driven, hidden_effects
+from ident.diagnosis.vehicle.library import DRIFTS, POSITIVE
+from ident.diagnosis.vehicle.visibility import RANK, VISIBLE, Visibility, row_noise
+from ident.effects import EFFECTS
+from ident.effects.extended import read_model
 from ident.records.record import Record, Segment, make_segment
-from ident.vehicle.description import load_vehicle
-from ident.vehicle.effects import EFFECTS, EffectName
-from ident.vehicle.extended import read_model
+from ident.vehicle.description import VehicleDescription, load_vehicle
 from ident.vehicle.parameters import Parameters
 
 Array = NDArray[np.float64]
@@ -40,9 +40,6 @@ IDENTICAL: Final = 0.999
 
 In the four steps, causes are either identical to seven digits or below 0.97.
 """
-
-POSITIVE: Final = (*ONE_SIDED, EffectName.PAYLOAD)
-"""Effects whose size is never negative: they stand for no change in the other direction."""
 
 SIZED: Final = 1e-3
 """Part of a column that the size of the effect must have; the rest is another of its numbers."""
@@ -99,7 +96,7 @@ def exam_identities(folder: ExamFolder) -> tuple[Identities, ...]:
     for text in exam.plans:
         plans = plans_from_text(text, vehicle, exam.cycle)
         records = [planned_record(plan, model.parameters) for plan in (plans.fit, plans.confirm)]
-        found.append(identities(build_problem(records, vehicle, model.parameters, given=model.effects)))
+        found.append(identities(build_problem(records, vehicle, model.parameters, given=model.effects), vehicle))
     return tuple(found)
 
 
@@ -123,7 +120,7 @@ def planned_record(plan: Plan, parameters: Parameters) -> Record:
     return Record(segments, "planned")
 
 
-def identities(problem: Problem) -> Identities:
+def identities(problem: Problem, vehicle: VehicleDescription) -> Identities:
     """Identities of all causes that a problem shows.
 
     Structure is compared beside the parameters, which are free there; changed parameters as they are.
@@ -150,7 +147,7 @@ def identities(problem: Problem) -> Identities:
             for cause in group
             for positive in (True, False)
         },
-        hidden_effects(Driven(dict.fromkeys((block.step for block in problem.blocks), (0.0,)))),
+        hidden_effects(Driven(dict.fromkeys((block.step for block in problem.blocks), (0.0,))), Visibility(vehicle)),
     )
 
 
@@ -201,7 +198,7 @@ def _is_injected(candidate: Candidate, column: Column) -> bool:
     if start is None:
         return True
     values = start(np.eye(column.width)[0])
-    defaults = [parameter.default for parameter in EFFECTS[EffectName(candidate.effect)].parameters]
+    defaults = [parameter.default for parameter in EFFECTS[candidate.effect].parameters]
     return all(
         default is None or bool(np.isclose(value, default)) for default, value in zip(defaults, values, strict=True)
     )

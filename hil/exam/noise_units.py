@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.campaign.steps import EXCITATIONS
+from ident.diagnosis.vehicle.creep import granted_creep
 from ident.estimate.equations import Equations, motion_of, usable_equations
 from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.estimate.noise import noise_floor
-from ident.gap.vehicle.creep import granted_creep
+from ident.plant import kinematics
 from ident.records.record import Record, Segment, Step
-from ident.vehicle import kinematics
 from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]

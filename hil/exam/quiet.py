@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from emulator.effects.injection import AnyEffect
+from emulator.effects import Wanted
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
 from ident.campaign.controller import Controller
@@ -18,7 +18,7 @@ from ident.records.record import Record, Segment
 Array = NDArray[np.float64]
 
 
-def drive_quietly(plan: Plan, prototype: str, effects: Sequence[AnyEffect]) -> Record:
+def drive_quietly(plan: Plan, prototype: str, effects: Sequence[Wanted]) -> Record:
     """Record of a plan on a vehicle without noise, sampled and controlled in every cycle as over the bus.
 
     Args:
@@ -53,12 +53,12 @@ class _Driver:
         self._angle = 2 * np.pi / built.drive.counts_per_revolution / built.geometry.gear_ratio
         encoder = built.encoder
         self._steering = [sign * 2 * np.pi / encoder.counts_per_revolution for sign in encoder.directions]
-        self._zero = encoder.zero_position
+        self._zero = encoder.zero_positions
 
     def steering(self) -> Array:
         """Steering angles (2,) as the encoders report them [rad]."""
-        pairs = zip(self._steering, self._vehicle.encoders, strict=True)
-        return np.array([unit * (encoder.position() - self._zero) for unit, encoder in pairs])
+        sides = zip(self._steering, self._zero, self._vehicle.encoders, strict=True)
+        return np.array([unit * (encoder.position() - zero) for unit, zero, encoder in sides])
 
     def follow(self, reference: Reference) -> Segment:
         """Drive a reference under the controller of a campaign."""

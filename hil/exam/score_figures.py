@@ -7,7 +7,7 @@ from typing import Final
 from xml.sax.saxutils import escape
 
 from hil.exam.statistics import Bin
-from ident.vehicle.effects import EffectName
+from ident.effects import EFFECTS
 
 _INK: Final = "#222"
 _FAINT: Final = "#999"
@@ -81,7 +81,7 @@ def _cell(place: tuple[float, float], count: int, total: int, *, right: bool) ->
 
 def _ordered(names: set[str]) -> list[str]:
     """Effects of the library in their order, then others, then verdicts."""
-    known = [str(name) for name in EffectName if name in names]
+    known = [str(name) for name in EFFECTS if name in names]
     verdicts = [name for name in _VERDICTS if name in names]
     return [*known, *sorted(names - set(known) - set(verdicts)), *verdicts]
 

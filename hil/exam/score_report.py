@@ -6,11 +6,13 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from hil.exam.answer_file import open_cases
 from hil.exam.answers import chance, permuted, read_answers
-from hil.exam.folder import ExamFolder
+from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.identity import exam_identities
 from hil.exam.score_names import ASKED, PERMUTED, RIGHT
 from hil.exam.scoring import Group, Score, missing_cases, removal_rates, score
@@ -26,12 +28,21 @@ class ScoreReport:
         permuted: of the same answers beside other truths.
         chance: share that is expected of them, over all permutations.
         without: rates of the run without the true candidate; empty where there was none.
+        first_seed: that the cases follow from, of an exam that is not sealed; None: it is.
     """
 
     score: Score
     permuted: Rate
     chance: float
     without: Mapping[str, Rate]
+    first_seed: int | None
+
+    @property
+    def seal(self) -> str:
+        """Whether whoever diagnosed could know the cases."""
+        if self.first_seed is None:
+            return "Sealed: the cases were drawn from a secret."
+        return f"Not sealed: the cases follow from seed {self.first_seed}, whoever diagnosed could know them."
 
     @property
     def rates(self) -> dict[str, Rate]:
@@ -43,20 +54,27 @@ class ScoreReport:
         return f"chance, {self.chance:.3f}" if name == PERMUTED else ASKED.get(name, "")
 
 
-def score_exam(folder: ExamFolder, generator: np.random.Generator) -> ScoreReport:
-    """Open the sealed answer and score all that was diagnosed; `generator` draws one permutation of the answers.
+def score_exam(folder: ExamFolder, generator: np.random.Generator, key: Path | None) -> ScoreReport:
+    """Open the answer and score all that was diagnosed.
+
+    Args:
+        folder: of the exam.
+        generator: draws one permutation of the answers.
+        key: file that the exam was sealed with; None for one that is not sealed.
 
     Raises:
-        UserError: there is no exam, no diagnosis, or the sealed answer is another one.
+        UserError: there is no exam, no diagnosis, the answer is another one, or the key is.
     """
+    cases = open_cases(folder, key)
     known = exam_identities(folder)
-    answers = read_answers(folder, known)
+    answers = read_answers(folder, cases, known)
     without = folder.diagnosed(removed=True)
     return ScoreReport(
-        score=score(answers, missing_cases(folder)),
+        score=score(answers, missing_cases(folder, cases)),
         permuted=score(permuted(answers, generator)).rates[RIGHT],
         chance=chance(answers),
-        without=removal_rates(read_answers(folder, known, removed=True)) if without else {},
+        without=removal_rates(read_answers(folder, cases, known, removed=True)) if without else {},
+        first_seed=read_exam(folder).first_seed,
     )
 
 
@@ -66,13 +84,15 @@ def summary_lines(report: ScoreReport) -> list[str]:
     texts |= {name: _text(value) for name, value in report.score.numbers.items()}
     width = max(len(name) for name in texts)
     lines = [f"{name:<{width}}  {text:<32}{_wish(report.asked(name))}".rstrip() for name, text in texts.items()]
-    return [f"{report.score.cases} cases scored, {sum(report.score.missing.values())} without an answer.", *lines]
+    counted = f"{report.score.cases} cases scored, {sum(report.score.missing.values())} without an answer."
+    return [counted, report.seal, *lines]
 
 
 def score_markdown(report: ScoreReport, title: str) -> str:
     """The whole score."""
     score = report.score
-    parts = [f"# {title}", "", f"{score.cases} cases. Rates with Wilson's 95 % interval and counts.", ""]
+    counted = f"{score.cases} cases. {report.seal} Rates with Wilson's 95 % interval and counts."
+    parts = [f"# {title}", "", counted, ""]
     parts += ["| what | measured | asked |", "|---|---|---|"]
     parts += [f"| {name} | {rate} | {report.asked(name)} |" for name, rate in report.rates.items()]
     parts += [f"| {name} | {_text(value)} | {report.asked(name)} |" for name, value in score.numbers.items()]
@@ -89,6 +109,8 @@ def score_json(report: ScoreReport) -> str:
     """All numbers; a rate is hits, cases, value and the ends of its interval."""
     score = report.score
     content = {
+        "sealed": report.first_seed is None,
+        "first_seed": report.first_seed,
         "cases": score.cases,
         "rates": {name: _plain(rate) for name, rate in report.rates.items() if rate.cases},
         "numbers": {name: _finite(value) for name, value in score.numbers.items()},

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from hil.exam import score_names as names
 from hil.exam.answers import FAILED, Answer
 from hil.exam.cases import SIZES, Case, Kind
-from hil.exam.folder import ExamFolder, open_answer, read_exam
+from hil.exam.folder import ExamFolder
 from hil.exam.statistics import Bin, Rate, calibration_error, rate, reliability
 
 
@@ -63,13 +63,12 @@ class Score:
     missing: Mapping[str, int]
 
 
-def removable(folder: ExamFolder) -> dict[str, str]:
-    """True name by case, of the cases with one effect of the library; opens the sealed answer."""
-    cases = open_answer(folder, read_exam(folder).answer_hash)
+def removable(cases: Sequence[Case]) -> dict[str, str]:
+    """True name by case, of the cases with one effect of the library."""
     return {case.identifier: case.effects[0].name for case in cases if case.kind is Kind.EFFECT}
 
 
-def missing_cases(folder: ExamFolder) -> dict[str, int]:
+def missing_cases(folder: ExamFolder, cases: Sequence[Case]) -> dict[str, int]:
     """Cases that count nowhere, by what they are and why."""
 
     def what(case: Case) -> str:
@@ -77,7 +76,6 @@ def missing_cases(folder: ExamFolder) -> dict[str, int]:
         driven = "not driven" if folder.undriven(case.identifier).is_file() else "not diagnosed"
         return f"{truth}, size {case.noise_units:g}: {driven}"
 
-    cases = open_answer(folder, read_exam(folder).answer_hash)
     return dict(Counter(what(case) for case in cases if not folder.diagnosis(case.identifier).is_file()))
 
 

@@ -4,38 +4,29 @@ from __future__ import annotations
 
 import os
 import secrets
-import shutil
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
-from emulator.effects.injection import AnyEffect
-from emulator.effects.unlibraried import UNLIBRARIED, Unlibraried, UnlibrariedName
+from emulator.effects import INJECTORS, Unlibraried, Wanted
 from hil.campaign.folder import network_file_of
-from hil.exam.cases import Case, Composition, Injected, draw_cases
+from hil.exam.answer_file import answer_hash, answer_text, key_of_exam, open_answer, undriven_text
+from hil.exam.cases import Case, Composition, Injected, Kind, draw_cases
 from hil.exam.driving import drive
-from hil.exam.folder import (
-    RECORDS,
-    Exam,
-    ExamFolder,
-    answer_hash,
-    open_answer,
-    read_exam,
-    sealed,
-    write_exam,
-)
+from hil.exam.folder import RECORDS, Exam, ExamFolder, read_exam, write_exam
+from hil.exam.key import Key, make_key
+from hil.exam.lots import Lots, lots_of_key, lots_of_seed
 from hil.exam.plans import ExamPlans, plan_exam, plans_from_text, plans_text
 from hil.exam.record_bytes import record_bytes
 from hil.exam.sizes import SizeTable
 from hil.exam.workers import run_all
 from hil.network import load_network
+from ident.effects import make_effect
 from ident.errors import UserError
 from ident.vehicle.description import find_data_file, load_vehicle
-from ident.vehicle.effects import EffectName, make_effect
 from ident.writing import write_whole
 
 Progress = Callable[[int, int], None]
@@ -45,7 +36,12 @@ MODEL_FILE: Final = Path(__file__).parent / "data" / "model.toml"
 """The model that is judged, as identified from a campaign of the prototype without effects: `quasiomni campaign
 --seed 400001 --periods 8 --skip lane_change`, then `quasiomni identify`."""
 
+SALT: Final = 16
+"""Length of the salt of an exam [bytes]."""
+
 _EPOCH: Final = (0, 0)
+
+_KINDS: Final = (Kind.EFFECT, Kind.PAIR, Kind.NONE, Kind.UNKNOWN, Kind.INVISIBLE)
 
 
 @dataclass(frozen=True)
@@ -56,7 +52,8 @@ class SealingOrder:
         out: folder.
         prototype: of the emulator, by name.
         composition: how many cases of each kind.
-        seed: first of the noise, two a case; of the excitations, one each; and of everything drawn.
+        key: file of the secret that everything is drawn from, made where it is missing; None: not sealed.
+        first_seed: without a key, the first of the noise, two a case, of the excitations, and of everything drawn.
         jobs: processes on this machine.
         scheduler: of a Dask cluster, None for this machine.
     """
@@ -64,7 +61,8 @@ class SealingOrder:
     out: Path
     prototype: str
     composition: Composition
-    seed: int
+    key: Path | None
+    first_seed: int | None
     jobs: int
     scheduler: str | None
 
@@ -75,17 +73,19 @@ def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
     A case whose effects stop the campaign has no records: what was wrong is sealed with the answer.
 
     Raises:
-        UserError: no case is asked for, or the folder holds another exam.
+        UserError: no case is asked for, neither or both of key and first seed are given, the key is another one, or the
+            folder holds another exam.
     """
-    if not order.composition.total:
-        raise UserError("An exam without cases is none.", "Ask for some: --effects, --none, --unknown.")
+    _refuse_impossible(order)
     folder = ExamFolder(order.out)
     # The excitations take minutes before the first case is done.
     progress(0, order.composition.total)
     if not folder.manifest.is_file():
         _draw(folder, order, table)
     exam = read_exam(folder)
-    cases = open_answer(folder, exam.answer_hash)
+    _refuse_other_lots(exam, order)
+    key = key_of_exam(folder, exam, order.key)
+    cases = open_answer(folder, exam, key)
     _refuse_other(cases, exam, order)
     left = [case for case in cases if not _finished(folder, case.identifier)]
     tasks = [(exam.plans[case.excitation], exam.prototype, exam.cycle, case) for case in left]
@@ -93,12 +93,24 @@ def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
     progress(done, len(cases))
     for identifier, contents in run_all(drive_case, tasks, jobs=order.jobs, scheduler=order.scheduler):
         if isinstance(contents, str):
-            write_whole(contents, folder.undriven(identifier))
+            write_whole(undriven_text(identifier, contents, exam, key), folder.undriven(identifier))
         else:
             _write_records(folder, identifier, contents)
         done += 1
         progress(done, len(cases))
+    if left:
+        _hide_order(folder, exam)
     return exam
+
+
+def _refuse_impossible(order: SealingOrder) -> None:
+    if not order.composition.total:
+        raise UserError("An exam without cases is none.", "Ask for some: --effects, --none, --unknown.")
+    if (order.key is None) == (order.first_seed is None):
+        raise UserError(
+            "An exam is drawn either from a secret or from a seed that everybody may know.",
+            "Name a file for the secret, outside the exam (--key FILE), or a seed for a set to tune on (--first-seed).",
+        )
 
 
 def _write_records(folder: ExamFolder, identifier: str, contents: tuple[bytes, bytes]) -> None:
@@ -106,6 +118,14 @@ def _write_records(folder: ExamFolder, identifier: str, contents: tuple[bytes, b
         path = folder.record(identifier, which)
         write_whole(content, path)
         os.utime(path, _EPOCH)
+
+
+def _hide_order(folder: ExamFolder, exam: Exam) -> None:
+    """Write all records anew, one after the other: how long each was driven shows in the times of the first files."""
+    for identifier in exam.identifiers:
+        if folder.complete(identifier):
+            fit, confirm = (folder.record(identifier, which).read_bytes() for which in RECORDS)
+            _write_records(folder, identifier, (fit, confirm))
 
 
 def drive_case(plans: str, prototype: str, cycle: float, case: Case) -> tuple[str, tuple[bytes, bytes] | str]:
@@ -120,16 +140,11 @@ def drive_case(plans: str, prototype: str, cycle: float, case: Case) -> tuple[st
     return case.identifier, (record_bytes(fit), record_bytes(confirm))
 
 
-def effect_of(injected: Injected) -> AnyEffect:
+def effect_of(injected: Injected) -> Wanted:
     """What the emulator injects."""
-    if injected.name in UnlibrariedName.__members__.values():
-        return Unlibraried(UnlibrariedName(injected.name), injected.where, injected.size)
-    return make_effect(EffectName(injected.name), injected.where, {injected.parameter: injected.size})
-
-
-def unlibraried_unit(name: str) -> str:
-    """Unit of the size of an effect without a candidate."""
-    return UNLIBRARIED[UnlibrariedName(name)].unit
+    if not INJECTORS[injected.name].known:
+        return Unlibraried(injected.name, injected.where, injected.size)
+    return make_effect(injected.name, injected.where, {injected.parameter: injected.size})
 
 
 @lru_cache(maxsize=Composition.excitations)
@@ -140,18 +155,35 @@ def _plans(text: str, prototype: str, cycle: float) -> ExamPlans:
 def _draw(folder: ExamFolder, order: SealingOrder, table: SizeTable) -> None:
     """Everything but the records."""
     cycle = load_network(network_file_of(order.prototype)).cycle_period
-    cases = draw_cases(table, order.composition, order.seed, np.random.default_rng(order.seed))
-    plans = _draw_plans(order, cycle)
-    answer = sealed(cases, secrets.token_bytes(16))
+    key = None if order.key is None else make_key(order.key, folder.path)
+    salt = b"" if key is None else secrets.token_bytes(SALT)
+    lots = _lots(order, key, salt)
+    cases = draw_cases(table, order.composition, lots.noise, lots.questions, lots.identifiers)
+    exam = Exam(
+        prototype=order.prototype,
+        cycle=cycle,
+        plans=_draw_plans(order, lots, cycle),
+        identifiers=tuple(case.identifier for case in cases),
+        first_seed=order.first_seed,
+        salt=salt.hex(),
+        key="" if key is None else key.fingerprint(salt),
+    )
+    answer = answer_text(cases, exam, key)
     write_whole(answer, folder.answer)
-    shutil.copyfile(find_data_file("ident.vehicle", order.prototype), folder.vehicle)
-    shutil.copyfile(MODEL_FILE, folder.model)
-    identifiers = tuple(case.identifier for case in cases)
-    write_exam(folder, Exam(order.prototype, cycle, plans, identifiers, answer_hash(answer)))
+    write_whole(find_data_file("ident.vehicle", order.prototype).read_bytes(), folder.vehicle)
+    write_whole(MODEL_FILE.read_bytes(), folder.model)
+    write_exam(folder, replace(exam, answer_hash=answer_hash(answer)))
 
 
-def _draw_plans(order: SealingOrder, cycle: float) -> tuple[str, ...]:
-    tasks = [(number, order.prototype, order.seed + number, cycle) for number in range(order.composition.driven)]
+def _lots(order: SealingOrder, key: Key | None, salt: bytes) -> Lots:
+    if key is not None:
+        return lots_of_key(key, salt)
+    assert order.first_seed is not None
+    return lots_of_seed(order.first_seed)
+
+
+def _draw_plans(order: SealingOrder, lots: Lots, cycle: float) -> tuple[str, ...]:
+    tasks = [(number, order.prototype, lots.excitation(number), cycle) for number in range(order.composition.driven)]
     return tuple(text for _, text in sorted(run_all(draw_plans, tasks, jobs=order.jobs, scheduler=order.scheduler)))
 
 
@@ -160,13 +192,28 @@ def draw_plans(number: int, prototype: str, seed: int, cycle: float) -> tuple[in
     return number, plans_text(plan_exam(load_vehicle(prototype), seed, cycle))
 
 
-def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
-    first = min(case.seed for case in cases)
-    held = (exam.prototype, len(cases), len(exam.plans), first)
-    if held != (order.prototype, order.composition.total, order.composition.driven, order.seed):
+def _refuse_other_lots(exam: Exam, order: SealingOrder) -> None:
+    if exam.sealed and order.key is None:
         raise UserError(
-            f"{order.out} holds another exam: {len(cases)} cases of {exam.prototype} on {len(exam.plans)} "
-            f"excitations from seed {first}.",
+            f"{order.out} holds a sealed exam.", "Go on with its key (--key), or name another folder (--out)."
+        )
+    if exam.first_seed != order.first_seed:
+        raise UserError(
+            f"{order.out} holds another exam, not sealed, from seed {exam.first_seed}.",
+            f"Go on with it by --first-seed {exam.first_seed}, or name another folder (--out).",
+        )
+
+
+def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
+    wanted = order.composition
+    asked = dict(
+        zip(_KINDS, (wanted.effects, wanted.pairs, wanted.none, wanted.unknown, wanted.invisible), strict=True)
+    )
+    held = Counter(case.kind for case in cases)
+    if (exam.prototype, len(exam.plans), held) != (order.prototype, wanted.driven, Counter(asked)):
+        kinds = ", ".join(f"{held[kind]} {kind}" for kind in _KINDS)
+        raise UserError(
+            f"{order.out} holds another exam: {kinds} of {exam.prototype} on {len(exam.plans)} excitations.",
             "Go on with it as it was begun, or name another folder (--out).",
         )
 

@@ -12,7 +12,7 @@ from emulator.firmware.drive.faults import OF_TRIP
 from emulator.firmware.drive.faults import Fault as DriveFault
 from emulator.firmware.emergency import ErrorRegister
 from emulator.firmware.network import DeviceNetwork
-from hil.buses.frame_kinds import ERROR_FRAME, PROTOCOL_ERROR
+from hil.bus.frame_kinds import ERROR_FRAME, PROTOCOL_ERROR
 from hil.faults.agenda import Agenda
 from hil.faults.fault import Fault, FaultError, FaultKind
 from hil.faults.hardware import EncoderTap, TappedVehicle

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
+from hil.network.cia import ErrorCode
 from ident.errors import UserError
 
 
@@ -110,7 +111,9 @@ SPECIFICATIONS: Final[Mapping[FaultKind, Specification]] = {
     FaultKind.BUS_OFF: Specification(Target.NODE, "the CAN controller is bus-off; at the end it recovers (EMCY 8140h)"),
     FaultKind.POWER: Specification(Target.NODE, "the supply is off; at the end the node boots"),
     FaultKind.TRIP: Specification(
-        Target.DRIVE, "the drive trips once", {"code": Parameter(0x2310, 0x1000, 0xFFFF, "error code 603Fh")}
+        Target.DRIVE,
+        "the drive trips once",
+        {"code": Parameter(ErrorCode.CONTINUOUS_OVER_CURRENT, 0x1000, 0xFFFF, "error code 603Fh")},
     ),
     FaultKind.STUCK: Specification(Target.NODE, "the encoder stays at its count"),
     FaultKind.JUMP: Specification(

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 
 from hil.faults.fault import SPECIFICATIONS, Fault, FaultKind
+from hil.network.cia import NODE_ID, Service
 
 
 class Frame(NamedTuple):
@@ -38,7 +39,9 @@ def identifiers(low: int, high: int) -> Selection:
 
 def sent_by_node(node_id: int) -> Selection:
     """What a node sends in the predefined connection set (CiA 301, table 38)."""
-    return lambda frame: not frame.from_master and frame.can_id >= 0x80 and frame.can_id & 0x7F == node_id
+    return lambda frame: (
+        not frame.from_master and frame.can_id >= Service.EMERGENCY and frame.can_id & NODE_ID == node_id
+    )
 
 
 def sent_by_master(frame: Frame) -> bool:
@@ -53,7 +56,7 @@ def any_frame(frame: Frame) -> bool:
 
 def heartbeat_of(node_id: int) -> Selection:
     """Boot-up messages and heartbeats of a node, or of the master."""
-    return lambda frame: frame.can_id == 0x700 + node_id
+    return lambda frame: frame.can_id == Service.HEARTBEAT + node_id
 
 
 @dataclass

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from hil.faults.fault import Fault, FaultError, FaultKind
 from hil.faults.frames import Selection, any_frame, heartbeat_of, identifiers, sent_by_master, sent_by_node
 from hil.network import Network
+from hil.network.cia import HIGHEST_CAN_ID
 from ident.vehicle.geometry import WHEELS
 
 MASTER = "master"
@@ -96,7 +97,7 @@ def identifier(text: str) -> int:
         value = int(text, 0)
     except ValueError:
         value = -1
-    if not 0 <= value <= 0x7FF:
+    if not 0 <= value <= HIGHEST_CAN_ID:
         raise FaultError(f"{text!r} is no 11-bit identifier.", "Write for example 0x181.")
     return value
 

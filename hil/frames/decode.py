@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +14,14 @@ from hil.frames.grid import SyncGrid
 from hil.frames.logs import read_log
 from hil.frames.table import FrameTable
 from hil.network import MappedObject, Network, Node, Pdo, PdoDirection
+from hil.network.cia import Index
 from ident.errors import RecordError
 
-_TORQUE_ACTUAL = 0x6077
-_POSITION_ACTUAL = 0x6064
-_ENCODER_POSITION = 0x6004
-_TARGET_TORQUE = 0x6071
+LONGEST_GAP: Final = 5
+"""Cycles in a row that a master short of time may leave out: 10 ms, over which samples can be interpolated."""
+
+_MOSTLY: Final = 0.1
+"""Share of cycles without a command below which those frames were lost, and not left out by the master."""
 
 FloatArray = NDArray[np.float64]
 
@@ -37,6 +40,8 @@ class DecodedLog:
         missing: cycles that the master left out.
         resampled: the SYNCs were not on the grid, so the rows are interpolated linearly between them by their stamps.
         start: stamp of the first SYNC in the log [s].
+        cycles: SYNCs in the log.
+        cycle: (N,) number of the SYNC that each row belongs to, -1 where the master left cycles out.
     """
 
     time: FloatArray
@@ -48,9 +53,13 @@ class DecodedLog:
     missing: int
     resampled: bool
     start: float
+    cycles: int
+    cycle: NDArray[np.int64]
 
 
-def decode_log(path: Path, network: Network, accept_truncated: bool = False, longest_gap: int = 5) -> DecodedLog:
+def decode_log(
+    path: Path, network: Network, accept_truncated: bool = False, longest_gap: int = LONGEST_GAP
+) -> DecodedLog:
     """Decode a recorded step.
 
     Args:
@@ -60,8 +69,8 @@ def decode_log(path: Path, network: Network, accept_truncated: bool = False, lon
         longest_gap: cycles in a row that a master short of time may have left out; they are interpolated.
 
     Raises:
-        RecordError: the log cannot be read, a node is not in it, frames have other lengths, a sample is missing, or
-            more cycles in a row than `longest_gap`.
+        RecordError: the log cannot be read, a node is not in it, frames have other lengths, a sample or a command is
+            missing, more cycles in a row than `longest_gap` are, or the clock of the log was set.
     """
     return _Decoder(read_log(path, accept_truncated), network, path, accept_truncated).decode(longest_gap)
 
@@ -91,23 +100,24 @@ class _Decoder:
 
     def decode(self, longest_gap: int) -> DecodedLog:
         self._refuse_absent_nodes()
-        grid = SyncGrid(self._stamps, self._network.cycle_period)
-        if grid.worst_gap > longest_gap:
-            raise RecordError(
-                f"{self._path}: {grid.worst_gap} cycles in a row are missing after t = {grid.worst_gap_at:.3f} s.",
-                "Drive the step again; see to it that the master keeps its cycle.",
-            )
+        grid = SyncGrid(self._stamps, self._network.cycle_period, longest_gap, str(self._path))
         drives, encoders = self._network.drives, self._network.encoders
+        wheels = _columns([self._angle(node, Index.POSITION_ACTUAL) for node in drives])
+        steering = _columns([self._angle(node, Index.ENCODER_POSITION) for node in encoders])
+        units = np.abs([node.angle_unit for node in (*drives, *encoders)])
+        grid.refuse_clock_steps(np.hstack([wheels, steering]), units, self._network.cycle_period, str(self._path))
         return DecodedLog(
             time=grid.time,
             command_torques=grid.hold(_columns([self._commands(node) for node in drives])),
             motor_torques=grid.interpolate(_columns([self._torque(node) for node in drives])),
-            wheel_angles=grid.interpolate(_columns([self._angle(node, _POSITION_ACTUAL) for node in drives])),
-            steering_angles=grid.interpolate(_columns([self._angle(node, _ENCODER_POSITION) for node in encoders])),
+            wheel_angles=grid.interpolate(wheels),
+            steering_angles=grid.interpolate(steering),
             jitter=grid.jitter,
             missing=grid.missing,
             resampled=grid.resamples,
             start=float(self._stamps[0]),
+            cycles=self._count,
+            cycle=grid.nearest,
         )
 
     def _refuse_absent_nodes(self) -> None:
@@ -131,7 +141,7 @@ class _Decoder:
         return _scaled(np.cumsum((steps + half) % node.counter_modulus - half), node.angle_unit)
 
     def _torque(self, node: Node) -> FloatArray:
-        return _scaled(self._sampled(node, _TORQUE_ACTUAL), node.torque_unit)
+        return _scaled(self._sampled(node, Index.TORQUE_ACTUAL), node.torque_unit)
 
     def _sampled(self, node: Node, index: int) -> NDArray[np.int64]:
         pdo, item, offset = _locate(node, PdoDirection.TRANSMIT, index)
@@ -141,12 +151,13 @@ class _Decoder:
         return self._values(rows[first][cycles < self._count], item, offset)
 
     def _commands(self, node: Node) -> FloatArray:
-        pdo, item, offset = _locate(node, PdoDirection.RECEIVE, _TARGET_TORQUE)
+        pdo, item, offset = _locate(node, PdoDirection.RECEIVE, Index.TARGET_TORQUE)
         # A command waits in the drive for the next SYNC, so it belongs to the cycle after the one it was sent in.
         latched = self._cycle + 1
         rows = self._rows(node, pdo, latched)
         if not len(rows):
             raise RecordError(f"{self._path} has no commands to {node.label}.", "Record the master's own frames too.")
+        self._refuse_lost_commands(node, latched[rows])
         last = np.searchsorted(latched[rows], np.arange(self._count), side="right") - 1
         values = self._values(rows, item, offset)
         return _scaled(values[np.maximum(last, 0)], node.torque_unit)
@@ -171,6 +182,16 @@ class _Decoder:
             raise RecordError(
                 f"{self._path}: {node.label} has no sample in {len(missing)} of {self._count} cycles (t = {times}"
                 f"{', ...' if len(missing) > 5 else ''}).",
+                "Drive the step again; look for frames lost on the bus.",
+            )
+
+    def _refuse_lost_commands(self, node: Node, latched: NDArray[np.int64]) -> None:
+        """A master that commands in every cycle does so in each; one that only sends changes is believed."""
+        silent = np.setdiff1d(np.arange(1, self._count), latched)
+        if 0 < len(silent) < _MOSTLY * self._count:
+            raise RecordError(
+                f"{self._path}: no command to {node.label} in {len(silent)} of {self._count} cycles "
+                f"(t = {silent[0] * self._network.cycle_period:.3f} s first), and one in all others.",
                 "Drive the step again; look for frames lost on the bus.",
             )
 

@@ -9,13 +9,7 @@ from typing import NamedTuple
 import can
 
 from hil.network import MappedObject, Network, Node, Pdo, PdoDirection
-
-STATUSWORD = 0x6041
-TORQUE_ACTUAL = 0x6077
-POSITION_ACTUAL = 0x6064
-ENCODER_POSITION = 0x6004
-CONTROLWORD = 0x6040
-TARGET_TORQUE = 0x6071
+from hil.network.cia import Index
 
 
 class FieldRef(NamedTuple):
@@ -70,8 +64,8 @@ class CommandFrames:
             for pdo, message in zip(receive, self.messages, strict=True)
             for item, offset in _offsets(pdo)
         }
-        self._torque = self._places[TARGET_TORQUE]
-        self._control = self._places[CONTROLWORD]
+        self._torque = self._places[Index.TARGET_TORQUE]
+        self._control = self._places[Index.CONTROLWORD]
         self._permille = 1.0 / node.torque_unit
         self.target = 0
 

@@ -9,19 +9,13 @@ from hil.master.errors import IdentityError, MissingNodeError, ModeError, UnitsE
 from hil.master.link import Link
 from hil.master.sdo import ObjectAccess
 from hil.network import Network, Node, Pdo
-
-CYCLIC_SYNCHRONOUS_TORQUE = 10
-_TORQUE_MODE_BIT = 1 << CYCLIC_SYNCHRONOUS_TORQUE - 1
-
-_NMT_RESET_NODE = 0x81
-_PDO_INVALID = 1 << 31
-_SYNC_COB_ID = 0x1005
+from hil.network.cia import CobId, Index, Mode, NmtCommand, Service
 
 _IDENTITY_OBJECTS = {
-    "device_type": (0x1000, 0),
-    "vendor_id": (0x1018, 1),
-    "product_code": (0x1018, 2),
-    "revision_number": (0x1018, 3),
+    "device_type": (Index.DEVICE_TYPE, 0),
+    "vendor_id": (Index.IDENTITY, 1),
+    "product_code": (Index.IDENTITY, 2),
+    "revision_number": (Index.IDENTITY, 3),
 }
 
 
@@ -35,16 +29,16 @@ def await_boot_up(link: Link, nodes: Iterable[Node], timeout: float) -> None:
 
     def booted(can_id: int, data: bytearray, _timestamp: float) -> None:
         if bytes(data) == b"\x00":
-            waiting.pop(can_id - 0x700, None)
+            waiting.pop(can_id - Service.HEARTBEAT, None)
 
     # What has been waiting in the interface may hold the boot-up message of an earlier start.
     link.drain()
-    heartbeats = [0x700 + node_id for node_id in waiting]
+    heartbeats = [Service.HEARTBEAT + node_id for node_id in waiting]
     for can_id in heartbeats:
         link.subscribe(can_id, booted)
     try:
         for node_id in tuple(waiting):
-            link.send_message(0, bytes((_NMT_RESET_NODE, node_id)))
+            link.send_message(0, bytes((NmtCommand.RESET_NODE, node_id)))
         link.pump(timeout, lambda: not waiting)
     finally:
         for can_id in heartbeats:
@@ -78,14 +72,13 @@ def check_drive(access: ObjectAccess) -> None:
         UnitsError: 6076h or 608Fh differ.
         ModeError: cyclic synchronous torque is not in 6502h.
     """
-    quantities = access.node.quantities
-    _compare(access, "rated torque in mNm", 0x6076, 0, quantities["rated_torque"].value * 1000.0)
-    increments = access.read(0x608F, 1) / max(access.read(0x608F, 2), 1)
-    if increments != quantities["counts_per_revolution"].value:
-        raise _units(
-            access.node, "counts per revolution", 0x608F, increments, quantities["counts_per_revolution"].value
-        )
-    if not access.read(0x6502) & _TORQUE_MODE_BIT:
+    rated = access.node.quantity("rated_torque") * 1000.0
+    _compare(access, "rated torque in mNm", Index.MOTOR_RATED_TORQUE, rated)
+    counts = access.node.quantities["counts_per_revolution"].value
+    increments = access.read(Index.ENCODER_RESOLUTION, 1) / max(access.read(Index.ENCODER_RESOLUTION, 2), 1)
+    if increments != counts:
+        raise _units(access.node, "counts per revolution", Index.ENCODER_RESOLUTION, increments, counts)
+    if not access.read(Index.SUPPORTED_DRIVE_MODES) & Mode.CYCLIC_SYNCHRONOUS_TORQUE.supported_bit:
         raise ModeError(
             f"{access.node.label} does not support cyclic synchronous torque (6502h bit 9 is 0).",
             "Update its firmware or use a drive that does.",
@@ -98,9 +91,9 @@ def check_encoder(access: ObjectAccess) -> None:
     Raises:
         UnitsError: 6001h or 6002h differ.
     """
-    quantities = access.node.quantities
-    _compare(access, "measuring units per revolution", 0x6001, 0, quantities["counts_per_revolution"].value)
-    _compare(access, "measuring range", 0x6002, 0, quantities["measuring_range"].value)
+    counts, span = (access.node.quantities[name].value for name in ("counts_per_revolution", "measuring_range"))
+    _compare(access, "measuring units per revolution", Index.MEASURING_UNITS_PER_REVOLUTION, counts)
+    _compare(access, "measuring range", Index.TOTAL_MEASURING_RANGE, span)
 
 
 def configure(access: ObjectAccess, network: Network) -> None:
@@ -110,8 +103,8 @@ def configure(access: ObjectAccess, network: Network) -> None:
         _configure_pdo(access, pdo)
     quantities = access.node.quantities
     timeout = round(quantities["heartbeat_timeout"].value * 1000.0)
-    access.write(0x1016, 1, network.master_id << 16 | timeout)
-    access.write(0x1017, 0, round(quantities["heartbeat_period"].value * 1000.0))
+    access.write(Index.CONSUMER_HEARTBEAT_TIME, 1, network.master_id << 16 | timeout)
+    access.write(Index.PRODUCER_HEARTBEAT_TIME, 0, round(quantities["heartbeat_period"].value * 1000.0))
 
 
 def select_mode(access: ObjectAccess) -> None:
@@ -120,26 +113,26 @@ def select_mode(access: ObjectAccess) -> None:
     Raises:
         ModeError: 6061h shows another mode.
     """
-    access.write(0x6060, 0, CYCLIC_SYNCHRONOUS_TORQUE)
-    mode = access.read(0x6061)
-    if mode != CYCLIC_SYNCHRONOUS_TORQUE:
+    access.write(Index.MODES_OF_OPERATION, 0, Mode.CYCLIC_SYNCHRONOUS_TORQUE)
+    mode = access.read(Index.MODES_OF_OPERATION_DISPLAY)
+    if mode != Mode.CYCLIC_SYNCHRONOUS_TORQUE:
         raise ModeError(
-            f"{access.node.label} stays in mode {mode} (6061h) instead of {CYCLIC_SYNCHRONOUS_TORQUE}.",
+            f"{access.node.label} stays in mode {mode} (6061h) instead of {Mode.CYCLIC_SYNCHRONOUS_TORQUE}.",
             "Look into the drive's manual for what keeps it there.",
         )
 
 
 def _name_sync(access: ObjectAccess, cob_id: int) -> None:
-    described = access.node.object_dictionary.get_variable(_SYNC_COB_ID)
+    described = access.node.object_dictionary.get_variable(Index.SYNC_COB_ID)
     if described is not None and described.default != cob_id:
-        access.write(_SYNC_COB_ID, 0, cob_id)
+        access.write(Index.SYNC_COB_ID, 0, cob_id)
 
 
 def _configure_pdo(access: ObjectAccess, pdo: Pdo) -> None:
     # CiA 301, 7.5.2.36: make it invalid, clear the count, map, set the count, make it valid.
-    flags = access.read(pdo.communication_index, 1) & 0x60000000
+    flags = access.read(pdo.communication_index, 1) & (CobId.NO_REMOTE | CobId.EXTENDED)
     cob_id = flags | pdo.cob_id(access.node.node_id)
-    access.write(pdo.communication_index, 1, cob_id | _PDO_INVALID)
+    access.write(pdo.communication_index, 1, cob_id | CobId.INVALID)
     access.write(pdo.communication_index, 2, pdo.transmission_type)
     access.write(pdo.mapping_index, 0, 0)
     for subindex, item in enumerate(pdo.objects, start=1):
@@ -148,8 +141,8 @@ def _configure_pdo(access: ObjectAccess, pdo: Pdo) -> None:
     access.write(pdo.communication_index, 1, cob_id)
 
 
-def _compare(access: ObjectAccess, what: str, index: int, subindex: int, expected: float) -> None:
-    found = access.read(index, subindex)
+def _compare(access: ObjectAccess, what: str, index: int, expected: float) -> None:
+    found = access.read(index)
     if not math.isclose(found, expected, rel_tol=1e-9, abs_tol=0.5):
         raise _units(access.node, what, index, found, expected)
 

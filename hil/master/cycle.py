@@ -10,12 +10,8 @@ from typing import NamedTuple
 
 import can
 
-from hil.clock import Clock
+from hil.bus.clock import Clock
 from hil.master.codec import (
-    ENCODER_POSITION,
-    POSITION_ACTUAL,
-    STATUSWORD,
-    TORQUE_ACTUAL,
     CommandFrames,
     Counter,
     CycleLayout,
@@ -23,6 +19,7 @@ from hil.master.codec import (
 from hil.master.errors import ConfigurationError, NodeLostError
 from hil.master.link import Link, is_data_frame
 from hil.network import Network
+from hil.network.cia import Index
 
 Fields = tuple[int, ...]
 
@@ -62,10 +59,10 @@ class Cycle:
         self._command_messages = [message for command in self.commands for message in command.messages]
         self._sync = can.Message(arbitration_id=network.sync_cob_id, is_extended_id=False, is_rx=False)
         field = self._layout.field
-        self._status = [field(node, STATUSWORD) for node in network.drives]
-        self._torque = [(*field(node, TORQUE_ACTUAL), node.torque_unit) for node in network.drives]
-        self._position = [(*field(node, POSITION_ACTUAL), Counter(node)) for node in network.drives]
-        self._encoder = [(*field(node, ENCODER_POSITION), Counter(node)) for node in network.encoders]
+        self._status = [field(node, Index.STATUSWORD) for node in network.drives]
+        self._torque = [(*field(node, Index.TORQUE_ACTUAL), node.torque_unit) for node in network.drives]
+        self._position = [(*field(node, Index.POSITION_ACTUAL), Counter(node)) for node in network.drives]
+        self._encoder = [(*field(node, Index.ENCODER_POSITION), Counter(node)) for node in network.encoders]
         self._origin: float | None = None
         self._number = 0
         self._shift = 0.0

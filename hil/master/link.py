@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 import can
 import canopen
 
-from hil.clock import Clock
+from hil.bus.clock import Clock
+from hil.network.cia import HIGHEST_CAN_ID
 from ident.errors import BusError
 
 Tap = Callable[[can.Message], None]
@@ -48,7 +49,9 @@ class Link(canopen.Network):
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         """Send a data frame; called by canopen's SDO and NMT services too."""
-        self.transmit(can.Message(arbitration_id=can_id, data=data, is_extended_id=can_id > 0x7FF, is_rx=False))
+        self.transmit(
+            can.Message(arbitration_id=can_id, data=data, is_extended_id=can_id > HIGHEST_CAN_ID, is_rx=False)
+        )
 
     def transmit(self, message: can.Message) -> None:
         """Send a frame and show it to the tap.

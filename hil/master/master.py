@@ -9,17 +9,15 @@ from typing import Self
 
 import can
 
-from hil.clock import Clock
+from hil.bus.clock import Clock
 from hil.master import commissioning
 from hil.master.cycle import Cycle, Sample
 from hil.master.drive_states import (
     ENABLED_MASK,
     ENABLED_PATTERN,
     POWERED,
-    QUICK_STOP,
     TO_OPERATION_ENABLED,
     TO_SWITCH_ON_DISABLED,
-    DriveState,
     decode_state,
 )
 from hil.master.errors import DriveStateError
@@ -27,10 +25,9 @@ from hil.master.link import Link, Tap
 from hil.master.sdo import ObjectAccess
 from hil.master.supervision import Supervision
 from hil.network import Network, Node
+from hil.network.cia import Controlword, DriveState, Index, NmtCommand
 from ident.errors import BusError
 
-_NMT_START = 0x01
-_NMT_PRE_OPERATIONAL = 0x80
 _RAMP_TIME = 0.1
 """Time in which an orderly end takes the torques to zero [s]."""
 _STOP_TIME = 2.0
@@ -104,7 +101,7 @@ class Master:
             commissioning.configure(self._access[node.node_id], self._network)
         for node in self._network.drives:
             commissioning.select_mode(self._access[node.node_id])
-        self._command_nmt(_NMT_START)
+        self._command_nmt(NmtCommand.START)
         self._cycle.resume()
         self._supervision.start(self._cycle.time)
         self._started = True
@@ -156,8 +153,8 @@ class Master:
         self.disable()
         for access in self._access.values():
             # The master's heartbeat ends now; the nodes must not take that for an accident.
-            access.write(0x1016, 1, 0)
-        self._command_nmt(_NMT_PRE_OPERATIONAL)
+            access.write(Index.CONSUMER_HEARTBEAT_TIME, 1, 0)
+        self._command_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
         self._started = False
 
     def emergency_stop(self) -> None:
@@ -166,7 +163,7 @@ class Master:
         """
         for command in self._cycle.commands:
             command.set_torque(0.0)
-            command.set_controlword(QUICK_STOP)
+            command.set_controlword(Controlword.QUICK_STOP)
         with self._link.record_may_fail(), self._cycle.watching():
             for _ in range(round(_STOP_TIME / self._network.cycle_period)):
                 # A frame that the interface refuses now may pass a cycle later.
@@ -177,7 +174,7 @@ class Master:
                 if not POWERED.intersection(self.drive_states):
                     break
             with contextlib.suppress(BusError):
-                self._command_nmt(_NMT_PRE_OPERATIONAL)
+                self._command_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
         self._started = self._enabled = False
 
     def __enter__(self) -> Self:
@@ -236,6 +233,6 @@ class Master:
     def _error_code(self, node: Node) -> str:
         """What 603Fh holds; a drive that does not tell must not hide the state that it is in."""
         try:
-            return f"= {self._access[node.node_id].read(0x603F):04X}h"
+            return f"= {self._access[node.node_id].read(Index.ERROR_CODE):04X}h"
         except BusError:
             return "cannot be read"

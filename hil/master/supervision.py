@@ -7,6 +7,7 @@ import struct
 from hil.master.errors import NodeLostError
 from hil.master.link import Link
 from hil.network import Network, Node
+from hil.network.cia import NMT_STATE, Service
 
 _OPERATIONAL = 5
 _LOST_AFTER = 3
@@ -23,7 +24,7 @@ class Supervision:
 
     def __init__(self, link: Link, network: Network) -> None:
         self._link = link
-        self._heartbeat_id = 0x700 + network.master_id
+        self._heartbeat_id = Service.HEARTBEAT + network.master_id
         self._period = network.times["heartbeat_period"]
         self._nodes = {node.node_id: node for node in network.nodes}
         self._next_beat = float("-inf")
@@ -32,8 +33,8 @@ class Supervision:
         self._states: dict[int, int] = {}
         self._emergencies: dict[int, tuple[int, int]] = {}
         for node_id in self._nodes:
-            link.subscribe(0x700 + node_id, self._on_heartbeat)
-            link.subscribe(0x80 + node_id, self._on_emergency)
+            link.subscribe(Service.HEARTBEAT + node_id, self._on_heartbeat)
+            link.subscribe(Service.EMERGENCY + node_id, self._on_emergency)
 
     def start(self, now: float) -> None:
         """The nodes are operational from `now` [s] on."""
@@ -77,10 +78,10 @@ class Supervision:
             )
 
     def _on_heartbeat(self, can_id: int, data: bytearray, _timestamp: float) -> None:
-        self._heard[can_id - 0x700] = self._now
+        self._heard[can_id - Service.HEARTBEAT] = self._now
         if data:
-            self._states[can_id - 0x700] = data[0] & 0x7F
+            self._states[can_id - Service.HEARTBEAT] = data[0] & NMT_STATE
 
     def _on_emergency(self, can_id: int, data: bytearray, _timestamp: float) -> None:
         if len(data) >= 3:
-            self._emergencies[can_id - 0x80] = struct.unpack_from("<HB", data)
+            self._emergencies[can_id - Service.EMERGENCY] = struct.unpack_from("<HB", data)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+from hil.network.cia import Service
 from hil.network.description import Network, Node, Role
 from ident.errors import DataFileError
 
@@ -14,7 +15,12 @@ SHORTEST_TIME: Final = 0.001
 LONGEST_TIME: Final = 65.535
 """Range of the heartbeat objects 1016h and 1017h [s]: whole milliseconds in 16 bits."""
 
-_SERVICES: Final = {"EMCY": 0x80, "SDO response": 0x580, "SDO request": 0x600, "heartbeat": 0x700}
+_SERVICES: Final = {
+    "EMCY": Service.EMERGENCY,
+    "SDO response": Service.SDO_ANSWER,
+    "SDO request": Service.SDO_REQUEST,
+    "heartbeat": Service.HEARTBEAT,
+}
 """Identifiers of a node besides its PDOs (CiA 301, predefined connection set)."""
 
 
@@ -67,7 +73,7 @@ def check_network(network: Network) -> None:
 def _identifiers(network: Network) -> Iterator[tuple[int, str]]:
     yield 0, "NMT"
     yield network.sync_cob_id, "the SYNC"
-    yield 0x700 + network.master_id, "the heartbeat of the master"
+    yield Service.HEARTBEAT + network.master_id, "the heartbeat of the master"
     for node in network.nodes:
         yield from ((base + node.node_id, f"{name} of {node.label}") for name, base in _SERVICES.items())
         yield from ((pdo.cob_id(node.node_id), f"a {pdo.direction} PDO of {node.label}") for pdo in node.pdos)

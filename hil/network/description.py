@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
 import canopen
 
-from hil.buses.bit_length import longest_frame_bits
+from hil.bus.bit_length import longest_frame_bits
+from hil.network.cia import PDO_MAPPING, PDO_SPACING, Index, Service
+from ident.errors import DataFileError
 from ident.vehicle.quantities import Quantity
 
 
@@ -79,22 +81,30 @@ class Pdo:
     @property
     def communication_index(self) -> int:
         """Index of the communication parameter (1400h.. or 1800h..)."""
-        return (0x1400 if self.direction is PdoDirection.RECEIVE else 0x1800) + self.number - 1
+        return (
+            (Index.RPDO_COMMUNICATION if self.direction is PdoDirection.RECEIVE else Index.TPDO_COMMUNICATION)
+            + self.number
+            - 1
+        )
 
     @property
     def mapping_index(self) -> int:
         """Index of the mapping parameter (1600h.. or 1A00h..)."""
-        return self.communication_index + 0x200
+        return self.communication_index + PDO_MAPPING
 
     def cob_id(self, node_id: int) -> int:
         """COB-ID of the predefined connection set (CiA 301, table 38)."""
-        base = 0x200 if self.direction is PdoDirection.RECEIVE else 0x180
-        return base + 0x100 * (self.number - 1) + node_id
+        base = Service.RPDO_1 if self.direction is PdoDirection.RECEIVE else Service.TPDO_1
+        return base + PDO_SPACING * (self.number - 1) + node_id
 
 
 @dataclass(frozen=True)
 class Node:
-    """One node: address, expected identity, mounting and PDO layout. SI units, counts where it says so."""
+    """One node: address, expected identity, mounting and PDO layout. SI units, counts where it says so.
+
+    `device` is the name of its table in the network file. Of the quantities of a drive, those that the vehicle file
+    owns may be missing until `Network.completed` has added them.
+    """
 
     node_id: int
     role: Role
@@ -105,6 +115,7 @@ class Node:
     zero_counts: int
     quantities: Mapping[str, Quantity]
     pdos: tuple[Pdo, ...]
+    device: str = ""
 
     @property
     def label(self) -> str:
@@ -112,14 +123,32 @@ class Node:
         return f"node {self.node_id} ({self.role})"
 
     @property
+    def is_drive(self) -> bool:
+        """A wheel drive, and no encoder."""
+        return self.role in DRIVES
+
+    def quantity(self, name: str) -> float:
+        """A number of its device, SI.
+
+        Raises:
+            DataFileError: the network file leaves it to the vehicle file, and was read without one.
+        """
+        if name not in self.quantities:
+            raise DataFileError(
+                f"The network file does not give {name} of {self.label}: the vehicle file owns it.",
+                "Name the vehicle file too (--vehicle), or write the same number into the network file.",
+            )
+        return self.quantities[name].value
+
+    @property
     def torque_unit(self) -> float:
         """Motor torque, vehicle sign, of one per mille of 6076h [Nm]."""
-        return self.rotation * self.quantities["rated_torque"].value / 1000.0
+        return self.rotation * self.quantity("rated_torque") / 1000.0
 
     @property
     def angle_unit(self) -> float:
         """Wheel or steering angle, vehicle sign, of one count [rad]."""
-        counts = self.quantities["counts_per_revolution"].value * self.quantities["gear_ratio"].value
+        counts = self.quantity("counts_per_revolution") * self.quantity("gear_ratio")
         return self.rotation * 2.0 * math.pi / counts
 
     @property
@@ -151,6 +180,17 @@ class Network:
                 length = sum(item.bits for item in pdo.objects) // 8
                 bits += longest_frame_bits(length) / pdo.transmission_type
         return bits / (self.bit_rate * self.cycle_period)
+
+    def completed(self, gear_ratio: float, rated_torque: float, source: str) -> Network:
+        """With what the vehicle file owns [-, Nm] where the network file leaves it out; `source` names the file."""
+        owned = {
+            "gear_ratio": Quantity(gear_ratio, "1", source),
+            "rated_torque": Quantity(rated_torque, "Nm", source),
+        }
+        nodes = (
+            replace(node, quantities={**owned, **node.quantities}) if node.is_drive else node for node in self.nodes
+        )
+        return replace(self, nodes=tuple(nodes))
 
     def node(self, role: Role) -> Node:
         """The node with this role."""

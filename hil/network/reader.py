@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import configparser
 import io
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -11,9 +13,11 @@ from typing import Any
 import canopen
 
 from hil.network.checks import check_complete, check_network, check_positive
+from hil.network.cia import HIGHEST_CAN_ID, DataType, Index
 from hil.network.description import DRIVES, Identity, MappedObject, Network, Node, Pdo, PdoDirection, Role
 from ident.errors import DataFileError
-from ident.vehicle.quantities import Quantity, read_quantities, read_toml, require_table
+from ident.reading import PARSER_ERRORS, read_text
+from ident.vehicle.quantities import Quantity, read_quantities, read_toml, refuse_unknown, require_table
 
 DEFAULT_NETWORK = Path(__file__).parent.parent / "data" / "network.toml"
 
@@ -29,14 +33,43 @@ _BUS_UNITS = {"bit_rate": "bit/s", "cycle_period": "s"}
 _MASTER_UNITS = dict.fromkeys(
     ("heartbeat_period", "boot_timeout", "sdo_timeout", "sample_timeout", "state_timeout"), "s"
 )
+_OF_THE_VEHICLE = ("gear_ratio", "rated_torque")
+"""Quantities of a device that the vehicle file owns: a network file may leave them out."""
+
+_KEYS = {
+    "file": ("name", "description", "bus", "master", "devices", "nodes"),
+    "master": ("node_id", "sync_cob_id", "times"),
+    "device": ("eds", "identity", "quantities", "pdos"),
+    "pdo": ("direction", "number", "transmission_type", "objects"),
+    "object": ("name", "index", "subindex"),
+    "node": ("id", "role", "device", "rotation", "zero_counts"),
+}
+"""What each level of a network file may hold."""
+
 _NEEDED = {
-    PdoDirection.RECEIVE: {True: (0x6040, 0x6071), False: ()},
-    PdoDirection.TRANSMIT: {True: (0x6041, 0x6077, 0x6064), False: (0x6004,)},
+    PdoDirection.RECEIVE: {True: (Index.CONTROLWORD, Index.TARGET_TORQUE), False: ()},
+    PdoDirection.TRANSMIT: {
+        True: (Index.STATUSWORD, Index.TORQUE_ACTUAL, Index.POSITION_ACTUAL),
+        False: (Index.ENCODER_POSITION,),
+    },
 }
 """Objects that the cyclic path needs: direction -> is it a drive -> indices."""
 
-_STRUCT_CODES = {0x02: "b", 0x03: "h", 0x04: "i", 0x05: "B", 0x06: "H", 0x07: "I", 0x15: "q", 0x1B: "Q"}
+_STRUCT_CODES: Mapping[int, str] = {
+    DataType.INTEGER8: "b",
+    DataType.INTEGER16: "h",
+    DataType.INTEGER32: "i",
+    DataType.UNSIGNED8: "B",
+    DataType.UNSIGNED16: "H",
+    DataType.UNSIGNED32: "I",
+    DataType.INTEGER64: "q",
+    DataType.UNSIGNED64: "Q",
+}
 """CiA 301 data types that a PDO of ours may carry -> `struct` code."""
+
+
+_ENTRIES = re.compile(r"^\s*NrOfEntries\s*=\s*(\d+)", re.IGNORECASE | re.MULTILINE)
+_SUBINDICES = 254
 
 
 def load_network(path: Path = DEFAULT_NETWORK) -> Network:
@@ -47,11 +80,14 @@ def load_network(path: Path = DEFAULT_NETWORK) -> Network:
             cannot be.
     """
     document = read_toml(path)
+    refuse_unknown(document, _KEYS["file"], f"{path}:")
     bus = _read_positive(document, "bus", _BUS_UNITS, path, f"{path}: bus")
     master = require_table(document, "master", path)
+    refuse_unknown(master, _KEYS["master"], f"{path}: master")
     times = _read_positive(master, "times", _MASTER_UNITS, path, f"{path}: master.times")
     devices = require_table(document, "devices", path)
-    nodes = tuple(_read_node(entry, devices, path) for entry in document.get("nodes", ()))
+    _check_devices(devices, path)
+    nodes = tuple(_read_node(entry, devices, path) for entry in _tables(document, "nodes", f"{path}:"))
     check_complete(nodes, path)
     network = Network(
         name=str(document.get("name", path.stem)),
@@ -59,7 +95,7 @@ def load_network(path: Path = DEFAULT_NETWORK) -> Network:
         bit_rate=bus["bit_rate"].value,
         cycle_period=bus["cycle_period"].value,
         master_id=_read_integer(master, "node_id", 1, 127, f"{path}: master"),
-        sync_cob_id=_read_integer(master, "sync_cob_id", 1, 0x7FF, f"{path}: master"),
+        sync_cob_id=_read_integer(master, "sync_cob_id", 1, HIGHEST_CAN_ID, f"{path}: master"),
         times={name: quantity.value for name, quantity in times.items()},
         nodes=nodes,
     )
@@ -67,10 +103,34 @@ def load_network(path: Path = DEFAULT_NETWORK) -> Network:
     return network
 
 
+def _check_devices(devices: Mapping[str, Any], path: Path) -> None:
+    """Refuse keys that nobody reads, in devices that no node uses too."""
+    for name in devices:
+        device, where = require_table(devices, name, path), f"{path}: devices.{name}"
+        refuse_unknown(device, _KEYS["device"], where)
+        for pdo in _tables(device, "pdos", where):
+            refuse_unknown(pdo, _KEYS["pdo"], f"{where}.pdos")
+            for item in _tables(pdo, "objects", f"{where}.pdos"):
+                refuse_unknown(item, _KEYS["object"], f"{where}.pdos.objects")
+
+
+def _tables(parent: Mapping[str, Any], name: str, where: str) -> Sequence[Mapping[str, Any]]:
+    """The array of tables of that name, empty where there is none."""
+    found = parent.get(name, ())
+    if not isinstance(found, Sequence) or not all(isinstance(entry, Mapping) for entry in found):
+        raise DataFileError(f"{where} {name} is no array of tables.", f"Write [[{name}]] ahead of each entry.")
+    return found
+
+
 def _read_positive(
-    parent: Mapping[str, Any], name: str, units: Mapping[str, str], path: Path, where: str
+    parent: Mapping[str, Any],
+    name: str,
+    units: Mapping[str, str],
+    path: Path,
+    where: str,
+    optional: Iterable[str] = (),
 ) -> dict[str, Quantity]:
-    quantities = read_quantities(require_table(parent, name, path), units, where)
+    quantities = read_quantities(require_table(parent, name, path), units, where, optional=optional)
     check_positive({key: quantity.value for key, quantity in quantities.items()}, where)
     return quantities
 
@@ -84,6 +144,7 @@ def _read_integer(table: Mapping[str, Any], name: str, low: int, high: int, wher
 
 def _read_node(entry: Mapping[str, Any], devices: Mapping[str, Any], path: Path) -> Node:
     where = f"{path}: node {entry.get('id')}"
+    refuse_unknown(entry, _KEYS["node"], where)
     try:
         role = Role(entry.get("role", ""))
     except ValueError as error:
@@ -91,11 +152,11 @@ def _read_node(entry: Mapping[str, Any], devices: Mapping[str, Any], path: Path)
     device = require_table(devices, str(entry.get("device")), path)
     node_id = _read_integer(entry, "id", 1, 127, where)
     eds = path.parent / str(device.get("eds"))
-    dictionary = _read_eds(eds, node_id)
+    dictionary = read_eds(eds, node_id)
     rotation = _read_integer(entry, "rotation", -1, 1, where)
     if rotation == 0:
         raise DataFileError(f"{where}: rotation is 0.", "Give +1 or -1.")
-    units = _DRIVE_UNITS if role in DRIVES else _ENCODER_UNITS
+    units, left_out = (_DRIVE_UNITS, _OF_THE_VEHICLE) if role in DRIVES else (_ENCODER_UNITS, ())
     pdos = tuple(_read_pdo(pdo, dictionary, where) for pdo in device.get("pdos", ()))
     _check_needed(pdos, role, where)
     return Node(
@@ -106,31 +167,43 @@ def _read_node(entry: Mapping[str, Any], devices: Mapping[str, Any], path: Path)
         identity=_read_identity(device, where),
         rotation=rotation,
         zero_counts=_read_integer(entry, "zero_counts", -(2**31), 2**32 - 1, where),
-        quantities=_read_positive(device, "quantities", units, path, where),
+        quantities=_read_positive(device, "quantities", units, path, where, left_out),
+        device=str(entry["device"]),
         pdos=pdos,
     )
 
 
-def _read_eds(path: Path, node_id: int) -> canopen.ObjectDictionary:
+def read_eds(path: Path, node_id: int) -> canopen.ObjectDictionary:
+    """The object dictionary of an EDS file.
+
+    Raises:
+        DataFileError: it cannot be read, or is none.
+    """
+    content = read_text(path)
     try:
-        return _parse(path.suffix, path.read_bytes(), node_id)
-    except OSError as error:
-        raise DataFileError(f"{path} cannot be read: {error}.", "Name an existing EDS file.") from error
-    except (ValueError, KeyError) as error:
+        return _parse(path.suffix, content, node_id)
+    except (configparser.Error, *PARSER_ERRORS) as error:
         raise DataFileError(f"{path} is not an EDS file: {error}.", "Check it with an EDS editor.") from error
 
 
 @lru_cache(maxsize=64)
-def _parse(suffix: str, content: bytes, node_id: int) -> canopen.ObjectDictionary:
+def _parse(suffix: str, content: str, node_id: int) -> canopen.ObjectDictionary:
     # Parsing takes longer than all the rest of a network file; the result is only read, and new content is parsed anew.
-    file = io.StringIO(content.decode(), newline=None)
+    for number in _ENTRIES.findall(content):
+        # canopen makes as many subindices as are asked for, and there are no more than these.
+        if int(number) > _SUBINDICES:
+            raise ValueError(f"NrOfEntries is {number}")
+    file = io.StringIO(content, newline=None)
     file.name = f"dictionary{suffix}"
     return canopen.import_od(file, node_id=node_id)
 
 
 def _read_identity(device: Mapping[str, Any], where: str) -> Identity:
-    table = device.get("identity", {})
+    table = device.get("identity")
+    if not isinstance(table, Mapping):
+        raise DataFileError(f"{where}: its device has no identity.", "Write identity = { device_type = ..., ... }.")
     names = Identity.__dataclass_fields__
+    refuse_unknown(table, names, f"{where}, identity")
     return Identity(**{name: _read_integer(table, name, 0, 2**32 - 1, f"{where}, identity") for name in names})
 
 
@@ -151,17 +224,18 @@ def _read_pdo(entry: Mapping[str, Any], dictionary: canopen.ObjectDictionary, wh
 
 
 def _read_object(item: Mapping[str, Any], dictionary: canopen.ObjectDictionary, where: str) -> MappedObject:
-    index = _read_integer(item, "index", 0x1000, 0xFFFF, f"{where}, PDO object {item.get('name')!r}")
+    index = _read_integer(item, "index", Index.DEVICE_TYPE, 0xFFFF, f"{where}, PDO object {item.get('name')!r}")
     subindex = _read_integer({"subindex": 0, **item}, "subindex", 0, 0xFF, f"{where}, {index:04X}h")
     variable = dictionary.get_variable(index, subindex)
-    if variable is None or variable.data_type not in _STRUCT_CODES or not variable.pdo_mappable:
+    code = None if variable is None else _STRUCT_CODES.get(variable.data_type or 0)
+    if variable is None or code is None or not variable.pdo_mappable:
         raise DataFileError(f"{where}: {index:04X}h:{subindex} cannot be mapped.", "Choose from the EDS file.")
     if variable.name != item.get("name"):
         raise DataFileError(
             f"{where}: {index:04X}h:{subindex} is {variable.name!r} in the EDS file, not {item.get('name')!r}.",
             "Make name and index agree.",
         )
-    return MappedObject(variable.name, index, subindex, _STRUCT_CODES[variable.data_type], len(variable))
+    return MappedObject(variable.name, index, subindex, code, len(variable))
 
 
 def _check_needed(pdos: Sequence[Pdo], role: Role, where: str) -> None:

@@ -10,12 +10,12 @@ from typing import Final
 
 import can
 
-from hil.master.drive_states import DriveState
 from hil.network import DRIVES, Role
+from hil.network.cia import NMT_STATE, DriveState, NmtState, Service
 from hil.pytest_plugin.world import World
 from ident.errors import UserError
 
-_NMT_STATES: Final = {0: "boot-up", 4: "stopped", 5: "operational", 127: "pre-operational"}
+_NMT_STATES: Final = {int(state): state.name.lower().replace("_", "-") for state in NmtState}
 _ANY_ERROR: Final = 0xFFFF
 _STANDSTILL: Final = 0.002
 """Speed that counts as rest [m/s]: the wheels' dry friction holds the vehicle below it."""
@@ -67,7 +67,7 @@ def emergency(role: str, code: int = _ANY_ERROR) -> Condition:
     wanted = _role(role, list(Role))
 
     def codes(world: World, since: int) -> list[int]:
-        can_id = 0x80 + world.network.node(wanted).node_id
+        can_id = Service.EMERGENCY + world.network.node(wanted).node_id
         seen = [message.data for message in world.frames[since:] if message.arbitration_id == can_id]
         return [int(struct.unpack_from("<H", data)[0]) for data in seen if len(data) == 8]
 
@@ -89,9 +89,9 @@ def heartbeat_state(role: str, state: str) -> Condition:
         raise UserError(f"There is no NMT state {state!r}.", f"Use one of {', '.join(_NMT_STATES.values())}.")
 
     def states(world: World, since: int) -> list[str]:
-        can_id = 0x700 + world.network.node(wanted).node_id
+        can_id = Service.HEARTBEAT + world.network.node(wanted).node_id
         seen = [message.data for message in world.frames[since:] if message.arbitration_id == can_id]
-        return [_NMT_STATES.get(data[0] & 0x7F, "unknown") for data in seen if data]
+        return [_NMT_STATES.get(data[0] & NMT_STATE, "unknown") for data in seen if data]
 
     return Condition(
         f"{role} to say that it is {state}",

@@ -11,12 +11,11 @@ from typing import Final
 import can
 
 from hil.network import Network
+from hil.network.cia import FUNCTION_CODE, NMT_STATE, NODE_ID, SDO_ABORT, ErrorCode, NmtState, Service
 from ident.errors import UserError
 
-_HEARTBEAT_LOST: Final = 0x8130
 _LOST_AFTER: Final = 3.0
 """Heartbeat periods of silence after which a node counts as lost."""
-_ABORT: Final = 0x80
 
 
 class Symptom(StrEnum):
@@ -74,14 +73,14 @@ def _unanswered(frames: Sequence[can.Message], network: Network) -> list[Finding
     open_requests: dict[int, can.Message] = {}
     nodes = {node.node_id: node for node in network.nodes}
     for frame in frames:
-        service, node_id = frame.arbitration_id & 0x780, frame.arbitration_id & 0x7F
+        service, node_id = frame.arbitration_id & FUNCTION_CODE, frame.arbitration_id & NODE_ID
         if node_id not in nodes or not frame.data:
             continue
-        if service == 0x600 and frame.data[0] != _ABORT:
+        if service == Service.SDO_REQUEST and frame.data[0] != SDO_ABORT:
             open_requests[node_id] = frame
-        elif service == 0x580:
+        elif service == Service.SDO_ANSWER:
             open_requests.pop(node_id, None)
-            if frame.data[0] == _ABORT:
+            if frame.data[0] == SDO_ABORT:
                 findings.append(Finding(Symptom.SDO_ABORT, _abort_text(nodes[node_id].label, frame)))
     for node_id, request in open_requests.items():
         what = f"{nodes[node_id].label} did not answer the SDO request {bytes(request.data).hex(' ')}"
@@ -98,13 +97,21 @@ def _lost(frames: Sequence[can.Message], network: Network, end: float) -> list[F
     """Nodes that have sent a heartbeat of *operational* and then fell silent, and nodes that miss one (8130h)."""
     findings = []
     for node in network.nodes:
-        beats = [frame for frame in frames if frame.arbitration_id == 0x700 + node.node_id and frame.data]
+        beats = [frame for frame in frames if frame.arbitration_id == Service.HEARTBEAT + node.node_id and frame.data]
         silence = _LOST_AFTER * node.quantities["heartbeat_period"].value
-        if len(beats) > 1 and beats[-1].data[0] & 0x7F == 5 and end - beats[-1].timestamp > silence:
+        if (
+            len(beats) > 1
+            and beats[-1].data[0] & NMT_STATE == NmtState.OPERATIONAL
+            and end - beats[-1].timestamp > silence
+        ):
             what = f"{node.label} sent its last heartbeat at t = {beats[-1].timestamp:.3f} s, {end:.3f} s is the end"
             findings.append(Finding(Symptom.LOST_HEARTBEAT, what))
-        emergencies = [frame for frame in frames if frame.arbitration_id == 0x80 + node.node_id and len(frame.data) > 1]
-        missed = [one for one in emergencies if struct.unpack_from("<H", one.data)[0] == _HEARTBEAT_LOST]
+        emergencies = [
+            frame
+            for frame in frames
+            if frame.arbitration_id == Service.EMERGENCY + node.node_id and len(frame.data) > 1
+        ]
+        missed = [one for one in emergencies if struct.unpack_from("<H", one.data)[0] == ErrorCode.HEARTBEAT]
         findings += [
             Finding(Symptom.LOST_HEARTBEAT, f"{node.label} misses a heartbeat (8130h) at t = {one.timestamp:.3f} s")
             for one in missed

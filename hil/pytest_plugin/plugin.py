@@ -6,7 +6,7 @@ Loaded by pytest in every project, it imports nothing heavy before a test asks f
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     import can
 
     from emulator.vehicle import EmulatedVehicle
-    from hil.clock import SimulatedClock
+    from hil.bench.prototypes import Emulated
+    from hil.bus.clock import SimulatedClock
     from hil.faults import FaultInjector
     from hil.pytest_plugin.expectations import Expect
     from hil.pytest_plugin.health import Symptom
@@ -67,30 +68,27 @@ def pytest_runtest_makereport(
 @pytest.fixture
 def vehicle(request: pytest.FixtureRequest) -> Iterator[EmulatedVehicle]:
     """An emulated vehicle on the floor, at rest; the marker `hil` says which."""
-    from emulator.prototype import load_prototype
     from emulator.vehicle import EmulatedVehicle
 
     asked = _asked(request)
-    prototype = load_prototype(str(asked["prototype"]))
-    with EmulatedVehicle(prototype, seed=int(asked["seed"]), noise_scale=float(asked["noise"])) as emulated:
+    with EmulatedVehicle(
+        _emulated(asked).prototype, seed=int(asked["seed"]), noise_scale=float(asked["noise"])
+    ) as emulated:
         yield emulated
 
 
 @pytest.fixture
 def bench(request: pytest.FixtureRequest, vehicle: EmulatedVehicle) -> Iterator[World]:
     """The vehicle behind a bus in lockstep; at the end the bus has to be well, see the fixture `allow`."""
-    from emulator.ground import Ground
-    from hil.bench import LockstepBench
-    from hil.campaign.folder import network_file_of
-    from hil.network import load_network
+    from hil.bench.lockstep import LockstepBench
     from hil.pytest_plugin.recording import Artifacts
     from hil.pytest_plugin.world import World
 
     asked = _asked(request)
     seed, delays = int(asked["seed"]), bool(asked["delays"])
-    network = Path(asked["network"] or network_file_of(str(asked["prototype"])))
-    with LockstepBench(vehicle, network, ground=Ground(vehicle.engine), seed=seed, delays=delays) as lockstep:
-        world = World(lockstep, vehicle, load_network(network))
+    network = _emulated(asked).network
+    with LockstepBench(vehicle, network.path, ground=vehicle, seed=seed, delays=delays) as lockstep:
+        world = World(lockstep, vehicle, network)
         request.node.stash[_WORLD] = world
         folder = Path(request.config.getoption("--hil-artifacts"))
         request.node.stash[_ARTIFACTS] = Artifacts(folder / _file_name(request.node.nodeid), request.node.nodeid)
@@ -146,6 +144,15 @@ def _asked(request: pytest.FixtureRequest) -> dict[str, Any]:
     for wrong in [*map(repr, marker.args if marker else ()), *(name for name in given if name not in _CHOICES)]:
         raise UserError(f"The marker hil takes no {wrong}.", f"Use NAME=VALUE with one of {', '.join(_CHOICES)}.")
     return {**_CHOICES, **given}
+
+
+def _emulated(asked: Mapping[str, Any]) -> Emulated:
+    """The prototype and the network that were asked for; they agree."""
+    from hil.bench.prototypes import load_emulated
+    from hil.campaign.folder import network_file_of
+
+    prototype = str(asked["prototype"])
+    return load_emulated(prototype, Path(asked["network"] or network_file_of(prototype)))
 
 
 def _file_name(node_id: str) -> str:

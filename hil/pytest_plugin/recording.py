@@ -10,6 +10,7 @@ import can
 from hil.pytest_plugin.timeline import timeline
 from hil.pytest_plugin.world import World
 from ident.errors import UserError
+from ident.writing import write_by, write_whole
 
 
 class Artifacts:
@@ -32,14 +33,15 @@ class Artifacts:
         """
         recording = self._path.with_name(f"{self._path.name}.blf")
         picture = self._path.with_name(f"{self._path.name}.svg")
-        try:
-            recording.parent.mkdir(parents=True, exist_ok=True)
-            with can.BLFWriter(recording) as writer:
+
+        def write_frames(path: Path) -> None:
+            with can.BLFWriter(path) as writer:
                 for frame in world.frames:
                     writer.on_message_received(frame)
-            picture.write_text(timeline(world, self._title), encoding="utf-8")
-        except OSError as error:
-            raise UserError(
-                f"{recording.parent} cannot be written to: {error.strerror}.", "Name another folder: --hil-artifacts."
-            ) from error
+
+        try:
+            write_by(write_frames, recording)
+            write_whole(timeline(world, self._title), picture)
+        except UserError as error:
+            raise UserError(error.what, "Name another folder: --hil-artifacts.") from error
         return {"recording": recording, "timeline": picture}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
@@ -12,9 +12,9 @@ from typing import Final
 
 import can
 
-from hil.buses.bit_length import ERROR_FRAME_BITS, frame_bits
-from hil.master.drive_states import DriveState
+from hil.bus.bit_length import ERROR_FRAME_BITS, frame_bits
 from hil.network import DRIVES
+from hil.network.cia import NMT_STATE, DriveState, NmtState, Service
 from hil.pytest_plugin.world import Sample, World
 
 _WIDTH, _LEFT, _RIGHT, _ROW, _CURVE = 1000, 130, 20, 22, 90
@@ -34,11 +34,11 @@ _STATE_COLOURS: Final = {
     DriveState.FAULT_REACTION_ACTIVE: "#d9734e",
     DriveState.FAULT: "#c0392b",
 }
-_NMT: Final = {
-    0: ("boot-up", "#8e7cc3"),
-    4: ("stopped", "#d9734e"),
-    5: ("operational", "#7fa8d1"),
-    127: ("pre-operational", "#d3dfec"),
+_NMT: Final[Mapping[int, tuple[str, str]]] = {
+    NmtState.BOOT_UP: ("boot-up", "#8e7cc3"),
+    NmtState.STOPPED: ("stopped", "#d9734e"),
+    NmtState.OPERATIONAL: ("operational", "#7fa8d1"),
+    NmtState.PRE_OPERATIONAL: ("pre-operational", "#d3dfec"),
 }
 _FAULT_COLOUR, _EMERGENCY_COLOUR, _NOTE_COLOUR, _FAILED_COLOUR = "#b04a8f", "#c0392b", "#666666", "#c0392b"
 _STYLE: Final = "text{font:11px sans-serif;fill:#222}.t{font-size:13px;font-weight:bold}.s{font-size:9px}"
@@ -95,14 +95,16 @@ def _drive_rows(world: World, axis: _Axis) -> Iterator[str]:
 
 def _node_rows(world: World, axis: _Axis) -> Iterator[str]:
     for node in world.network.nodes:
-        beats = [frame for frame in world.frames if frame.arbitration_id == 0x700 + node.node_id and frame.data]
-        points = [(frame.timestamp, _NMT.get(frame.data[0] & 0x7F, ("?", "#ffffff"))) for frame in beats]
+        beats = [
+            frame for frame in world.frames if frame.arbitration_id == Service.HEARTBEAT + node.node_id and frame.data
+        ]
+        points = [(frame.timestamp, _NMT.get(frame.data[0] & NMT_STATE, ("?", "#ffffff"))) for frame in beats]
         yield _label(f"NMT {node.node_id}") + _bars(points, axis) + "".join(_emergencies(world, node.node_id, axis))
 
 
 def _emergencies(world: World, node_id: int, axis: _Axis) -> Iterator[str]:
     for frame in world.frames:
-        if frame.arbitration_id == 0x80 + node_id and len(frame.data) == 8:
+        if frame.arbitration_id == Service.EMERGENCY + node_id and len(frame.data) == 8:
             x, code = axis.x(frame.timestamp), struct.unpack_from("<H", frame.data)[0]
             yield f'<path d="M{x} 2l5 16h-10z" fill="{_EMERGENCY_COLOUR}"/>' + _text(x + 6, 14, f"{code:04X}h", "s")
 

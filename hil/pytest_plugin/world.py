@@ -11,15 +11,15 @@ from typing import Final
 import can
 
 from emulator.vehicle import EmulatedVehicle, GroundTruth
-from hil.bench import LockstepBench
-from hil.clock import SimulatedClock
+from hil.bench.lockstep import LockstepBench
+from hil.bus.clock import SimulatedClock
 from hil.faults import FaultInjector
 from hil.faults.injector import Injected
-from hil.master.drive_states import DriveState, decode_state
+from hil.master.drive_states import decode_state
 from hil.network import DRIVES, Network, Role
+from hil.network.cia import DriveState, Index
 from ident.errors import UserError
 
-_STATUSWORD: Final = 0x6041
 _SAMPLE_PERIOD: Final = 0.01
 _IDLE_STEP: Final = 0.001
 _STUCK: Final = 1000
@@ -148,7 +148,7 @@ class World:
     def statusword(self, role: Role) -> int:
         """6041h of a drive, from its object dictionary: whatever is mapped into its PDOs."""
         node = self._bench.devices.nodes[self.network.node(role).node_id]
-        return node.object_dictionary.value(_STATUSWORD)
+        return node.object_dictionary.value(Index.STATUSWORD)
 
     def drive_state(self, role: Role) -> DriveState | None:
         """State of a drive; None for a pattern that CiA 402 does not know."""

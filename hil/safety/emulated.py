@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
-from hil.bench import LockstepBench
-from hil.network import load_network
+from hil.bench.lockstep import LockstepBench
+from hil.bench.prototypes import load_emulated
 from hil.safety.report import MasterDeathReport, evaluate
 from hil.safety.trial import DeathOfMaster, StopSettings
 
@@ -33,7 +32,8 @@ def let_master_die(prototype: str, network: Path, settings: StopSettings, seed: 
         DataFileError: prototype or network file is missing or malformed.
         TrialError: the speed is not reached.
     """
-    loaded, described = load_prototype(prototype), load_network(network)
+    emulated = load_emulated(prototype, network)
+    loaded, described = emulated.prototype, emulated.network
     with EmulatedVehicle(loaded, seed=seed) as vehicle, LockstepBench(vehicle, network) as bench:
         trial = DeathOfMaster(bench.bus, bench.clock, described, loaded.geometry.wheel_radius, _Odometer(vehicle))
         return evaluate(trial.run(settings), settings, described)

@@ -9,8 +9,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.master.drive_states import DriveState, decode_state
+from hil.master.drive_states import decode_state
 from hil.network import DRIVES, Network
+from hil.network.cia import DriveState
 from hil.safety.trial import StopRecord, StopSettings
 
 _SPEED_WINDOW: Final = 0.06

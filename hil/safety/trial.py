@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -10,16 +11,15 @@ import can
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.clock import Clock
+from hil.bus.clock import Clock
 from hil.master import Master
 from hil.master.codec import Counter
 from hil.network import Network, Node
+from hil.network.cia import ErrorCode, Index, Service
 from ident.errors import UserError
 
-_HEARTBEAT: Final = 0x700
-_EMERGENCY: Final = 0x80
-_HEARTBEAT_LOST: Final = b"\x30\x81"
-"""Error code 8130h as an emergency message carries it."""
+_HEARTBEAT_LOST: Final = struct.pack("<H", ErrorCode.HEARTBEAT)
+"""As an emergency message carries it."""
 
 _SAMPLE_PERIOD: Final = 0.01
 _HOLDING_TIME: Final = 0.5
@@ -40,7 +40,11 @@ _RESOLUTION: Final = 1e-5
 _WATCHING_TIME: Final = 30.0
 """Longest time for which a rolling vehicle is watched [s]."""
 
-_WORDS: Final[Mapping[str, int]] = {"abort": 0x6007, "quick_stop": 0x605A, "fault_reaction": 0x605E}
+_WORDS: Final[Mapping[str, int]] = {
+    "abort": Index.ABORT_CONNECTION_OPTION,
+    "quick_stop": Index.QUICK_STOP_OPTION,
+    "fault_reaction": Index.FAULT_REACTION_OPTION,
+}
 
 
 class TrialError(UserError):
@@ -116,7 +120,7 @@ class DeathOfMaster:
         self._truth = truth
         self._master = Master(bus, clock, network, self._tap)
         self._counters = [Counter(node) for node in network.drives]
-        self._emergencies = {_EMERGENCY + node.node_id for node in network.drives}
+        self._emergencies = {Service.EMERGENCY + node.node_id for node in network.drives}
         self._last_heartbeat = 0.0
         self._reaction: float | None = None
 
@@ -139,10 +143,12 @@ class DeathOfMaster:
         access = self._master.object_access(node)
         for name, index in _WORDS.items():
             access.write(index, 0, getattr(settings, name))
-        access.write(0x6085, 0, round(settings.deceleration / (self._radius * abs(node.angle_unit))))
+        access.write(
+            Index.QUICK_STOP_DECELERATION, 0, round(settings.deceleration / (self._radius * abs(node.angle_unit)))
+        )
 
     def _speed_up(self, speed: float) -> None:
-        rated = min(node.quantities["rated_torque"].value for node in self._network.drives)
+        rated = min(node.quantity("rated_torque") for node in self._network.drives)
         integral = held = torque = present = 0.0
         last = self._master.exchange((torque,) * 4)
         for _ in range(round(_SPEEDING_TIME / self._network.cycle_period)):
@@ -166,7 +172,9 @@ class DeathOfMaster:
         now = still_since = death
         while now - death < _WATCHING_TIME and now - still_since < _RESTING_TIME:
             now = self._clock.now()
-            samples.append((now, self._ways(), self._read(0x6041), self._truth() if self._truth is not None else 0.0))
+            samples.append(
+                (now, self._ways(), self._read(Index.STATUSWORD), self._truth() if self._truth is not None else 0.0)
+            )
             if len(samples) < 2 or _moved(samples[-2][1], samples[-1][1]):
                 still_since = now
             self._clock.wait_until(round(now + _SAMPLE_PERIOD, 9))
@@ -179,19 +187,19 @@ class DeathOfMaster:
             death,
             self._last_heartbeat,
             self._reaction,
-            tuple(self._read(0x603F)),
+            tuple(self._read(Index.ERROR_CODE)),
         )
 
     def _read(self, index: int) -> list[int]:
         return [self._master.object_access(node).read(index) for node in self._network.drives]
 
     def _ways(self) -> list[float]:
-        counts = self._read(0x6064)
+        counts = self._read(Index.POSITION_ACTUAL)
         return [counter.angle(count) * self._radius for counter, count in zip(self._counters, counts, strict=True)]
 
     def _tap(self, message: can.Message) -> None:
         can_id = message.arbitration_id
-        if can_id == _HEARTBEAT + self._network.master_id:
+        if can_id == Service.HEARTBEAT + self._network.master_id:
             self._last_heartbeat = message.timestamp
         elif self._reaction is None and can_id in self._emergencies and message.data[:2] == _HEARTBEAT_LOST:
             self._reaction = message.timestamp

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.campaign.steps import StepSpec
-from ident.vehicle import dynamics, kinematics
+from ident.plant import dynamics, kinematics
+from ident.plant.modes import Mode
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import COULOMB_EPSILON
 
 Array = NDArray[np.float64]

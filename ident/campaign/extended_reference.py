@@ -10,20 +10,22 @@ from scipy import integrate
 
 from ident.campaign.feed_forward import Course, feed_forward
 from ident.campaign.reference import STEERING_LOOPS, Reference
-from ident.vehicle.extended import ExtendedModel
+from ident.effects.extended import ExtendedModel
+from ident.plant.kinematics import virtual_steering
+from ident.plant.modes import Mode
 from ident.vehicle.geometry import Geometry
-from ident.vehicle.modes import Mode, virtual_steering
 
 Array = NDArray[np.float64]
 
 
-def with_effects(reference: Reference, model: ExtendedModel, geometry: Geometry) -> Reference:
+def with_effects(reference: Reference, model: ExtendedModel, geometry: Geometry, elapsed: float = 0.0) -> Reference:
     """The reference of steered motion with the torques that the effects ask for.
 
     Args:
         reference: of a lane change, its torques those of the plain model with the same parameters.
         model: with its effects.
         geometry: of the vehicle.
+        elapsed: time since the start of the campaign at which it is driven [s].
     """
     dt = reference.sample_time
     alpha = np.stack([reference.tracks[loop].position for loop in STEERING_LOOPS], axis=1)
@@ -39,6 +41,7 @@ def with_effects(reference: Reference, model: ExtendedModel, geometry: Geometry)
         beta=np.asarray(integrate.cumulative_trapezoid(wheel_rates, dx=dt, axis=0, initial=0.0)),
         velocities=velocities,
         accelerations=np.gradient(velocities, dt, axis=0),
+        elapsed=elapsed + dt * np.arange(len(reference), dtype=np.float64),
     )
     demand = feed_forward(model, course, reference.feed_forward, geometry, dt)
     return replace(reference, feed_forward=demand.torques)

@@ -10,26 +10,26 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.effects.extended import ExtendedModel
 from ident.estimate.filters import second_derivative, zero_phase
-from ident.vehicle import symbolic
-from ident.vehicle.effect_terms import (
-    EffectTerm,
+from ident.plant import symbolic
+from ident.plant.kinematics import GENERALIZED_VELOCITIES
+from ident.plant.modes import Mode
+from ident.plant.springs import MOTOR_SHARE, resting_twist, stiffness_of
+from ident.plant.symbolic import Expression
+from ident.plant.terms import (
     State,
+    Term,
     added_forces,
     changed_parameters,
     on_radii,
     rolling_radii,
     shaft_torques,
 )
-from ident.vehicle.extended import ExtendedModel
-from ident.vehicle.flexible import Spring
+from ident.plant.transmissions import Spring
+from ident.plant.vectorised import Vectorised
 from ident.vehicle.geometry import Geometry
-from ident.vehicle.kinematics import GENERALIZED_VELOCITIES
-from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
-from ident.vehicle.springs import MOTOR_SHARE, resting_twist, stiffness_of
-from ident.vehicle.symbolic import Expression
-from ident.vehicle.vectorised import Vectorised
 
 Array = NDArray[np.float64]
 
@@ -47,6 +47,7 @@ class Course:
         alpha: (N, 2) [rad].
         beta: (N, 4) [rad].
         velocities, accelerations: ṡ_k, s̈_k (N, n_k).
+        elapsed: time since the start of the campaign (N,) [s].
     """
 
     mode: Mode
@@ -55,6 +56,7 @@ class Course:
     beta: Array
     velocities: Array
     accelerations: Array
+    elapsed: Array
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,7 @@ def feed_forward(model: ExtendedModel, course: Course, plain: Array, geometry: G
         course.beta,
         course.velocities,
         course.accelerations,
+        course.elapsed[:, None],
         plain,
         model.parameters.values,
         geometry.as_vector(),
@@ -114,7 +117,7 @@ def _twist(spring: Spring, load: Array, sample_time: float) -> Array:
     return zero_phase(np.asarray(resting, dtype=float).reshape(-1), TWIST_CUTOFF, sample_time)
 
 
-def _wheels_function(mode: Mode, terms: Sequence[EffectTerm]) -> Vectorised:
+def _wheels_function(mode: Mode, terms: Sequence[Term]) -> Vectorised:
     """Torques at the shafts of rigid gears (4,), what of them accelerates the motors, at the wheels (4,), B_m."""
     width = len(GENERALIZED_VELOCITIES[mode])
     heading, alpha, beta, plain = (ca.SX.sym(name, size) for name, size in (("γ", 1), ("α", 2), ("β", 4), ("u", 4)))
@@ -123,15 +126,17 @@ def _wheels_function(mode: Mode, terms: Sequence[EffectTerm]) -> Vectorised:
     H = on_radii(symbolic.complement(mode, alpha), rolling_radii(terms, beta))
     rates = H @ velocity
     accelerations = ca.jtimes(rates, alpha, rates[3:5]) + ca.jtimes(rates, beta, rates[5:]) + H @ acceleration
-    state = State(heading, alpha, beta, rates, accelerations)
-    forces, parameters = added_forces(terms, state, p), changed_parameters(terms, p)
+    elapsed = ca.SX.sym("t")
+    state = State(heading, alpha, beta, rates, accelerations, elapsed)
+    parameters = changed_parameters(terms, p, state)
+    forces = added_forces(terms, state, parameters)
     wanted = H.T @ (symbolic.regressor(rates, accelerations) @ parameters + forces)
     driven = H.T @ symbolic.input_matrix()
     local = plain + _at_its_place(forces)
     torques = local + driven.T @ ca.solve(driven @ driven.T, wanted - driven @ local)
     motor = MOTOR_SHARE * parameters[PARAMETER_NAMES.index("B_w")]
     results = ca.densify(ca.vertcat(torques, motor * accelerations[5:], motor))
-    inputs = [heading, alpha, beta, velocity, acceleration, plain, p, symbolic.GEOMETRY, symbolic.EPSILON]
+    inputs = [heading, alpha, beta, velocity, acceleration, elapsed, plain, p, symbolic.GEOMETRY, symbolic.EPSILON]
     return Vectorised(ca.Function("torques", inputs, [ca.cse(results)]))
 
 
@@ -142,7 +147,7 @@ def _at_its_place(forces: Expression) -> Expression:
     return forces[5:] / lengths.i_G + ca.vertcat(-left, left, right, -right)
 
 
-def _asked_function(terms: Sequence[EffectTerm]) -> Vectorised:
+def _asked_function(terms: Sequence[Term]) -> Vectorised:
     """Torques that the drives must believe to give for others to act at their shafts: `shaft_torques` backwards."""
     torques, angles, reported = (ca.SX.sym(name, 4) for name in ("u", "angles", "reported"))
     true = shaft_torques(terms, reported, angles)

@@ -13,11 +13,11 @@ from scipy import integrate, optimize
 
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.steps import StepSpec
+from ident.plant import dynamics, kinematics
+from ident.plant.modes import Mode
 from ident.records.record import Step
-from ident.vehicle import dynamics, kinematics
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.geometry import WHEELS, Geometry
-from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import Parameters
 
 Array = NDArray[np.float64]

@@ -12,9 +12,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.plant.modes import Mode
 from ident.records.record import Step
 from ident.vehicle.geometry import Geometry
-from ident.vehicle.modes import Mode
 
 Array = NDArray[np.float64]
 

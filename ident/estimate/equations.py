@@ -8,16 +8,25 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.estimate.filters import Processing, differentiate, moving_rows, second_derivative, zero_phase
+from ident.estimate.filters import (
+    Processing,
+    differentiate,
+    moving_rows,
+    second_derivative,
+    sliding_samples,
+    zero_phase,
+)
+from ident.plant import dynamics, kinematics
+from ident.plant.modes import Mode
+from ident.records.checks import UNJUDGED
 from ident.records.record import Segment, Step
-from ident.vehicle import dynamics, kinematics
 from ident.vehicle.geometry import WHEELS, Geometry
-from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
 
 Array = NDArray[np.float64]
 
 _BETA: Final = slice(5, 9)
+_WHEEL_JOINTS: Final = (5, 6, 7, 8)
 
 
 @dataclass(frozen=True)
@@ -38,11 +47,11 @@ class RowsOfStep:
 ROWS: Final = {
     Step.STEERING_LEFT: RowsOfStep(Mode.ALIGNMENT, ("alpha_l",), (3, 5, 6)),
     Step.STEERING_RIGHT: RowsOfStep(Mode.ALIGNMENT, ("alpha_r",), (4, 7, 8)),
-    Step.STRAIGHT: RowsOfStep(Mode.STEERED, ("x",), (5, 6, 7, 8)),
-    Step.ROTATION: RowsOfStep(Mode.ROTATION, ("gamma",), (5, 6, 7, 8)),
-    Step.LATERAL: RowsOfStep(Mode.LATERAL, ("y",), (5, 6, 7, 8)),
+    Step.STRAIGHT: RowsOfStep(Mode.STEERED, ("x",), _WHEEL_JOINTS),
+    Step.ROTATION: RowsOfStep(Mode.ROTATION, ("gamma",), _WHEEL_JOINTS),
+    Step.LATERAL: RowsOfStep(Mode.LATERAL, ("y",), _WHEEL_JOINTS),
     Step.LANE_CHANGE: RowsOfStep(Mode.STEERED, ("alpha_v", "x"), (3, 4, 5, 6, 7, 8)),
-    Step.WHEEL_LIFTED: RowsOfStep(None, tuple(f"beta_{wheel}" for wheel in WHEELS), (5, 6, 7, 8)),
+    Step.WHEEL_LIFTED: RowsOfStep(None, tuple(f"beta_{wheel}" for wheel in WHEELS), _WHEEL_JOINTS),
 }
 """Steps that the estimator knows; segments of other names are passed over."""
 
@@ -88,8 +97,8 @@ class Equations:
 def motion_of(segment: Segment, geometry: Geometry, processing: Processing) -> Motion:
     """Smoothed angles, rates and accelerations of a segment; the twist by odometry (3)."""
     dt = segment.sample_time
-    alpha = zero_phase(segment.steering_angles, processing.signal_cutoff, dt)
-    beta = zero_phase(segment.wheel_angles, processing.signal_cutoff, dt)
+    alpha = zero_phase(segment.steering_angles, processing.signal_cutoff, dt, UNJUDGED)
+    beta = zero_phase(segment.wheel_angles, processing.signal_cutoff, dt, UNJUDGED)
     alpha_rate, beta_rate = differentiate(alpha, dt), differentiate(beta, dt)
     twist = kinematics.odometry(alpha, alpha_rate, beta_rate, geometry)
     rates = np.hstack([twist, alpha_rate, beta_rate])
@@ -103,7 +112,8 @@ def equations_of(
     """Rows that a segment contributes, one `Equations` a coordinate.
 
     The columns of Θ and τ pass the same zero-phase filter: a regressor built from filtered velocities would
-    not be the filtered regressor, because of tanh.
+    not be the filtered regressor, because of tanh. In stiction Θ p = τ does not hold, and the filter would spread by
+    how much over the rows beside it: such samples are zero on both sides.
 
     Raises:
         KeyError: the segment's step is none of ROWS.
@@ -111,21 +121,29 @@ def equations_of(
     spec = ROWS[Step(segment.step)]
     motion = motion_of(segment, geometry, processing)
     theta, torque, names = _raw_rows(spec, segment, motion, geometry, epsilon)
+    found = []
+    for name in spec.coordinates:
+        row, rates = names.index(name), motion.rates[:, _joints(spec, name)]
+        found.append(_filtered(segment, name, theta[:, row], torque[:, row], rates, processing))
+    return found
+
+
+def _filtered(
+    segment: Segment, coordinate: str, theta: Array, torque: Array, rates: Array, processing: Processing
+) -> Equations:
+    """Rows from unfiltered Θ (N, 11) and τ (N,), and the rates (N, n) of the joints whose friction is in them."""
     dt = segment.sample_time
-    theta, torque = zero_phase(theta, processing.cutoff, dt), zero_phase(torque, processing.cutoff, dt)
-    return [
-        Equations(
-            step=segment.step,
-            coordinate=name,
-            sample_time=dt,
-            time=segment.time,
-            regressor=theta[:, names.index(name)],
-            torque=torque[:, names.index(name)],
-            moving=_moving(spec, name, motion, processing, dt),
-            period=segment.period,
-        )
-        for name in spec.coordinates
-    ]
+    slides = sliding_samples(rates, processing, dt)
+    return Equations(
+        step=segment.step,
+        coordinate=coordinate,
+        sample_time=dt,
+        time=segment.time,
+        regressor=zero_phase(np.where(slides[:, None], theta, 0.0), processing.cutoff, dt, UNJUDGED),
+        torque=zero_phase(np.where(slides, torque, 0.0), processing.cutoff, dt, UNJUDGED),
+        moving=moving_rows(rates, processing, dt),
+        period=segment.period,
+    )
 
 
 def _raw_rows(
@@ -141,16 +159,11 @@ def _raw_rows(
     return theta, torque, kinematics.GENERALIZED_VELOCITIES[spec.mode]
 
 
-def _moving(
-    spec: RowsOfStep, coordinate: str, motion: Motion, processing: Processing, sample_time: float
-) -> NDArray[np.bool_]:
+def _joints(spec: RowsOfStep, coordinate: str) -> tuple[int, ...]:
+    """Indices into q of the joints whose friction acts in the rows of one coordinate."""
     if spec.mode is None:
-        joints: tuple[int, ...] = (5 + WHEELS.index(coordinate.removeprefix("beta_")),)
-    elif coordinate == "x":
-        joints = (5, 6, 7, 8)
-    else:
-        joints = spec.joints
-    return moving_rows(motion.rates[:, joints], processing, sample_time)
+        return (5 + WHEELS.index(coordinate.removeprefix("beta_")),)
+    return _WHEEL_JOINTS if coordinate == "x" else spec.joints
 
 
 def usable_equations(segments: list[Segment], geometry: Geometry, processing: Processing) -> list[Equations]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.vehicle import dynamics, kinematics
+from ident.plant import dynamics, kinematics
+from ident.plant.modes import Mode
 from ident.vehicle.geometry import Geometry
-from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import PARAMETER_NAMES
 
 Array = NDArray[np.float64]

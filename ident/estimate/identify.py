@@ -13,15 +13,9 @@ from threadpoolctl import threadpool_limits
 from ident.errors import EstimationError
 from ident.estimate.equations import Equations, column, usable_equations
 from ident.estimate.filters import Processing
-from ident.estimate.least_squares import LinearSystem, Solution, solve
+from ident.estimate.least_squares import ORDINARY, Estimator, LinearSystem, Solution
 from ident.estimate.noise import NoiseFloor, noise_floor
-from ident.estimate.uncertainty import (
-    LongRun,
-    Scores,
-    interval_factor,
-    long_run_covariance,
-    parameter_covariance,
-)
+from ident.estimate.uncertainty import ErrorCovariance, FittedRows, error_covariance, interval_factor
 from ident.records.record import Record, Step
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS
@@ -33,6 +27,8 @@ INDEPENDENT: Final = tuple(name for name in PARAMETER_NAMES if name != "B_w")
 
 LIFTED: Final = ("d_vw", "d_cw", "B_w")
 """What a wheel in the air shows."""
+
+_INERTIA: Final = LIFTED.index("B_w")
 
 INERTIAL: Final = {
     "C_l": Step.STEERING_LEFT,
@@ -89,6 +85,13 @@ class Estimate:
         half_width = (self.ci95[1] - self.ci95[0]) / 2
         return not half_width < POOR_RELATIVE_HALF_WIDTH * self.value
 
+    @property
+    def quality(self) -> str:
+        """In a word: `impossible` for a value that is not positive, which no lack of excitation explains."""
+        if not self.value > 0:
+            return "impossible"
+        return "poor" if self.poor else "good"
+
 
 @dataclass(frozen=True)
 class Identification:
@@ -126,9 +129,9 @@ class _Fit:
 
     system: LinearSystem
     solution: Solution
-    covariance: Array
+    error: ErrorCovariance
     naive_covariance: Array
-    long_run: LongRun
+    method: str
 
 
 def identify(
@@ -137,6 +140,7 @@ def identify(
     *,
     known_inertia: KnownInertia | None = None,
     processing: Processing | None = None,
+    estimator: Estimator = ORDINARY,
 ) -> Identification:
     """Identify p (18) from a record of the campaign.
 
@@ -145,6 +149,7 @@ def identify(
         geometry: of the vehicle.
         known_inertia: B_w; needed where the record holds no `wheel_lifted` step, otherwise it takes its place.
         processing: filters and thresholds.
+        estimator: solves the rows; ordinary least squares, or another one of `ident.estimate.least_squares`.
 
     Raises:
         EstimationError: a step or an excitation is missing, named.
@@ -153,27 +158,26 @@ def identify(
     equations = usable_equations(list(record.segments), geometry, processing)
     # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        return _identify(equations, known_inertia, processing)
+        return _identify(equations, known_inertia, processing, estimator)
 
 
 def _identify(
-    equations: Sequence[Equations], known_inertia: KnownInertia | None, processing: Processing
+    equations: Sequence[Equations], known: KnownInertia | None, processing: Processing, estimator: Estimator
 ) -> Identification:
-    inertia, lifted = _wheel_inertia(equations, known_inertia)
+    inertia, lifted = _wheel_inertia(equations, known, estimator)
     rows = [equation for equation in equations if equation.step in FIT_STEPS]
-    fit = _fit(rows, INDEPENDENT, {"B_w": inertia.value})
+    fit = _fit(rows, INDEPENDENT, {"B_w": inertia.value}, estimator)
     sensitivity = _sensitivity_to_inertia(fit, rows)
-    covariance = _joint_covariance(fit, sensitivity, inertia.std)
+    error = _joint_error(fit, sensitivity, inertia.std, _freedom_of_inertia(lifted))
     estimates = [
-        _estimate(fit, index, covariance[index, index], abs(sensitivity[index]) * inertia.std)
-        for index in range(len(INDEPENDENT))
+        _estimate(fit, index, error, abs(sensitivity[index]) * inertia.std) for index in range(len(INDEPENDENT))
     ]
     _refuse_unexcited(estimates)
     values = np.array([*(estimate.value for estimate in estimates), inertia.value])
-    deviations = np.sqrt(np.diag(covariance))
+    deviations = np.sqrt(np.diag(error.matrix))
     return Identification(
         estimates=(*estimates, _inertia_estimate(inertia, lifted)),
-        correlation=covariance / np.outer(deviations, deviations),
+        correlation=error.matrix / np.outer(deviations, deviations),
         condition=fit.solution.condition,
         floors=tuple(noise_floor(equation, values) for equation in equations),
         equations=tuple(equations),
@@ -194,7 +198,9 @@ def _refuse_unexcited(estimates: Sequence[Estimate]) -> None:
         )
 
 
-def _wheel_inertia(equations: Sequence[Equations], known: KnownInertia | None) -> tuple[KnownInertia, _Fit | None]:
+def _wheel_inertia(
+    equations: Sequence[Equations], known: KnownInertia | None, estimator: Estimator
+) -> tuple[KnownInertia, _Fit | None]:
     if known is not None:
         return known, None
     rows = [equation for equation in equations if equation.step == Step.WHEEL_LIFTED]
@@ -203,13 +209,17 @@ def _wheel_inertia(equations: Sequence[Equations], known: KnownInertia | None) -
             "The record holds no step wheel_lifted, so B_w cannot be found.",
             "Give B_w with its standard deviation (--b-w 0.121 --b-w-std 0.01), or drive wheel_lifted.",
         )
-    fit = _fit(rows, LIFTED, {})
-    index = LIFTED.index("B_w")
-    std = float(np.sqrt(fit.covariance[index, index]))
-    return KnownInertia(float(fit.solution.values[index]), std, "wheel_lifted"), fit
+    fit = _fit(rows, LIFTED, {}, estimator)
+    std = float(np.sqrt(fit.error.matrix[_INERTIA, _INERTIA]))
+    return KnownInertia(float(fit.solution.values[_INERTIA]), std, "wheel_lifted"), fit
 
 
-def _fit(rows: Sequence[Equations], names: tuple[str, ...], known: dict[str, float]) -> _Fit:
+def _freedom_of_inertia(fit: _Fit | None) -> float:
+    """Degrees of freedom of B_w's standard deviation; one that is given is taken as known."""
+    return np.inf if fit is None else float(fit.error.degrees_of_freedom[_INERTIA])
+
+
+def _fit(rows: Sequence[Equations], names: tuple[str, ...], known: dict[str, float], estimator: Estimator) -> _Fit:
     if not rows:
         raise EstimationError(
             "The record holds none of the steps of an identification.",
@@ -220,51 +230,63 @@ def _fit(rows: Sequence[Equations], names: tuple[str, ...], known: dict[str, flo
     torque = np.concatenate([row.torque[row.moving] for row in rows])
     for name, value in known.items():
         torque = torque - theta[:, column(name)] * value
-    system = LinearSystem(names, theta[:, columns], torque)
-    solution = solve(system)
-    long_run = long_run_covariance(_scores(rows, solution, columns))
+    part = np.repeat(np.arange(len(rows)), [int(row.moving.sum()) for row in rows])
+    system = LinearSystem(names, theta[:, columns], torque, part)
+    solution = estimator(system)
     freedom = max(len(torque) - len(names), 1)
     return _Fit(
         system=system,
         solution=solution,
-        covariance=parameter_covariance(solution.normal_inverse, long_run),
-        naive_covariance=solution.normal_inverse * float(solution.residual @ solution.residual) / freedom,
-        long_run=long_run,
+        error=error_covariance(_fitted_rows(rows, solution, columns)),
+        naive_covariance=solution.influence.T
+        @ solution.influence
+        * float(solution.residual @ solution.residual)
+        / freedom,
+        method=estimator.name,
     )
 
 
-def _scores(rows: Sequence[Equations], solution: Solution, columns: list[int]) -> list[Scores]:
-    """xₜ eₜ of every part, on the parts' own time axis, zero where rows were dropped."""
+def _fitted_rows(rows: Sequence[Equations], solution: Solution, columns: list[int]) -> list[FittedRows]:
+    """The rows of a fit, every part on its own time axis; residual and influence are zero in dropped rows."""
     counts = np.cumsum([int(row.moving.sum()) for row in rows])[:-1]
     parts = []
-    for row, residual in zip(rows, np.split(solution.residual, counts), strict=True):
-        values = np.zeros((len(row.torque), len(columns)))
-        values[row.moving] = row.regressor[row.moving][:, columns] * residual[:, None]
-        parts.append(Scores(values, row.period, row.sample_time))
+    fitted = zip(rows, np.split(solution.residual, counts), np.split(solution.influence, counts), strict=True)
+    for row, left, psi in fitted:
+        residual, influence = np.zeros(len(row.torque)), np.zeros((len(row.torque), len(columns)))
+        residual[row.moving], influence[row.moving] = left, psi
+        parts.append(
+            FittedRows(row.regressor[:, columns], influence, residual, row.moving, row.period, row.sample_time)
+        )
     return parts
 
 
 def _sensitivity_to_inertia(fit: _Fit, rows: Sequence[Equations]) -> Array:
-    """∂p₁/∂B_w = -(Θ₁ᵀΘ₁)⁻¹ Θ₁ᵀΘ₂, (n,)."""
+    """∂p₁/∂B_w = -ψᵀΘ₂, (n,)."""
     theta = np.concatenate([row.regressor[row.moving, column("B_w")] for row in rows])
-    return np.asarray(-fit.solution.normal_inverse @ (fit.system.regressor.T @ theta))
+    return np.asarray(-fit.solution.influence.T @ theta)
 
 
-def _joint_covariance(fit: _Fit, sensitivity: Array, inertia_std: float) -> Array:
-    """Covariance of all eleven: that of p₁ at known B_w, plus what the uncertainty of B_w adds."""
+def _joint_error(fit: _Fit, sensitivity: Array, inertia_std: float, inertia_freedom: float) -> ErrorCovariance:
+    """Error of all eleven: that of p₁ at known B_w, plus what the uncertainty of B_w adds."""
     size = len(sensitivity)
+    at_known = np.zeros((size + 1, size + 1))
+    at_known[:size, :size] = fit.error.matrix
     gradient = np.append(sensitivity, 1.0) * inertia_std
-    joint = np.outer(gradient, gradient)
-    joint[:size, :size] += fit.covariance
+    by_inertia = np.outer(gradient, gradient)
     if inertia_std == 0.0:
-        joint[size, size] = np.finfo(float).tiny
-    return joint
+        by_inertia[size, size] = np.finfo(float).tiny
+    return ErrorCovariance.total(
+        [
+            ErrorCovariance(at_known, np.append(fit.error.degrees_of_freedom, np.inf)),
+            ErrorCovariance(by_inertia, np.full(size + 1, inertia_freedom)),
+        ]
+    )
 
 
-def _estimate(fit: _Fit, index: int, variance: float, b_w_std: float) -> Estimate:
+def _estimate(fit: _Fit, index: int, error: ErrorCovariance, b_w_std: float) -> Estimate:
     name = fit.system.names[index]
-    value, std = float(fit.solution.values[index]), float(np.sqrt(variance))
-    half_width = interval_factor(fit.long_run.degrees_of_freedom) * std
+    value, std = float(fit.solution.values[index]), float(np.sqrt(error.matrix[index, index]))
+    half_width = interval_factor(float(error.degrees_of_freedom[index])) * std
     return Estimate(
         name=name,
         unit=PARAMETER_UNITS[name],
@@ -274,7 +296,7 @@ def _estimate(fit: _Fit, index: int, variance: float, b_w_std: float) -> Estimat
         naive_std=float(np.sqrt(fit.naive_covariance[index, index])),
         b_w_std=b_w_std,
         independence=_independence(fit, index),
-        method="least squares",
+        method=fit.method,
     )
 
 
@@ -285,7 +307,7 @@ def _independence(fit: _Fit, index: int) -> float:
 
 def _inertia_estimate(inertia: KnownInertia, fit: _Fit | None) -> Estimate:
     if fit is not None:
-        return _estimate(fit, LIFTED.index("B_w"), inertia.std**2, inertia.std)
+        return _estimate(fit, _INERTIA, fit.error, inertia.std)
     half_width = interval_factor(np.inf) * inertia.std
     return Estimate(
         name="B_w",

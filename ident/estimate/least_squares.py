@@ -1,9 +1,10 @@
-"""Column-scaled least squares (25), with known parameters moved to the right-hand side (24)."""
+"""Estimators of (24): column-scaled least squares (25), and the same with weights."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,28 +25,100 @@ class LinearSystem:
         names: of the n unknown parameters.
         regressor: Θ₁ (M, n).
         torque: right-hand side (M,).
+        part: (M,) number of the step and coordinate that a row comes from; None where all come from one.
     """
 
     names: tuple[str, ...]
     regressor: Array
     torque: Array
+    part: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Least-squares solution.
+    """What an estimator found.
 
     Attributes:
-        values: (n,).
+        values: p₁ (n,).
+        influence: ψ (M, n): errors e of the rows move the values by ψᵀ e. Standard deviations are made of that.
         normal_inverse: (Θ₁ᵀΘ₁)⁻¹ (n, n).
         condition: cond(Θ₁ᵀΘ₁) with unit-norm columns, the number printed in the paper's section 7.
         residual: τ - Θ₁ p₁ (M,).
     """
 
     values: Array
+    influence: Array
     normal_inverse: Array
     condition: float
     residual: Array
+
+
+class Estimator(Protocol):
+    """Solves the rows of a campaign."""
+
+    @property
+    def name(self) -> str:
+        """As results name the method."""
+
+    def __call__(self, system: LinearSystem) -> Solution:
+        """Solve a system.
+
+        Raises:
+            EstimationError: a parameter has no excitation, or a combination of parameters has none; named.
+        """
+
+
+@dataclass(frozen=True)
+class LeastSquares:
+    """(25): all rows count alike."""
+
+    name: str = "least squares"
+
+    def __call__(self, system: LinearSystem) -> Solution:
+        """Solve (25).
+
+        Raises:
+            EstimationError: a parameter has no excitation, or a combination of parameters has none; named.
+        """
+        return solve(system)
+
+
+@dataclass(frozen=True)
+class WeightedLeastSquares:
+    """Each part counts by the variance of its own residual under ordinary least squares (feasible generalized LS).
+
+    Better where steps or coordinates are of different noise, a little worse where they are not: the variances are
+    estimated. Noise that changes within a part, and its colour, are not weighted.
+    """
+
+    name: str = "weighted least squares"
+
+    def __call__(self, system: LinearSystem) -> Solution:
+        """Solve twice: for the residuals, and with their weights.
+
+        Raises:
+            EstimationError: a parameter has no excitation, or a combination of parameters has none; named.
+        """
+        plain = solve(system)
+        if system.part is None:
+            return plain
+        squares = np.bincount(system.part, plain.residual**2)
+        mean = squares / np.maximum(np.bincount(system.part), 1)
+        weight = 1 / np.sqrt(np.maximum(mean, _LEAST * mean.max()))[system.part]
+        weighted = solve(replace(system, regressor=system.regressor * weight[:, None], torque=system.torque * weight))
+        return replace(
+            plain,
+            values=weighted.values,
+            influence=weighted.influence * weight[:, None],
+            residual=system.torque - system.regressor @ weighted.values,
+        )
+
+
+ORDINARY: Final = LeastSquares()
+"""What the paper does, and what is done where nobody says otherwise."""
+
+_LEAST: Final = 1e-6
+"""Smallest variance of a part over the largest that a weight believes."""
 
 
 def solve(system: LinearSystem) -> Solution:
@@ -60,10 +133,11 @@ def solve(system: LinearSystem) -> Solution:
     left, singular, right = np.linalg.svd(scaled, full_matrices=False)
     _refuse_dependent(system.names, singular, right)
     values = right.T @ ((left.T @ system.torque) / singular) / scale
-    inverse = (right.T / singular**2) @ right
+    normal_inverse = (right.T / singular**2) @ right / np.outer(scale, scale)
     return Solution(
         values=values,
-        normal_inverse=inverse / np.outer(scale, scale),
+        influence=system.regressor @ normal_inverse,
+        normal_inverse=normal_inverse,
         condition=float((singular[0] / singular[-1]) ** 2),
         residual=system.torque - system.regressor @ values,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,14 @@ from ident.estimate.equations import Equations
 from ident.records.repeats import repeats_of
 
 Array = NDArray[np.float64]
+
+
+_FORCES: Final = ("x", "y")
+
+
+def torque_unit(coordinate: str) -> str:
+    """Unit of the generalized torque of a coordinate."""
+    return "N" if coordinate in _FORCES else "Nm"
 
 
 @dataclass(frozen=True)
@@ -31,6 +40,11 @@ class NoiseFloor:
     residual: float
     noise: float
     model_error: float
+
+    @property
+    def unit(self) -> str:
+        """Of the generalized torque."""
+        return torque_unit(self.coordinate)
 
     @property
     def nrmse(self) -> float:

@@ -1,21 +1,32 @@
 """Standard deviations that stay right under coloured residuals and repeated model error.
 
-The estimate's error is (Θᵀ Θ)⁻¹ Σ xₜ eₜ. Three things make the textbook σ²(Θᵀ Θ)⁻¹ too small: the residual is
-coloured (by the filter, by slow friction), its size differs between steps, and model error repeats with every
-period of the excitation, so that more periods do not average it out. The long-run covariance of the scores
-xₜ eₜ is therefore estimated in two parts: what differs between periods (noise), by a Bartlett kernel with
-Andrews' automatic bandwidth (Andrews 1991, eq. 6.4), and what repeats (model error), from the period means.
+The estimate's error is Σ ψₜ eₜ with the influence ψ of each row, (Θᵀ Θ)⁻¹ Θᵀ for least squares. Three things make the
+textbook σ²(Θᵀ Θ)⁻¹ too small: the residual is coloured (by the filter, by slow friction), its size differs between
+steps, and model error repeats with every period of the excitation, so that more periods do not average it out. The
+covariance is therefore estimated for every step and in two parts: what differs between periods (noise) and what repeats
+(model error), each by its autocovariance. Every parameter has the degrees of freedom of its own variance, by Welch and
+Satterthwaite.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from ident.estimate.repeat_noise import (
+    Autocovariance,
+    leverage,
+    mean_of_repeats,
+    noise_between,
+    propagated,
+    propagated_noise,
+    shrinkage,
+)
 from ident.records.repeats import repeats_of
 
 Array = NDArray[np.float64]
@@ -27,40 +38,75 @@ BLOCK_TIME = 0.02
 SIGNIFICANCE = 0.95
 """Confidence with which a pattern must exceed the noise before it counts as repeated model error."""
 
+_LEAST_LEFT = 0.1
+"""Part of a variance that must be left in residuals for the rest to be concluded from it."""
+
 
 @dataclass(frozen=True)
-class Scores:
-    """xₜ eₜ of one coordinate of one segment, zero in dropped rows.
+class FittedRows:
+    """Rows of one coordinate of one segment as they were fitted.
 
     Attributes:
-        values: (N, n).
+        regressor: (N, n).
+        influence: ψ (N, n).
+        residual: (N,).
+        kept: (N,) rows that were fitted.
         period: (N,) number of the repeat, -1 outside of any.
         sample_time: [s].
     """
 
-    values: Array
+    regressor: Array
+    influence: Array
+    residual: Array
+    kept: NDArray[np.bool_]
     period: NDArray[np.int64]
     sample_time: float
 
+    @classmethod
+    def of_least_squares(
+        cls,
+        regressor: Array,
+        residual: Array,
+        kept: NDArray[np.bool_],
+        period: NDArray[np.int64],
+        sample_time: float,
+        normal_inverse: Array,
+    ) -> Self:
+        """Rows that were fitted by least squares with (Θᵀ Θ)⁻¹ (n, n)."""
+        return cls(regressor, regressor @ normal_inverse, residual, kept, period, sample_time)
+
 
 @dataclass(frozen=True)
-class LongRun:
-    """Covariance of a sum of scores, and the degrees of freedom of that estimate."""
+class ErrorCovariance:
+    """Covariance of an estimate's error.
 
-    covariance: Array
-    degrees_of_freedom: float
+    Attributes:
+        matrix: (n, n).
+        degrees_of_freedom: (n,) of the variances on its diagonal.
+    """
+
+    matrix: Array
+    degrees_of_freedom: Array
+
+    @classmethod
+    def total(cls, parts: Sequence[Self]) -> Self:
+        """Of the sum of independent errors, degrees of freedom by Welch and Satterthwaite."""
+        matrix = np.sum([part.matrix for part in parts], axis=0)
+        weights = np.sum(
+            [np.diag(part.matrix) ** 2 / np.maximum(part.degrees_of_freedom, 1.0) for part in parts], axis=0
+        )
+        variances = np.diag(matrix)
+        known = weights > 0
+        return cls(matrix, np.where(known, variances**2 / np.where(known, weights, 1.0), np.inf))
 
 
-def long_run_covariance(parts: Sequence[Scores]) -> LongRun:
-    """Covariance (n, n) of Σ xₜ eₜ over independent parts."""
-    estimates = [estimate for part in parts for estimate in _of_part(part)]
-    total = np.sum([estimate.covariance for estimate in estimates], axis=0)
-    return LongRun(total, _combined_degrees(estimates, total))
+def error_covariance(parts: Sequence[FittedRows]) -> ErrorCovariance:
+    """Error covariance of an estimate that is linear in its rows; errors of different parts are independent.
 
-
-def parameter_covariance(normal_inverse: Array, scores: LongRun) -> Array:
-    """Sandwich (Θᵀ Θ)⁻¹ S (Θᵀ Θ)⁻¹, (n, n)."""
-    return np.asarray(normal_inverse @ scores.covariance @ normal_inverse)
+    Args:
+        parts: all rows of the fit.
+    """
+    return ErrorCovariance.total([found for part in parts for found in _of_part(part)])
 
 
 def interval_factor(degrees_of_freedom: float, level: float = 0.95) -> float:
@@ -68,58 +114,48 @@ def interval_factor(degrees_of_freedom: float, level: float = 0.95) -> float:
     return float(stats.t.ppf((1 + level) / 2, max(degrees_of_freedom, 1.0)))
 
 
-def _combined_degrees(estimates: Sequence[LongRun], total: Array) -> float:
-    """Welch-Satterthwaite on the traces, each column in units of its own total variance."""
-    unit = np.maximum(np.diag(total), np.finfo(float).tiny)
-    shares = [float(np.mean(np.diag(estimate.covariance) / unit)) for estimate in estimates]
-    weight = sum(share**2 / estimate.degrees_of_freedom for share, estimate in zip(shares, estimates, strict=True))
-    return 1.0 / weight if weight > 0 else np.inf
-
-
-def _of_part(part: Scores) -> list[LongRun]:
-    outside = part.values[part.period < 0]
-    folded = _fold(part)
-    if folded is None:
-        return [_bartlett(_block_sums(part.values, part.sample_time))]
-    estimates = _of_periods(folded, part.sample_time)
-    return [*estimates, _bartlett(_block_sums(outside, part.sample_time))] if np.any(outside) else estimates
-
-
-def _fold(part: Scores) -> Array | None:
-    """Scores by period (P, T, n), or None for fewer than two repeats."""
+def _of_part(part: FittedRows) -> list[ErrorCovariance]:
+    regressor, influence = (np.where(part.kept[:, None], each, 0.0) for each in (part.regressor, part.influence))
     samples = repeats_of(part.period)
-    return part.values[samples] if len(samples) > 1 else None
+    if len(samples) < 2:
+        return [_bartlett(_block_sums(influence * part.residual[:, None], part.sample_time))]
+    residual, kept = part.residual[samples], np.asarray(part.kept[samples].all(axis=0))
+    noise = noise_between(residual, kept)
+    found = _positive(*propagated_noise(noise, influence, samples))
+    pattern, taken = mean_of_repeats(residual, kept), leverage(influence[samples], regressor[samples])
+    if not _repeats(noise.colour, pattern, taken[0]):
+        return [found]
+    with_noise = _unfitted(pattern, influence[samples].sum(axis=0), taken)
+    repeated = _positive_part(with_noise.matrix - found.matrix)
+    return [found, ErrorCovariance(repeated, with_noise.degrees_of_freedom)]
 
 
-def _of_periods(folded: Array, sample_time: float) -> list[LongRun]:
-    """Noise from the differences between periods; repeated model error from their mean."""
-    periods = len(folded)
-    mean = folded.mean(axis=0)
-    deviations = np.concatenate([_block_sums(period - mean, sample_time) for period in folded])
-    noise = _bartlett(deviations)
-    noise_total = noise.covariance * periods / (periods - 1)
-    degrees = noise.degrees_of_freedom * (periods - 1) / periods
-    found = [LongRun(noise_total, degrees)]
-    if _repeats(folded, noise.degrees_of_freedom):
-        pattern = _prewhitened(_block_sums(mean, sample_time))
-        repeated = _positive_part(periods**2 * pattern.covariance - noise_total)
-        found.append(LongRun(repeated, pattern.degrees_of_freedom))
-    return found
+def _positive(matrix: Array, degrees: Array) -> ErrorCovariance:
+    return ErrorCovariance(_positive_part(matrix), degrees)
 
 
-def _repeats(folded: Array, degrees: float) -> bool:
-    """Whether the mean period (P, T, n) is larger than noise alone would leave it: an F test.
+def _unfitted(pattern: Autocovariance, influence: Array, taken: Array) -> ErrorCovariance:
+    """Error by what repeats, from residuals from which a fit has taken its part and its degrees of freedom."""
+    found = _positive(*propagated(pattern, influence))
+    left = np.maximum(found.degrees_of_freedom - taken[0], 1.0)
+    factor = np.sqrt(1 / np.maximum(shrinkage(pattern, influence, taken), _LEAST_LEFT))
+    return ErrorCovariance(found.matrix * np.outer(factor, factor), left)
 
-    Without the test, the noise of the mean period would be counted twice, and intervals under pure noise be half as
-    wide again as they need to be.
+
+def _repeats(noise: Autocovariance, pattern: Autocovariance, fitted: float) -> bool:
+    """Whether the mean period is larger than noise alone would leave it: an F test.
+
+    Without the test, the noise of the mean period would be counted twice, and intervals under pure noise be
+    needlessly wide.
+
+    Args:
+        fitted: parameters' worth of degrees of freedom that the fit has taken from the mean period.
     """
-    periods = len(folded)
-    between = folded.var(axis=0, ddof=1).mean(axis=0)
-    pattern = np.mean(folded.mean(axis=0) ** 2, axis=0)
-    driven = pattern > 0
-    smallest = np.finfo(float).eps * pattern[driven]
-    ratio = periods * float(np.mean(pattern[driven] / np.maximum(between[driven], smallest))) if driven.any() else 0.0
-    return ratio > float(stats.f.ppf(SIGNIFICANCE, degrees / periods, degrees * (periods - 1) / periods))
+    rows = pattern.independent_rows
+    left = max(rows - fitted, 1.0)
+    limit = stats.f.ppf(SIGNIFICANCE, left, max(noise.independent_rows * noise.replicates, 1.0))
+    mean_square = float(pattern.values[0]) * rows / left
+    return (noise.replicates + 1) * mean_square > float(noise.values[0]) * float(limit)
 
 
 def _positive_part(matrix: Array) -> Array:
@@ -135,30 +171,14 @@ def _block_sums(scores: Array, sample_time: float) -> Array:
     return np.asarray(np.add.reduceat(scores, starts, axis=0)) if len(scores) else scores
 
 
-def _prewhitened(blocks: Array) -> LongRun:
-    """Bartlett on AR(1)-whitened blocks, recoloured (Andrews and Monahan 1992).
-
-    The mean period is short, and the fit has taken from it what lies along the regressor: its sum is zero. Without
-    whitening the kernel then finds 0.6 to 0.8 of the true spread.
-    """
-    power = np.sum(blocks[:-1] ** 2, axis=0)
-    memory = np.sum(blocks[1:] * blocks[:-1], axis=0) / np.maximum(power, np.finfo(float).tiny)
-    memory = np.clip(memory, -0.97, 0.97)
-    whitened = _bartlett(np.vstack([blocks[:1], blocks[1:] - memory * blocks[:-1]]))
-    colour = 1 / (1 - memory)
-    slowest = float(np.abs(memory).max())
-    degrees = whitened.degrees_of_freedom * (1 - slowest) / (1 + slowest)
-    return LongRun(whitened.covariance * np.outer(colour, colour), degrees)
-
-
-def _bartlett(blocks: Array) -> LongRun:
+def _bartlett(blocks: Array) -> ErrorCovariance:
     """Newey-West covariance of the sum of the blocks (m, n), automatic bandwidth."""
     lag = _andrews_lag(blocks)
     total = blocks.T @ blocks
     for shift in range(1, lag + 1):
         product = blocks[shift:].T @ blocks[:-shift]
         total = total + (1 - shift / (lag + 1)) * (product + product.T)
-    return LongRun(total, 1.5 * len(blocks) / (lag + 1))
+    return ErrorCovariance(total, np.full(blocks.shape[1], 1.5 * len(blocks) / (lag + 1)))
 
 
 def _andrews_lag(blocks: Array) -> int:

@@ -11,9 +11,9 @@
 from __future__ import annotations
 
 import enum
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import prod
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy import io
 
 from ident.errors import RecordError
+from ident.reading import LARGEST_RECORD, PARSER_ERRORS, refuse_unreadable
 from ident.records.channels import Channels, read_channels, write_channels
 from ident.records.checks import numbers, period_numbers, refuse_nonfinite, refuse_short, uniform_sample_time
 
@@ -217,12 +218,17 @@ _EMPS: Final = ("t", "qm", "vir", "gtau")
 """Time [s], measured position [m], control voltage [V] and force per volt [N/V] (Janot, Gautier, Brunot 2019)."""
 
 
+_NUMBER: Final = 8
+"""Bytes of one."""
+
+
 def _read_emps(path: Path) -> Channels:
-    if not path.is_file():
-        raise RecordError(f"{path} does not exist.", "Name an existing record.")
+    refuse_unreadable(path, LARGEST_RECORD, RecordError)
     try:
+        if sum(prod(shape) for _, shape, _ in io.whosmat(path)) * _NUMBER > LARGEST_RECORD:
+            raise RecordError(f"{path} unpacks to more than {LARGEST_RECORD} bytes.", "Split the record.")
         content = io.loadmat(path)
-    except (io.matlab.MatReadError, zlib.error, ValueError, NotImplementedError, OSError, TypeError) as error:
+    except (io.matlab.MatReadError, *PARSER_ERRORS) as error:
         raise RecordError(
             f"{path} is not a readable MATLAB file: {error}.", "Save it with '-v7', or write CSV, Parquet or MF4."
         ) from error

@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import gc
 import importlib
-import struct
+import io
 import sys
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -17,12 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.errors import RecordError
+from ident.reading import LARGEST_RECORD, PARSER_ERRORS, refuse_unreadable
+from ident.records.apart import read_apart
+from ident.records.mf4_blocks import check_blocks
+from ident.writing import write_by
 
 Values = Mapping[str, NDArray[Any]]
 Handler = TypeVar("Handler")
 
 TEXT_CHANNELS: Final = ("step",)
 """Channels of a CSV file that hold words even where they look like numbers."""
+_CELL: Final = 8
+"""Bytes of a number."""
 OTHER_SEPARATORS: Final = ";\t"
 """What spreadsheets of other countries write between channels."""
 
@@ -45,10 +52,10 @@ def read_channels(path: Path) -> Channels:
     """Read all channels of a file.
 
     Raises:
-        RecordError: the file is missing, of unknown kind, unreadable, or its channels have several rasters.
+        RecordError: the file is missing, of unknown kind, unreadable, too large as it is or unpacked, or its channels
+            have several rasters.
     """
-    if not path.is_file():
-        raise RecordError(f"{path} does not exist or is no file.", "Name an existing record.")
+    refuse_unreadable(path, LARGEST_RECORD, RecordError)
     return _lookup(path, _READERS)(path)
 
 
@@ -57,8 +64,10 @@ def write_channels(channels: Channels, path: Path) -> None:
 
     Raises:
         RecordError: the file's ending is unknown, or a package for it is missing.
+        UserError: the file cannot be written.
     """
-    _lookup(path, _WRITERS)(channels, path)
+    write = _lookup(path, _WRITERS)
+    write_by(lambda part: write(channels, part), path)
 
 
 def _lookup(path: Path, table: Mapping[str, Handler]) -> Handler:
@@ -78,14 +87,21 @@ def _require_extra(module: str, path: Path) -> None:
 
 
 def _read_csv(path: Path) -> Channels:
+    rows: list[list[str]] = []
     with path.open(newline="", encoding="utf-8-sig") as file:
+        lines = csv.reader(file, strict=True)
         try:
-            header, *rows = csv.reader(file)
+            rows.extend(lines)
         except (ValueError, csv.Error) as error:
             raise RecordError(
-                f"{path} has no header line: it is empty or no CSV file.",
-                "Its first line names the channels, each further line is a sample.",
+                f"{path} is no CSV file, after line {lines.line_num}: {error}.", "Mend it there, or record again."
             ) from error
+    if not rows or not any(rows[0]):
+        raise RecordError(
+            f"{path} has no header line: it is empty or no CSV file.",
+            "Its first line names the channels, each further line is a sample.",
+        )
+    header, *rows = rows
     named = [_name_and_unit(cell) for cell in header]
     names = [name for name, _ in named]
     if len(names) == 1 and any(mark in names[0] for mark in OTHER_SEPARATORS):
@@ -145,14 +161,35 @@ def _read_parquet(path: Path) -> Channels:
     import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            _refuse_large_table(file.metadata, path)
+            table = pa.Table.from_batches(_bounded(file.iter_batches(), path), file.schema_arrow)
+    except (pa.ArrowException, *PARSER_ERRORS) as error:
         raise RecordError(f"{path} is not a readable Parquet file: {error}.", "Record again.") from error
-    stated = {entry.name: (entry.metadata or {}).get(b"unit", b"").decode() for entry in table.schema}
+    _refuse_twins(path, table.column_names)
+    stated = {entry.name: (entry.metadata or {}).get(b"unit", b"").decode(errors="replace") for entry in table.schema}
     return Channels(
         {name: table.column(name).to_numpy() for name in table.column_names},
         {name: unit for name, unit in stated.items() if unit},
     )
+
+
+def _refuse_large_table(metadata: Any, path: Path) -> None:
+    if metadata.num_rows * max(metadata.num_columns, 1) * _CELL > LARGEST_RECORD:
+        raise RecordError(
+            f"{path} has {metadata.num_rows} rows of {metadata.num_columns} channels, more than are read.",
+            "Split the record.",
+        )
+
+
+def _bounded(batches: Iterator[Any], path: Path) -> Iterator[Any]:
+    """Parts of a table until they are too many: a few bytes may stand for a text repeated a million times."""
+    size = 0
+    for batch in batches:
+        size += batch.nbytes
+        if size > LARGEST_RECORD:
+            raise RecordError(f"{path} unpacks to more than {LARGEST_RECORD} bytes.", "Split the record.")
+        yield batch
 
 
 def _write_parquet(channels: Channels, path: Path) -> None:
@@ -165,45 +202,66 @@ def _write_parquet(channels: Channels, path: Path) -> None:
         pa.field(name, array.type, metadata={"unit": channels.units.get(name, "")})
         for name, array in zip(channels.values, arrays, strict=True)
     ]
-    pq.write_table(pa.table(arrays, schema=pa.schema(fields)), path)
+    pq.write_table(pa.table(arrays, schema=pa.schema(fields)), path, write_page_checksum=True)
 
 
 def _read_mf4(path: Path) -> Channels:
     _require_extra("asammdf", path)
+    check_blocks(path)
+    try:
+        signals = read_apart(_signals, path)
+    except ValueError as error:
+        raise RecordError(f"{path} is not a readable MF4 file: {error}.", "Record again.") from error
+    if not signals:
+        raise RecordError(f"{path} holds no channels.", "Record again.")
+    _refuse_twins(path, [name for name, *_ in signals])
+    _, _, time, _ = signals[0]
+    for name, _, stamps, _ in signals:
+        if not np.array_equal(stamps, time):
+            raise RecordError(f"{path}: channel {name} is sampled at another rate.", "Resample to one raster.")
+    return Channels(
+        {"time": time, **{name: samples for name, _, _, samples in signals}},
+        {name: unit for name, unit, _, _ in signals if unit},
+    )
+
+
+def _signals(path: Path) -> list[tuple[str, str, NDArray[np.float64], NDArray[Any]]]:
+    """Name, unit, stamps [s] and samples of every channel.
+
+    Raises:
+        ValueError: asammdf cannot read the file; or an error of `PARSER_ERRORS`, of its own.
+    """
     from asammdf import MDF
     from asammdf.blocks.utils import MdfException
 
     try:
-        with MDF(path) as mdf:
-            signals = list(mdf.iter_channels(skip_master=True))
-    except (MdfException, OSError, ValueError, struct.error) as error:
-        _discard(error)
-        raise RecordError(f"{path} is not a readable MF4 file: {error}.", "Record again.") from error
-    if not signals:
-        raise RecordError(f"{path} holds no channels.", "Record again.")
-    time = np.asarray(signals[0].timestamps, dtype=float)
-    for signal in signals:
-        if not np.array_equal(signal.timestamps, time):
-            raise RecordError(f"{path}: channel {signal.name} is sampled at another rate.", "Resample to one raster.")
-    return Channels(
-        {"time": time, **{signal.name: _numbers_or_text(np.asarray(signal.samples)) for signal in signals}},
-        {signal.name: signal.unit for signal in signals if signal.unit},
-    )
+        with quietly(), MDF(path) as mdf:
+            return [
+                (one.name, one.unit, np.asarray(one.timestamps, dtype=float), _numbers_or_text(np.asarray(one.samples)))
+                for one in mdf.iter_channels(skip_master=True)
+            ]
+    except MdfException as error:
+        raise ValueError(str(error)) from error
 
 
-def _discard(error: BaseException) -> None:
-    """Delete what a reader left half-made, silently: the destructor of asammdf fails where its constructor has."""
-    hook = sys.unraisablehook
-    sys.unraisablehook = lambda _: None
+@contextmanager
+def quietly() -> Iterator[None]:
+    """Keep a reader from telling its own story: asammdf prints tracebacks, and its destructor fails as well."""
+    hook, unheard = sys.unraisablehook, io.StringIO()
     try:
+        with redirect_stdout(unheard), redirect_stderr(unheard):
+            yield
+    except BaseException as error:
+        sys.unraisablehook = lambda _: None
         traceback.clear_frames(error.__traceback__)
         gc.collect()
+        raise
     finally:
         sys.unraisablehook = hook
 
 
 def _numbers_or_text(samples: NDArray[Any]) -> NDArray[Any]:
-    return np.char.decode(samples, "utf-8") if samples.dtype.kind == "S" else samples
+    return np.char.decode(samples, "utf-8", "replace") if samples.dtype.kind == "S" else samples
 
 
 def _write_mf4(channels: Channels, path: Path) -> None:
@@ -223,7 +281,8 @@ def _write_mf4(channels: Channels, path: Path) -> None:
     ]
     with MDF(version="4.10") as mdf:
         mdf.append(signals, comment="quasiomni record")
-        mdf.save(path, overwrite=True)
+        # Compressed data carry a checksum, plain ones none.
+        mdf.save(path, overwrite=True, compression=1)
 
 
 _READERS: Final[dict[str, Callable[[Path], Channels]]] = {

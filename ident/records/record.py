@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.errors import RecordError
-from ident.records.checks import refuse_nonfinite, refuse_short, uniform_sample_time
+from ident.records.checks import refuse_lone_samples, refuse_nonfinite, refuse_short, uniform_sample_time
 from ident.vehicle.geometry import WHEELS
 
 Array = NDArray[np.float64]
@@ -138,13 +138,15 @@ def make_segment(segment: Segment, source: str) -> Segment:
     """Check a segment and set its sample time from its time channel.
 
     Raises:
-        RecordError: fewer than ten samples, a value that is not finite, time that is not uniform, or a load that is
-            negative or changes.
+        RecordError: fewer than ten samples, a value that is not finite or that stands alone, time that is not uniform,
+            or a load that is negative or changes.
     """
     where = f"{source}, step {segment.step!r}"
     refuse_short(len(segment), where)
     for name, values in _measured_channels(segment):
         refuse_nonfinite(name, values, where)
+        if name != "time":
+            refuse_lone_samples(name, values, where)
     load = segment.extra.get(PAYLOAD)
     if load is not None and (np.ptp(load) or load[0] < 0):
         raise RecordError(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.errors import RecordError
+from ident.reading import CONTROL
 from ident.records.checks import holds_numbers, numbers, period_numbers
 from ident.records.record import PAYLOAD, Record, Segment, make_segment
 from ident.vehicle.geometry import WHEELS
@@ -46,6 +47,7 @@ def record_from_table(table: Table, source: str) -> Record:
     table = _in_numbers(table, source)
     period = period_numbers(table.get("period"), len(table["time"]), source)
     steps = np.asarray(table["step"]).astype(str)
+    _refuse_control_characters(steps, source)
     starts = _starts(steps, table["time"])
     ends = [*starts[1:], len(steps)]
     segments = [
@@ -60,6 +62,14 @@ def _in_numbers(table: Table, source: str) -> Table:
     contract = {*CHANNEL_UNITS} - {"step"}
     kept = {name: channel for name, channel in table.items() if name in contract or holds_numbers(channel)}
     return {name: numbers(name, channel, source) for name, channel in kept.items()} | {"step": table["step"]}
+
+
+def _refuse_control_characters(steps: NDArray[Any], source: str) -> None:
+    odd = next((name for name in np.unique(steps).tolist() if CONTROL.search(name)), None)
+    if odd is not None:
+        raise RecordError(
+            f"{source} has a step named {odd!r}, with control characters.", "Name it in letters, digits and _."
+        )
 
 
 def _starts(steps: NDArray[Any], time: NDArray[np.float64]) -> list[int]:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ident.estimate.equations import Motion, motion_of
 from ident.estimate.filters import Processing
+from ident.plant import kinematics
 from ident.records.record import Record, Step
-from ident.vehicle import kinematics
 from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.estimate.filters import Processing
+from ident.estimate.noise import torque_unit
 from ident.report.comparison import Comparison, Folded
 from ident.report.digits import unit_text
 from ident.report.driven_path import Leg, vehicle_outline
 from ident.report.excitation import PhasePlane
-from ident.report.rows import ParameterRow, torque_unit
+from ident.report.rows import ParameterRow
 from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]

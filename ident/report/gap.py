@@ -12,9 +12,9 @@ import jinja2
 from markupsafe import Markup
 from plotly import offline
 
-from ident.gap.diagnosis import Diagnosis, Verdict
-from ident.gap.findings import Cause, Findings
-from ident.gap.vehicle.outcome import HORIZON
+from ident.diagnosis.diagnosis import Diagnosis, Verdict
+from ident.diagnosis.findings import Cause, Findings
+from ident.diagnosis.vehicle.outcome import HORIZON
 from ident.report import digits
 from ident.report.gap_figures import Figure, map_figure, residual_figures
 from ident.report.gap_summary import gap_line, next_text, plain, verdict_line

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from ident.gap.diagnosis import Diagnosis, NamedEffect, Share, Verdict
-from ident.gap.findings import Cause, Findings
+from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Share, Verdict
+from ident.diagnosis.findings import Cause, Findings
 from ident.report.digits import percent, significant, unit_text, with_std
 
 MOST_LINES: Final = 10

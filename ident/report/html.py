@@ -13,15 +13,18 @@ import jinja2
 from markupsafe import Markup, escape
 from plotly import offline
 
+from ident.assessment import Assessment
 from ident.campaign.plan import Plan
 from ident.estimate.identify import Identification
+from ident.estimate.noise import torque_unit
 from ident.records.record import Record
 from ident.report import digits, figures
+from ident.report.assessment import headline
 from ident.report.comparison import Comparison, comparisons, folded
 from ident.report.driven_path import Leg, covered_floor, driven_legs
 from ident.report.excitation import phase_planes
 from ident.report.paper import load_paper_result
-from ident.report.rows import Role, loop_rows, parameter_rows, step_rows, torque_unit
+from ident.report.rows import Role, loop_rows, parameter_rows, step_rows
 from ident.report.summary import summarise
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
@@ -37,6 +40,7 @@ class ReportContent:
     Attributes:
         title: heading of the page.
         identification: the result.
+        assessment: whether it can be true.
         record: what it was found from.
         vehicle: geometry, priors and limits.
         truth: true parameters, where they are known.
@@ -48,6 +52,7 @@ class ReportContent:
 
     title: str
     identification: Identification
+    assessment: Assessment
     record: Record
     vehicle: VehicleDescription
     truth: Parameters | None
@@ -82,6 +87,7 @@ def render_report(content: ReportContent) -> str:
             content=content,
             identification=content.identification,
             summary=summary,
+            headline=headline(content.assessment),
             warnings=[*content.warnings, *summary.warnings],
             rows=rows,
             steps=steps,

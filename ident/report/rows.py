@@ -40,14 +40,6 @@ class Role(enum.Enum):
     SHOWN = "not used"
 
 
-_FORCES: Final = ("x", "y")
-
-
-def torque_unit(coordinate: str) -> str:
-    """Unit of the generalized torque of a coordinate."""
-    return "N" if coordinate in _FORCES else "Nm"
-
-
 @dataclass(frozen=True)
 class ParameterRow:
     """One parameter beside what else is known of it.
@@ -115,7 +107,7 @@ class StepRow:
     @property
     def unit(self) -> str:
         """Of the generalized torque."""
-        return torque_unit(self.floor.coordinate)
+        return self.floor.unit
 
 
 @dataclass(frozen=True)

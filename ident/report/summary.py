@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
+from ident.assessment.fit import COORDINATE_WORDS
 from ident.estimate.identify import Identification
 from ident.records.record import Record
-from ident.report.digits import percent, significant
+from ident.report.digits import percent
 from ident.report.rows import LEAST_SQUARES, ParameterRow, Role, StepRow
-
-NRMSE_LIMITS: Final = {"x": 0.05, "alpha_v": 0.15}
-"""Largest NRMSE of a lane change that counts as validated, drive force and steering torque."""
-
-COORDINATE_WORDS: Final = {"x": "drive force", "alpha_v": "steering torque"}
 
 
 @dataclass(frozen=True)
@@ -23,7 +18,7 @@ class Summary:
 
     Attributes:
         sentences: what was identified, how well, and what was validated.
-        warnings: what to know before building on it.
+        warnings: what to know before building on it, beside what its assessment says.
     """
 
     sentences: tuple[str, ...]
@@ -45,7 +40,7 @@ def summarise(
         *_against_truth(parameters),
         *_validation(steps),
     ]
-    warnings = [*_poor(parameters), *_exact_inertia(identification), *_model_errors(steps), *_not_validated(steps)]
+    warnings = [*_exact_inertia(identification), *_unrepeated(steps), *_not_validated(steps)]
     return Summary(tuple(sentences), tuple(warnings))
 
 
@@ -101,44 +96,20 @@ def _validation(steps: Sequence[StepRow]) -> list[str]:
     ]
 
 
-def _poor(parameters: Sequence[ParameterRow]) -> list[str]:
-    return [
-        f"{row.estimate.name} is poorly excited: its 95 % interval is ±{percent(row.half_width)} of its value."
-        for row in parameters
-        if row.estimate.poor
-    ]
-
-
 def _exact_inertia(identification: Identification) -> list[str]:
     if identification["B_w"].std > 0:
         return []
     return ["B_w was given without uncertainty: the intervals of m_ch, C_ch, C_l and C_r are too narrow by its share."]
 
 
-def _model_errors(steps: Sequence[StepRow]) -> list[str]:
-    fitted = [row for row in steps if row.role is Role.FIT]
-    unrepeated = [row.floor.step for row in fitted if not row.floor.noise >= 0]
-    above = [row for row in fitted if row.floor.model_error > row.floor.noise]
-    warnings = [
-        f"In {row.floor.step}, what repeats from period to period ({significant(row.floor.model_error)} {row.unit} "
-        f"rms) exceeds the noise ({significant(row.floor.noise)} {row.unit} rms): the model leaves something out there "
-        "that more periods will not average out. The intervals account for it."
-        for row in above
-    ]
-    if unrepeated:
-        warnings.append(
-            f"No repeated periods in {', '.join(unrepeated)}: noise and model error cannot be told apart there."
-        )
-    return warnings
+def _unrepeated(steps: Sequence[StepRow]) -> list[str]:
+    steps_without = [row.floor.step for row in steps if row.role is Role.FIT and not row.floor.noise >= 0]
+    if not steps_without:
+        return []
+    return [f"No repeated periods in {', '.join(steps_without)}: noise and model error cannot be told apart there."]
 
 
 def _not_validated(steps: Sequence[StepRow]) -> list[str]:
-    rows = [row for row in steps if row.role is Role.VALIDATION]
-    if not rows:
-        return ["No lane change in the record: nothing outside of the fit has been checked."]
-    return [
-        f"The {COORDINATE_WORDS[row.floor.coordinate]} of the lane change is off by {percent(row.floor.nrmse)} NRMSE "
-        f"(limit {percent(NRMSE_LIMITS[row.floor.coordinate])})."
-        for row in rows
-        if not row.floor.nrmse <= NRMSE_LIMITS[row.floor.coordinate]
-    ]
+    if any(row.role is Role.VALIDATION for row in steps):
+        return []
+    return ["No lane change in the record: nothing outside of the fit has been checked."]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 from rich import box
 from rich.table import Table
@@ -17,6 +18,11 @@ from ident.vehicle.parameters import Parameters
 
 WARNING_STYLE = "bold yellow"
 
+_MARKED: Final = {
+    "impossible": "no mass, inertia or friction is negative",
+    "poor": "the interval is wider than half the value, too little excitation to build on",
+}
+
 
 def parameter_table(identification: Identification, truth: Parameters | None = None) -> Table:
     """Value, standard deviation and 95 % interval of p (18), beside the truth where it is known."""
@@ -26,8 +32,9 @@ def parameter_table(identification: Identification, truth: Parameters | None = N
     table = _table("Parameters", headings, left=(0, 4))
     for row in rows:
         table.add_row(*_parameter_cells(row), style=WARNING_STYLE if row.estimate.poor else None)
-    if any(row.estimate.poor for row in rows):
-        table.caption = "Marked: the interval is wider than half the value; too little excitation to build on."
+    captions = [text for quality, text in _MARKED.items() if any(row.estimate.quality == quality for row in rows)]
+    if captions:
+        table.caption = f"Marked: {'; '.join(captions)}."
     return table
 
 
@@ -79,7 +86,7 @@ def excitation_table(identification: Identification) -> Table:
             digits(estimate.naive_std, estimate.naive_std),
             significant(row.inflation, 2),
             percent(row.inertia_share),
-            "poor" if estimate.poor else "good",
+            estimate.quality,
             estimate.method,
             style=WARNING_STYLE if estimate.poor else None,
         )

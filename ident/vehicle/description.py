@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Final
@@ -11,7 +11,10 @@ from typing import Final
 from ident.errors import DataFileError
 from ident.vehicle.geometry import Geometry, read_geometry
 from ident.vehicle.parameters import PARAMETER_UNITS, Parameters, read_parameters
-from ident.vehicle.quantities import read_quantities, read_toml, require_table
+from ident.vehicle.quantities import read_quantities, read_toml, refuse_unknown, require_table
+
+KEYS: Final = ("name", "description", "geometry", "prior", "limits")
+"""What a vehicle file may hold at its top."""
 
 LIMIT_UNITS: Final = {
     "rated_torque": "Nm",
@@ -44,12 +47,13 @@ class Limits:
 
 @dataclass(frozen=True)
 class VehicleDescription:
-    """A vehicle file: the vehicle's name, geometry, prior parameters and limits."""
+    """A vehicle file: the vehicle's name, geometry, prior parameters and limits; `path` is the file, for messages."""
 
     name: str
     geometry: Geometry
     prior: Parameters
     limits: Limits
+    path: Path | None = field(default=None, compare=False)
 
 
 def find_data_file(package: str, name_or_path: str | Path) -> Path:
@@ -81,11 +85,14 @@ def load_vehicle(name_or_path: str | Path = "prototype") -> VehicleDescription:
     _check_limits(limits, path)
     prior = read_parameters(path, "prior")
     _check_prior(prior, path)
+    geometry = read_geometry(require_table(document, "geometry", path), path)
+    refuse_unknown(document, KEYS, f"{path}:")
     return VehicleDescription(
         name=str(document.get("name", path.stem)),
-        geometry=read_geometry(require_table(document, "geometry", path), path),
+        geometry=geometry,
         prior=prior,
         limits=limits,
+        path=path,
     )
 
 

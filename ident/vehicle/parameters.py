@@ -69,10 +69,13 @@ def parameters_from(quantities: Mapping[str, Quantity]) -> Parameters:
 
 
 def read_parameters(path: Path, table: str = "parameters") -> Parameters:
-    """Parameters from the table of that name in a TOML file; other keys of an entry are ignored.
+    """Parameters from the table of that name in a TOML file.
+
+    Entries of [parameters], which an identification writes, hold more than value, unit, std and source; it is ignored.
 
     Raises:
-        DataFileError: the file, the table or an entry is missing, or a unit is another one.
+        DataFileError: the file, the table or an entry is missing, a unit is another one, or a key is not known.
     """
     entries: Mapping[str, Any] = require_table(read_toml(path), table, path)
-    return parameters_from(read_quantities(entries, PARAMETER_UNITS, f"{path}: {table}"))
+    result = table == "parameters"
+    return parameters_from(read_quantities(entries, PARAMETER_UNITS, f"{path}: {table}", more_keys=result))

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from ident.errors import DataFileError
+from ident.reading import read_toml as read_toml
+
+GRAVITY: Final = 9.80665
+"""Standard gravity, ISO 80000-3 [m/s²]."""
+
+QUANTITY_KEYS: Final = ("value", "unit", "source", "std")
+"""What an entry of a table of quantities may hold."""
 
 
 @dataclass(frozen=True)
@@ -20,22 +27,6 @@ class Quantity:
     unit: str
     source: str
     std: float = 0.0
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """Parse a TOML file.
-
-    Raises:
-        DataFileError: the file is missing, cannot be read, or is not TOML.
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise DataFileError(f"{path} does not exist.", "Name an existing TOML file.") from error
-    except OSError as error:
-        raise DataFileError(f"{path} cannot be read: {error.strerror}.", "Name a readable TOML file.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DataFileError(f"{path} is not valid TOML: {error}.", "Mend the file at that place.") from error
 
 
 def require_table(document: Mapping[str, Any], name: str, path: Path) -> Mapping[str, Any]:
@@ -50,20 +41,53 @@ def require_table(document: Mapping[str, Any], name: str, path: Path) -> Mapping
     return table
 
 
-def read_quantities(table: Mapping[str, Any], units: Mapping[str, str], where: str) -> dict[str, Quantity]:
+def read_quantities(
+    table: Mapping[str, Any],
+    units: Mapping[str, str],
+    where: str,
+    *,
+    optional: Iterable[str] = (),
+    more_keys: bool = False,
+) -> dict[str, Quantity]:
     """Read the quantities named in `units` (name -> the unit it must have) from a parsed table.
+
+    Args:
+        table: as parsed.
+        units: name -> the unit it must have.
+        where: file and table, for errors.
+        optional: names that may be left out; they are then not in the result.
+        more_keys: an entry may hold other keys than those of a quantity, as in files of results.
 
     Raises:
         DataFileError: an entry is missing, unknown, not finite, or in another unit.
     """
-    _refuse_unknown(table, units, where)
-    return {name: _read_quantity(table, name, unit, where) for name, unit in units.items()}
+    refuse_unknown(table, units, where)
+    left_out = {name for name in optional if name not in table}
+    read = {name: _read_quantity(table, name, unit, where) for name, unit in units.items() if name not in left_out}
+    if not more_keys:
+        for name in read:
+            refuse_unknown(table[name], QUANTITY_KEYS, f"{where}.{name}")
+    return read
 
 
-def _refuse_unknown(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:
-    for name in table:
-        if name not in known:
-            raise DataFileError(f"{where}.{name} is not known.", f"Use only: {', '.join(known)}.")
+def refuse_unknown(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:
+    """Refuse keys that nobody reads: most are misspelt, and what was meant would be missed in silence.
+
+    Args:
+        table: as parsed.
+        known: the keys that are read.
+        where: the table, or the file followed by a colon, for errors.
+
+    Raises:
+        DataFileError: a key is not among `known`; with the one that was probably meant.
+    """
+    names = tuple(known)
+    for key in table:
+        if key not in names:
+            meant = get_close_matches(key, names, n=1)
+            hint = f"Did you mean {meant[0]!r}? " if meant else ""
+            place = f"{where} {key}" if where.endswith(":") else f"{where}.{key}"
+            raise DataFileError(f"{place} is not known.", f"{hint}Use only: {', '.join(names)}.")
 
 
 def _read_quantity(table: Mapping[str, Any], name: str, unit: str, where: str) -> Quantity:

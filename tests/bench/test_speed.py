@@ -14,10 +14,10 @@ import pytest
 
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
-from hil.bench import LockstepBench
+from hil.bench.lockstep import LockstepBench
+from hil.frames.recorder import Recorder
 from hil.master import Master
 from hil.network import load_network
-from hil.recorder import Recorder
 from ident.campaign.controller import Controller
 from ident.campaign.plan import Plan, make_plan
 from ident.campaign.steps import ORDER

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from hil.recorder import finished_steps
+from hil.frames.recorder import finished_steps
 from ident.records.record import Step
 
 GIVEN_INERTIA = ("--b-w", "0.121", "--b-w-std", "0.001")
@@ -80,21 +80,21 @@ def test_a_killed_run_keeps_its_finished_steps_and_goes_on(tmp_path: Path) -> No
 
 
 def test_a_campaign_on_a_bus_imports_nothing_of_the_emulator(tmp_path: Path) -> None:
-    """The emulator is another process here; on a vehicle there is none."""
+    """The emulator is another process here; on a vehicle there is none. A lane change is the shortest step."""
     bus, out = f"unix:{tmp_path / 'can0'}", tmp_path / "run"
     with running(quasiomni("emulate", "--bus", bus, "--lockstep")) as server:
         wait_until(lambda: (tmp_path / "can0").exists() or server.poll() is not None)
         campaign = subprocess.run(
             [
                 *(sys.executable, "-c", WITHOUT_EMULATOR, "campaign", "--bus", bus, "--lockstep", "--yes"),
-                *("--out", str(out), *GIVEN_INERTIA, *only(Step.ROTATION)),
+                *("--out", str(out), *GIVEN_INERTIA, *only(Step.LANE_CHANGE)),
             ],
             capture_output=True,
             timeout=TIMEOUT,
             check=False,
         )
     assert campaign.returncode == 0, campaign.stdout.decode() + campaign.stderr.decode()
-    assert names(out) == [Step.ROTATION]
+    assert names(out) == [Step.LANE_CHANGE]
 
 
 def test_without_a_yes_nothing_moves(tmp_path: Path) -> None:

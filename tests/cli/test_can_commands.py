@@ -48,8 +48,11 @@ MISTAKES = {
     "a vehicle that is none": (("can", "load", "--vehicle", "nix"), "There is no 'nix'"),
     "a file that is none": (("emulate", "--bus", "unix:/tmp/never", "--fault", "bad_day.txt"), "bad_day.txt does not"),
     "a script that is no text": (("emulate", "--bus", "unix:/tmp/never", "--fault", sys.executable), "Line 1"),
-    "a place that cannot be written": (("dbc", "--out", "/nowhere/x.dbc"), "/nowhere/x.dbc: No such file"),
-    "a folder that cannot be made": (("eds", "--out", "/proc/x"), "/proc/x: No such file"),
+    "a place that cannot be written": (
+        ("dbc", "--out", "/proc/nowhere/x.dbc"),
+        "/proc/nowhere/x.dbc cannot be written: No such file",
+    ),
+    "a folder that cannot be made": (("eds", "--out", "/proc/x"), "/proc/x/drive.eds cannot be written: No such file"),
     "a fault that is none": (("emulate", "--bus", "unix:/tmp/never", "--fault", "vanish@0x1"), "vanish"),
 }
 

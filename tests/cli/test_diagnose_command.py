@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from ident.gap.vehicle.ideal import FOUR, ideal_record
+from ident.diagnosis.vehicle.ideal import FOUR, ideal_record
+from ident.effects.extended import read_model
 from ident.records.channels import Channels, write_channels
 from ident.records.files import write_record
 from ident.records.record import Record
 from ident.vehicle.description import load_vehicle
-from ident.vehicle.extended import read_model
 from ident.vehicle.quantities import read_toml
 
 Quasi = Callable[..., Any]

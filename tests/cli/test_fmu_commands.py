@@ -18,12 +18,12 @@ from ident.campaign.excitation import FourierSeries
 from ident.campaign.plan import make_plan
 from ident.campaign.reference import excitation_reference
 from ident.campaign.steps import EXCITATIONS
+from ident.effects import make_effect
+from ident.effects.extended import ExtendedModel, write_model
+from ident.effects.text import effects_text
 from ident.records.files import write_record
 from ident.records.record import Record, Segment, Step, make_segment
 from ident.vehicle.description import find_data_file, load_vehicle
-from ident.vehicle.effect_text import effects_text
-from ident.vehicle.effects import EffectName, make_effect
-from ident.vehicle.extended import ExtendedModel, write_model
 from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS
 
 Quasi = Callable[..., Any]
@@ -57,8 +57,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for name, unit in PARAMETER_UNITS.items()
     ]
     effects = [
-        make_effect(EffectName.QUADRATIC_DRAG, "chassis", {"coefficient": 0.0}),
-        make_effect(EffectName.BACKLASH, "drive_fl", {"gap": 0.002}),
+        make_effect("quadratic_drag", "chassis", {"coefficient": 0.0}),
+        make_effect("backlash", "drive_fl", {"gap": 0.002}),
     ]
     folder.parameters.write_text("\n".join(lines) + effects_text(effects))
     return folder.path
@@ -112,7 +112,7 @@ def test_another_model_of_the_vehicle_becomes_an_fmu_and_that_of_the_run_stays(
     """As `diagnose --extended` writes one."""
     extended, fmu = tmp_path / "vehicle.toml", tmp_path / "platform.fmu"
     before = (run / "parameters.toml").read_bytes()
-    effect = make_effect(EffectName.STRIBECK, "steering_left", {"amplitude": 6.0, "velocity": 0.3})
+    effect = make_effect("stribeck", "steering_left", {"amplitude": 6.0, "velocity": 0.3})
     write_model(ExtendedModel(load_vehicle().prior, (effect,)), extended, {"run": "test"})
     built = quasi("fmu", run, "--model", extended, "-o", fmu, "--platforms", "host")
     assert built.code == 0, built
@@ -130,7 +130,7 @@ def test_an_effect_that_a_model_has_twice_is_refused(quasi: Quasi, run: Path, tm
     """Parameters of the FMU are named by effect and place."""
     model = tmp_path / "model.toml"
     sizes = {"amplitude": 2.0, "velocity": 0.3}, {"amplitude": 1.0, "velocity": 9.0}
-    two = tuple(make_effect(EffectName.STRIBECK, "steering_left", size) for size in sizes)
+    two = tuple(make_effect("stribeck", "steering_left", size) for size in sizes)
     write_model(ExtendedModel(load_vehicle().prior, two), model, {"run": "test"})
     refused = quasi("fmu", run, "--model", model, "-o", tmp_path / "none.fmu")
     assert refused.code == 2
@@ -159,7 +159,8 @@ def test_mistakes_are_told_with_a_remedy(quasi: Quasi, run: Path, record: Path, 
     (tmp_path / "broken.fmu").write_bytes(b"no archive")
     broken = quasi("cosim", tmp_path / "broken.fmu", "--record", record)
     assert broken.code == 2
-    assert "remedy" in broken.error
+    # Said before it is loaded: what cannot be loaded is reported afterwards.
+    assert broken.error.index("broken.fmu is native code of whoever made it") < broken.error.index("remedy")
     nonsense = quasi("campaign", "--plant", "bullet", "--out", tmp_path / "run", "--skip", "lane_change")
     assert nonsense.code == 2
     assert "fmu:FILE" in nonsense.error

@@ -82,7 +82,7 @@ def test_wrong_identity(quasi: Any, network_with: Any, tmp_path: Path) -> None:
 
 def test_wrong_units(quasi: Any, network_with: Any, tmp_path: Path) -> None:
     network = network_with("rated_torque = { value = 1.27", "rated_torque = { value = 12.7")
-    assert_user_error(campaign(quasi, tmp_path / "run", "--network", network), "6076", "1270", "12700")
+    assert_user_error(campaign(quasi, tmp_path / "run", "--network", network), "rated_torque", "1.27 Nm", "12.7 Nm")
     assert not (tmp_path / "run").exists()
 
 
@@ -108,9 +108,9 @@ def test_resume_without_a_run(quasi: Any, tmp_path: Path) -> None:
     assert_user_error(campaign(quasi, tmp_path / "nowhere", "--resume"), "no run folder")
 
 
-def test_a_resumed_run_is_not_driven_with_other_options(quasi: Any, tmp_path: Path, drive: Any) -> None:
+def test_a_resumed_run_is_not_driven_with_other_options(quasi: Any, tmp_path: Path, plan_run: Any) -> None:
     run = tmp_path / "run"
-    drive(run, [Step.ROTATION], known_inertia=KnownInertia(0.121, 0.001, "given"))
+    plan_run(run, [Step.ROTATION], known_inertia=KnownInertia(0.121, 0.001, "given"))
     for options, named in (
         (("--vehicle", "compact"), "--vehicle"),
         (("--seed", 9), "--seed"),

@@ -10,7 +10,8 @@ from pathlib import Path
 import can
 import pytest
 
-from hil.buses import LockstepHub, UnixBus, UnixHub
+from hil.bus.lockstep import LockstepHub
+from hil.bus.unix import UnixBus, UnixHub
 
 Pair = tuple[can.BusABC, can.BusABC]
 

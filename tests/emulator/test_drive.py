@@ -62,7 +62,7 @@ def test_torque_settles_at_the_command_limited_to_the_peak(torque: float) -> Non
         drive = enabled(vehicle)[2]
         drive.command(torque)
         vehicle.advance(0.01)
-        assert drive.measured_torque() == pytest.approx(math.copysign(min(abs(torque), 3.82), torque), abs=1e-12)
+        assert drive.measured_torque() == pytest.approx(math.copysign(min(abs(torque), 3.8), torque), abs=1e-12)
 
 
 def test_torque_follows_the_interpolated_set_point_through_the_current_loop(stand: EmulatedVehicle) -> None:

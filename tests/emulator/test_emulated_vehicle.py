@@ -16,10 +16,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from emulator.engine.pybullet.window import require_display
 from emulator.noise import Disturbances
 from emulator.prototype import Prototype, load_prototype
 from emulator.vehicle import EmulatedVehicle
-from emulator.window import require_display
 from ident.errors import UserError
 
 

@@ -66,7 +66,7 @@ def test_a_path_is_read_as_well_as_a_name() -> None:
         ("friction = { value = 0.9", "friction = { value = 0.0", "floor.friction"),
         ("direction_fl = { value = 1.0", "direction_fl = { value = 0.5", "direction_fl"),
         ("zero_position = { value = 65536.0", "zero_position = { value = 0.5", "zero_position"),
-        ("peak_torque = { value = 3.82", "peak_torque = { value = 1.0", "peak torque"),
+        ("peak_torque = { value = 3.8", "peak_torque = { value = 1.0", "peak torque"),
         ("torque_sensor = { value = 0.005", "torque_sensor = { value = -0.005", "torque_sensor"),
         ("load_correlation_time = { value = 0.1", "load_correlation_time = { value = 0.0", "load_corr"),
         ('length = { value = 1.75, unit = "m"', 'length = { value = 1750, unit = "mm"', "'mm'"),

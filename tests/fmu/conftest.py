@@ -14,8 +14,8 @@ from fmu.packaging import Order, build_fmu
 from fmu.platforms import host_platform
 from fmu.source import ModelSource
 from fmu.variables import Inputs
+from ident.effects import make_effect
 from ident.vehicle.description import load_vehicle
-from ident.vehicle.effects import EffectName, make_effect
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 Build = Callable[[FmiVersion, Inputs], Path]
@@ -44,8 +44,8 @@ def source() -> ModelSource:
     vehicle = load_vehicle()
     parameters = Parameters(vehicle.prior.values, np.full(len(PARAMETER_NAMES), 0.01))
     effects = (
-        make_effect(EffectName.STRIBECK, "steering_left", {"amplitude": 2.0}, {"amplitude": 0.1}),
-        make_effect(EffectName.BACKLASH, "drive_fl", {"gap": 0.001}),
+        make_effect("stribeck", "steering_left", {"amplitude": 2.0}, {"amplitude": 0.1}),
+        make_effect("backlash", "drive_fl", {"gap": 0.001}),
     )
     return ModelSource(vehicle, parameters, effects, {"run": "monday"}, {"parameters.toml": b"# as identified\n"})
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from emulator.firmware.flywheels import Flywheels
-from hil.bench import LockstepBench
+from hil.bench.lockstep import LockstepBench
 from hil.master import Master
 from hil.network import DEFAULT_NETWORK, Network, load_network
 

@@ -184,6 +184,7 @@ class DriveApplication:
         if option == AbortConnection.FAULT:
             self.fail(fault)
         elif option == AbortConnection.DISABLE_VOLTAGE:
+            self._points.forget()
             self._machine.command(Command.DISABLE_VOLTAGE)
         elif option == AbortConnection.QUICK_STOP:
             self._machine.command(Command.QUICK_STOP)
@@ -233,6 +234,7 @@ class DriveApplication:
         self.axis.release()
 
     def _start_quick_stop(self) -> None:
+        self._points.forget()
         option = QUICK_STOP_OPTIONS[self._option(0x605A)]
         if option.kind is StopKind.DISABLE:
             self._machine.take(12)
@@ -240,6 +242,7 @@ class DriveApplication:
             self._stop_axis(option.kind, None if option.stays else 12)
 
     def _react_to_fault(self) -> None:
+        self._points.forget()
         if self._reaction is StopKind.DISABLE:
             self._machine.take(14)
         else:

@@ -34,7 +34,11 @@ def approach(value: float, target: float, step: float) -> float:
 
 @dataclass
 class Setpoints:
-    """What the master has written, in the units of the objects."""
+    """What the master has written, in the units of the objects.
+
+    Attributes:
+        position_writes: times that 607Ah was written since there was nothing to go by.
+    """
 
     controlword: int = 0
     target_torque: int = 0
@@ -43,6 +47,18 @@ class Setpoints:
     torque_offset: int = 0
     velocity_offset: int = 0
     position_offset: int = 0
+    position_writes: int = 0
+
+    def aim(self, position: int) -> None:
+        """The master has written 607Ah."""
+        self.target_position = position
+        self.position_writes += 1
+
+    def forget(self) -> None:
+        """What was asked for counts for nothing any more; the controlword is the master's."""
+        controlword = self.controlword
+        self.clear()
+        self.controlword = controlword
 
     def clear(self) -> None:
         """Nothing is asked for."""
@@ -106,6 +122,10 @@ class Axis:
         """6064h [increments]."""
         self.count, self.read_at = self.hardware.position(), self._timers.now
         return (self.count - self.home + _HALF) % _SPAN - _HALF
+
+    def target(self) -> int:
+        """607Ah [increments]; it follows the position until the master has written one."""
+        return self.points.target_position if self.points.position_writes else self.position()
 
     def velocity(self) -> float:
         """Of the shaft [rad/s]."""

@@ -18,7 +18,6 @@ _I32 = 2**31 - 1
 
 _SETPOINTS = {
     0x6071: "target_torque",
-    0x607A: "target_position",
     0x60B0: "position_offset",
     0x60B1: "velocity_offset",
     0x60B2: "torque_offset",
@@ -88,6 +87,9 @@ def _bind_setpoints(drive: DriveApplication, objects: Dictionary) -> None:
     objects.on_write(0x6060, 0, lambda value: drive.select(_mode(value)))
     for index, name in _SETPOINTS.items():
         _bind_setpoint(drive, objects, index, name)
+    objects.on_read(0x607A, 0, drive.axis.target)
+    objects.on_write(0x607A, 0, lambda value: _follow(drive, value))
+    objects.on_pdo_write(0x607A, 0, points.aim)
 
 
 def _bind_setpoint(drive: DriveApplication, objects: Dictionary, index: int, name: str) -> None:
@@ -100,6 +102,11 @@ def _bind_setpoint(drive: DriveApplication, objects: Dictionary, index: int, nam
     objects.on_read(index, 0, lambda: int(getattr(points, name)))
     objects.on_write(index, 0, write)
     objects.on_pdo_write(index, 0, lambda value: setattr(points, name, value))
+
+
+def _follow(drive: DriveApplication, position: int) -> None:
+    drive.axis.points.aim(position)
+    drive.follow()
 
 
 def _on_read(objects: Dictionary, reads: dict[tuple[int, int], Callable[[], int]]) -> None:

@@ -6,7 +6,8 @@ import math
 from typing import Final
 
 from emulator.firmware.drive.axis import TICK, Axis, approach, shorter_way
-from emulator.firmware.drive.modes import FOLLOWS_COMMAND, POSITION_ERROR, TARGET_REACHED, Interpolation, Steady
+from emulator.firmware.drive.modes import FOLLOWS_COMMAND, POSITION_ERROR, TARGET_REACHED, Steady
+from emulator.firmware.drive.tracking import Limits, Tracking
 
 _NEW_SETPOINT: Final = 1 << 4
 _IMMEDIATELY: Final = 1 << 5
@@ -52,14 +53,20 @@ class PositionLoop:
 
 
 class CyclicPosition:
-    """Cyclic synchronous position: 607Ah + 60B0h, interpolated, velocity and torque offsets fed forward."""
+    """Cyclic synchronous position: 607Ah + 60B0h, interpolated, velocity and torque offsets fed forward.
+
+    A target that was written before this mode had power is not gone to: the drive comes to rest where it is, at 60C6h,
+    and stays until the master writes another.
+    """
 
     ticks = True
 
     def __init__(self, axis: Axis) -> None:
         self._axis = axis
         self._loop = PositionLoop(axis)
-        self._line = Interpolation()
+        self._tracking = Tracking()
+        self._writes = 0
+        self._goal: int | None = None
 
     @property
     def failed(self) -> bool:
@@ -67,27 +74,46 @@ class CyclicPosition:
         return self._loop.failed
 
     def start(self) -> None:
-        """From the present position."""
+        """From the present position and speed."""
+        axis = self._axis
         self._loop.start()
-        self.take()
+        self._tracking.start(axis.velocity() * axis.increments)
+        axis.points.position_writes = self._writes = 0
+        self._goal = None
 
     def take(self) -> None:
         """A new set-point to go to."""
-        self._line.begin(self._axis.parameters.interpolation_time)
+        points, period = self._axis.points, self._axis.parameters.interpolation_time
+        self._tracking.begin(period)
+        if points.position_writes != self._writes:
+            self._writes = points.position_writes
+            goal, last = points.target_position + points.position_offset, self._goal
+            self._tracking.set_point(None if last is None else shorter_way(goal - last), period)
+            self._goal = goal
 
     def tick(self) -> None:
         """One step along the line, and of the position and velocity loops."""
+        if self._goal is None:
+            self._loop.step(self._tracking.rest(self._limits()))
+            return
         axis, points = self._axis, self._axis.points
-        speed = axis.parameters.max_motor_speed * axis.increments
         distance = shorter_way(points.target_position + points.position_offset - axis.position_demand)
-        asked = self._line.step(distance) / TICK
-        slope = min(max(asked, -speed), speed)
+        slope, as_asked = self._tracking.step(distance, self._limits())
         self._loop.step(slope, offset=points.velocity_offset, extra=points.torque_offset * axis.permille)
-        axis.limited = axis.limited or slope != asked
+        axis.limited = axis.limited or not as_asked
 
     def status(self) -> int:
         """Bits 12, and 13 where the following error has lasted too long (6065h, 6066h)."""
         return FOLLOWS_COMMAND | (POSITION_ERROR if self.failed else 0)
+
+    def _limits(self) -> Limits:
+        parameters, scale = self._axis.parameters, self._axis.increments
+        return Limits(
+            parameters.max_motor_speed * scale,
+            parameters.max_acceleration * scale,
+            parameters.max_deceleration * scale,
+            parameters.interpolation_time,
+        )
 
 
 class ProfilePosition:
@@ -157,10 +183,11 @@ class ProfilePosition:
 
     def _accept(self, controlword: int) -> None:
         axis = self._axis
-        target = float(axis.points.target_position)
+        target = float(axis.target())
         if controlword & _RELATIVE:
             before = self._waiting if self._waiting is not None else axis.goal
-            target += axis.position_demand if before is None else before
+            way = axis.points.target_position if axis.points.position_writes else 0
+            target = way + (axis.position_demand if before is None else before)
         self._acknowledged = True
         if self._reached or controlword & _IMMEDIATELY:
             self._go(target)

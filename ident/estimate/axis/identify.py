@@ -11,13 +11,7 @@ from numpy.typing import NDArray
 from ident.errors import EstimationError
 from ident.estimate.axis.processing import PARAMETERS, AxisEquations, AxisProcessing, axis_equations
 from ident.estimate.least_squares import LinearSystem, Solution, solve
-from ident.estimate.uncertainty import (
-    LongRun,
-    Scores,
-    interval_factor,
-    long_run_covariance,
-    parameter_covariance,
-)
+from ident.estimate.uncertainty import ErrorCovariance, FittedRows, error_covariance, interval_factor
 from ident.records.axis_record import AxisKind, AxisRecord
 
 Array = NDArray[np.float64]
@@ -102,15 +96,16 @@ def identify_axis(record: AxisRecord, processing: AxisProcessing, axis: str | No
     signals = record.axis(axis)
     equations = axis_equations(record, signals, processing)
     solution = _solve(equations, f"{record.source}, {signals.label}")
-    long_run = long_run_covariance(
-        [Scores(equations.regressor * solution.residual[:, None], equations.period, equations.sample_time)]
+    kept = np.ones(len(solution.residual), dtype=bool)
+    rows = FittedRows(
+        equations.regressor, solution.influence, solution.residual, kept, equations.period, equations.sample_time
     )
-    covariance = parameter_covariance(solution.normal_inverse, long_run)
-    deviations = np.sqrt(np.diag(covariance))
+    error = error_covariance([rows])
+    deviations = np.sqrt(np.diag(error.matrix))
     return AxisIdentification(
         axis=signals.name,
-        estimates=_estimates(solution, deviations, long_run, signals.kind),
-        correlation=covariance / np.outer(deviations, deviations),
+        estimates=_estimates(solution, error, signals.kind),
+        correlation=error.matrix / np.outer(deviations, deviations),
         condition=solution.condition,
         regressor_condition=float(np.linalg.cond(equations.regressor)),
         relative_error=float(np.linalg.norm(solution.residual) / np.linalg.norm(equations.effort)),
@@ -130,10 +125,11 @@ def _solve(equations: AxisEquations, where: str) -> Solution:
         ) from error
 
 
-def _estimates(solution: Solution, deviations: Array, long_run: LongRun, kind: AxisKind) -> tuple[AxisEstimate, ...]:
+def _estimates(solution: Solution, error: ErrorCovariance, kind: AxisKind) -> tuple[AxisEstimate, ...]:
     freedom = len(solution.residual) - len(PARAMETERS)
     white = float(solution.residual @ solution.residual) / freedom
-    factor = interval_factor(long_run.degrees_of_freedom)
+    deviations = np.sqrt(np.diag(error.matrix))
+    factors = [interval_factor(float(freedom)) for freedom in error.degrees_of_freedom]
     return tuple(
         AxisEstimate(
             name=name,
@@ -143,7 +139,7 @@ def _estimates(solution: Solution, deviations: Array, long_run: LongRun, kind: A
             ci95=(float(value - factor * std), float(value + factor * std)),
             naive_std=float(np.sqrt(white * inverse)),
         )
-        for name, value, std, inverse in zip(
-            PARAMETERS, solution.values, deviations, np.diag(solution.normal_inverse), strict=True
+        for name, value, std, factor, inverse in zip(
+            PARAMETERS, solution.values, deviations, factors, np.diag(solution.normal_inverse), strict=True
         )
     )

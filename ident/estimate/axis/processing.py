@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -90,8 +91,12 @@ def axis_equations(record: AxisRecord, axis: AxisSignals, processing: AxisProces
 
 def smoothed(position: Array, cutoff: float, sample_time: float) -> Array:
     """4th-order Butterworth low-pass forwards and backwards along axis 0, cutoff in rad/s."""
-    sections = signal.butter(BUTTERWORTH_ORDER, cutoff / (2 * math.pi), fs=1 / sample_time, output="sos")
-    return _both_ways(sections, position, BUTTERWORTH_ORDER)
+    return _both_ways(_sections(cutoff, sample_time), position, BUTTERWORTH_ORDER)
+
+
+@lru_cache(maxsize=32)
+def _sections(cutoff: float, sample_time: float) -> Array:
+    return np.asarray(signal.butter(BUTTERWORTH_ORDER, cutoff / (2 * math.pi), fs=1 / sample_time, output="sos"))
 
 
 def decimated(values: Array, factor: int) -> Array:

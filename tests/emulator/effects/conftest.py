@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from emulator.prototype import Prototype, load_prototype
 from emulator.vehicle import EmulatedVehicle
-from ident.vehicle.effect_text import parse_effect
+from ident.effects.text import parse_effect
 
 SIGNS = (1, 1, -1, -1)
 """Mounting of the drives of the prototype: fl, rl, fr, rr."""

@@ -9,8 +9,8 @@ import numpy as np
 import pybullet
 import pytest
 
-from emulator.as_built import GRAVITY
 from ident.vehicle.parameters import PARAMETER_NAMES
+from ident.vehicle.quantities import GRAVITY
 
 Make = Callable[..., object]
 

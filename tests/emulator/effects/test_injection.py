@@ -6,46 +6,22 @@ from collections.abc import Callable
 
 import pytest
 
-from emulator.effects.injection import INJECTORS, inject
+from emulator.effects import inject
 from emulator.prototype import load_prototype
+from ident.effects import EFFECTS, make_effect
+from ident.effects.text import parse_effect
 from ident.errors import UserError
-from ident.vehicle.effect_text import parse_effect
-from ident.vehicle.effects import EFFECTS, EffectName, make_effect
+from ident.plant.places import members
+from ident.vehicle.description import load_vehicle
 
 Make = Callable[..., object]
 
-SMALL = {
-    EffectName.STRIBECK: 0.5,
-    EffectName.ASYMMETRIC_COULOMB: 0.3,
-    EffectName.ASYMMETRIC_VISCOUS: 0.1,
-    EffectName.QUADRATIC_DRAG: 0.05,
-    EffectName.SLOPE: 0.005,
-    EffectName.COM_OFFSET: 0.05,
-    EffectName.PAYLOAD: 40.0,
-    EffectName.TORQUE_GAIN: 0.05,
-    EffectName.TORQUE_BIAS: 0.03,
-    EffectName.TORQUE_RIPPLE: 0.03,
-    EffectName.TIME_DELAY: 0.004,
-    EffectName.BACKLASH: 0.005,
-    EffectName.ELASTICITY: 0.0005,
-    EffectName.WHEEL_RADIUS: 0.001,
-    EffectName.WHEEL_ECCENTRICITY: 1e-4,
-    EffectName.STEERING_OFFSET: 0.01,
-    EffectName.SLIP: 0.3,
-    EffectName.SCRUB: 3.0,
-    EffectName.STEERING_UNIT_MASS: 3.0,
-    EffectName.PARAMETER_CHANGE: 0.1,
-}
 
-
-def test_every_effect_has_an_injector() -> None:
-    assert set(INJECTORS) == set(EFFECTS)
-
-
-@pytest.mark.parametrize(("name", "where"), [(name, where) for name in EffectName for where in EFFECTS[name].places])
+@pytest.mark.parametrize(("name", "where"), [(kind.name, where) for kind in EFFECTS.values() for where in kind.places])
 @pytest.mark.parametrize("prototype", ["prototype", "compact"])
-def test_every_effect_can_be_at_each_of_its_places(name: EffectName, where: str, prototype: str) -> None:
-    effect = make_effect(name, where, {EFFECTS[name].size.name: SMALL[name]})
+def test_every_effect_can_be_at_each_of_its_places(name: str, where: str, prototype: str) -> None:
+    kind, vehicle = EFFECTS[name], load_vehicle(prototype)
+    effect = make_effect(name, where, {kind.size.name: kind.usual(vehicle, members(where)[0])})
     plain, changed = (inject(load_prototype(prototype), some, 1e-3) for some in ((), [effect]))
     assert repr(changed) != repr(plain)
 

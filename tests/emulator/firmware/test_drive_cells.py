@@ -177,7 +177,8 @@ def test_a_trip_is_a_fault_in_every_state_and_mode(cell: Cell, mode: Mode) -> No
 def test_no_mode_leaves_a_torque_behind_when_the_power_goes_off(cell: Cell, mode: Mode) -> None:
     cell.bring_to("OPERATION_ENABLED", mode)
     points = cell.drive.axis.points
-    points.target_torque, points.target_velocity, points.target_position = 300, 10**6, 10**6
+    points.target_torque, points.target_velocity = 300, 10**6
+    points.aim(10**6)
     cell.control(0x0F)
     cell.settle()
     assert (cell.drive.axis.torque_demand != 0) is (mode not in (Mode.NONE, Mode.HOMING, Mode.PROFILE_POSITION))

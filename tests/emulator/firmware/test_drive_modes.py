@@ -256,6 +256,164 @@ def test_no_following_error_is_monitored_with_the_largest_window(drive: Drive) -
     assert drive.status & 0x6F == 0x27
 
 
+FAR = 30_600_000
+"""Counts from zero at which a vehicle has come to stand: 29 revolutions."""
+
+
+def stand(drive: Drive, angle: float = FAR / COUNTS * math.tau) -> int:
+    """The shaft has been turned without power; its count."""
+    drive.shaft.angle, drive.shaft.speed = angle, 0.0
+    return drive.read(0x6064)
+
+
+def test_enabled_in_cyclic_position_the_drive_stays_until_a_target_is_written(drive: Drive) -> None:
+    here = stand(drive)
+    assert drive.read(0x607A) == here, "the target follows the position"
+    drive.enable(Mode.CYCLIC_POSITION)
+    drive.wait(1.0)
+    assert drive.read(0x6064) == pytest.approx(here, abs=2)
+    assert drive.speed == pytest.approx(0.0, abs=1e-6)
+    # The offsets of a master that is not there yet push nothing.
+    drive.write(0x60B1, 0, counts(20.0), "<i")
+    drive.write(0x60B2, 0, 300, "<h")
+    drive.wait(0.5)
+    assert drive.read(0x6064) == pytest.approx(here, abs=2)
+    drive.write(0x60B1, 0, 0, "<i")
+    drive.write(0x60B2, 0, 0, "<h")
+    drive.write(0x607A, 0, here + 1000, "<i")
+    drive.wait(1.0)
+    assert drive.read(0x6064) == pytest.approx(here + 1000, abs=2)
+
+
+def test_a_target_from_before_the_power_came_is_not_gone_to(drive: Drive) -> None:
+    drive.enable(Mode.CYCLIC_POSITION)
+    drive.write(0x607A, 0, counts(1.0), "<i")
+    drive.wait(1.0)
+    drive.write(0x6040, 0, 0x06, "<H")
+    here = stand(drive)
+    drive.write(0x607A, 0, 0, "<i")
+    drive.enable(Mode.CYCLIC_POSITION)
+    drive.wait(1.0)
+    assert drive.read(0x6064) == pytest.approx(here, abs=2)
+
+
+def test_a_change_to_cyclic_position_in_motion_comes_to_rest_at_60c6h_and_stays(drive: Drive) -> None:
+    drive.write(0x60C6, 0, counts(500.0), "<I")
+    drive.enable(Mode.PROFILE_VELOCITY)
+    drive.write(0x60FF, 0, counts(50.0), "<i")
+    drive.wait(2.0)
+    start, before = drive.shaft.angle, drive.speed
+    drive.write(0x6060, 0, Mode.CYCLIC_POSITION, "<b")
+    speeds = []
+    for _ in range(1000):
+        drive.wait(0.001)
+        speeds.append(drive.speed)
+    assert min(after - earlier for earlier, after in pairwise([before, *speeds])) > -1.0, "0.5 rad/s a tick, and lag"
+    assert drive.shaft.angle - start == pytest.approx(50.0**2 / 2 / 500.0, rel=0.1)
+    assert drive.speed == pytest.approx(0.0, abs=0.01)
+
+
+def demands(drive: Drive, ticks: int) -> list[float]:
+    """6062h in each tick [increments]."""
+    found = []
+    for _ in range(ticks):
+        drive.wait(0.001)
+        found.append(drive.read(0x6062))
+    return found
+
+
+@pytest.mark.parametrize("way", [0.0002, 0.01, 0.3, 5.0, 100.0, -20.0])
+@pytest.mark.parametrize(("up", "down"), [(500.0, 250.0), (100.0, 2000.0), (1582.0, 1582.0)])
+def test_a_step_of_the_target_is_gone_at_60c5h_60c6h_and_6080h(
+    drive: Drive, way: float, up: float, down: float
+) -> None:
+    drive.write(0x60C5, 0, counts(up), "<I")
+    drive.write(0x60C6, 0, counts(down), "<I")
+    drive.write(0x6080, 0, round(200.0 / math.tau * 60), "<I")
+    drive.write(0x6065, 0, 2**32 - 1, "<I")
+    here = stand(drive)
+    drive.enable(Mode.CYCLIC_POSITION)
+    drive.write(0x607A, 0, here + counts(way), "<i")
+    path = demands(drive, 3000)
+    slopes = [(after - before) * 1000.0 / COUNTS * math.tau for before, after in pairwise([here, *path])]
+    changes = [(after - before) * 1000.0 for before, after in pairwise([0.0, *slopes, 0.0])]
+    # A change of slope within an interpolation time of 2 ms is that of one line to the next; rounding is of a count.
+    assert max(map(abs, changes)) < 2.0 * max(up, down) + 20.0
+    assert max(map(abs, slopes)) < 200.0 * 1.001
+    assert path[-1] == here + counts(way)
+    beyond = max((position - path[-1]) * math.copysign(1.0, way) for position in path)
+    assert beyond <= 1.0, "it is not passed"
+    # As fast as the limits allow: a trapezoid or a triangle, and two interpolation times.
+    top = min(200.0, math.sqrt(2.0 * abs(way) * up * down / (up + down)))
+    fastest = top / up + top / down + max(abs(way) - top**2 / 2 / up - top**2 / 2 / down, 0.0) / top
+    taken = next(k for k, position in enumerate(path) if position == path[-1]) * 1e-3
+    assert taken < fastest * 1.02 + 0.006
+
+
+def test_a_path_within_the_limits_is_followed_as_if_there_were_none(drive: Drive) -> None:
+    drive.enable(Mode.CYCLIC_POSITION)
+    path = [counts(30.0 * (1 - math.cos(math.tau * k / 500))) for k in range(1000)]
+    behind = []
+    for value in path:
+        drive.write(0x607A, 0, value, "<i")
+        drive.wait(0.002)
+        behind.append(abs(drive.read(0x6062) - value))
+    # 30 (2 pi)^2 = 1184 rad/s^2 of 1582 are asked for.
+    assert max(behind) <= 1
+    assert not drive.status & LIMIT
+
+
+def test_a_path_is_met_again_after_a_set_point_that_was_lost(drive: Drive) -> None:
+    drive.write(0x6065, 0, 2**32 - 1, "<I")
+    drive.enable(Mode.CYCLIC_POSITION)
+    behind = []
+    for k in range(1000):
+        target = counts(100.0 * (k * 0.002) ** 2 / (1.0 + k * 0.002))
+        if not 500 <= k < 520:
+            drive.write(0x607A, 0, target, "<i")
+        drive.wait(0.002)
+        behind.append(drive.read(0x6062) - target)
+    assert max(map(abs, behind[500:525])) > counts(1.0)
+    assert max(map(abs, behind[600:])) <= 2
+
+
+@pytest.mark.parametrize("mode", [Mode.PROFILE_VELOCITY, Mode.CYCLIC_VELOCITY, Mode.CYCLIC_TORQUE, Mode.PROFILE_TORQUE])
+def test_what_was_asked_for_before_a_fault_is_forgotten(drive: Drive, mode: Mode) -> None:
+    drive.enable(mode)
+    drive.write(0x60FF, 0, counts(20.0), "<i")
+    drive.write(0x60B1, 0, counts(5.0), "<i")
+    drive.write(0x6071, 0, 100, "<h")
+    drive.write(0x60B2, 0, 50, "<h")
+    drive.wait(0.5)
+    assert drive.speed > 5.0
+    drive.shaft.trip(Trip.OVER_CURRENT)
+    stand(drive, 0.0)
+    drive.write(0x6040, 0, 0x80, "<H")
+    assert [drive.read(index) for index in (0x60FF, 0x60B1, 0x6071, 0x60B2)] == [0, 0, 0, 0]
+    drive.enable(mode)
+    drive.wait(1.0)
+    assert drive.speed == pytest.approx(0.0, abs=1e-3)
+
+
+def test_what_was_asked_for_before_a_quick_stop_is_forgotten_and_before_a_shutdown_is_not(drive: Drive) -> None:
+    drive.enable(Mode.PROFILE_VELOCITY)
+    for controlword, left in ((0x06, counts(20.0)), (0x02, 0)):
+        drive.write(0x60FF, 0, counts(20.0), "<i")
+        drive.write(0x6040, 0, controlword, "<H")
+        drive.wait(2.0)
+        drive.enable(Mode.PROFILE_VELOCITY)
+        assert drive.read(0x60FF) == left
+
+
+def test_a_position_profile_without_a_target_goes_nowhere(drive: Drive) -> None:
+    here = stand(drive)
+    drive.enable(Mode.PROFILE_POSITION)
+    for controlword in (0x1F, 0x0F, 0x5F):
+        drive.write(0x6040, 0, controlword, "<H")
+        drive.wait(0.5)
+        assert drive.read(0x6064) == pytest.approx(here, abs=2)
+
+
 NEW, NOW, RELATIVE = 0x1F, 0x3F, 0x5F
 """Operation enabled with a new set-point; at once; relative."""
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from fmu.model.generate import generate_core
 from fmu.table import variable_table
 from fmu.variables import Block, Inputs
+from ident.effects import Effect
 from ident.vehicle.description import load_vehicle
-from ident.vehicle.effects import Effect
 from ident.vehicle.parameters import Parameters
 
 Array = NDArray[np.float64]

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from fmu.table import variable_table
 from fmu.variables import Block, Inputs
+from ident.effects import EFFECTS, Effect, make_effect
+from ident.plant.springs import DAMPING_RATIO, MOTOR_SHARE
 from ident.vehicle.description import load_vehicle
-from ident.vehicle.effects import EFFECTS, Effect, EffectName, make_effect
-from ident.vehicle.springs import DAMPING_RATIO, MOTOR_SHARE
 
 Array = NDArray[np.float64]
 
-WITH_STATES = (EffectName.TIME_DELAY, EffectName.BACKLASH, EffectName.ELASTICITY)
+WITH_STATES = ("time_delay", "backlash", "elasticity")
 STEP = 5e-4
 STIFF = 1e6
 """Spring that gives less than what is looked at [Nm/rad]."""
@@ -45,7 +45,7 @@ def soft(core_of: Callable[..., Any]) -> Any:
 @pytest.fixture(scope="module")
 def late(core_of: Callable[..., Any]) -> Any:
     """Has delays of size zero."""
-    return core_of("prototype", [effect for effect in effects_of(0.0) if effect.name is EffectName.TIME_DELAY])
+    return core_of("prototype", [effect for effect in effects_of(0.0) if effect.name == "time_delay"])
 
 
 def watch(instance: Any, torques: Callable[[float], dict[str, float]], duration: float, *names: str) -> Array:

@@ -10,8 +10,8 @@ import pytest
 
 from fmu.table import neutral_effects, variable_table
 from fmu.variables import Block
+from ident.effects import make_effect
 from ident.vehicle.description import load_vehicle
-from ident.vehicle.effects import EffectName, make_effect
 
 GRAVITY = 9.80665
 ROLLING = {"x_dot": 0.5, **{f"beta_{wheel}_dot": 5.0 for wheel in ("fl", "rl", "fr", "rr")}}
@@ -150,7 +150,7 @@ def test_an_eccentric_mass_turns_the_vehicle_when_it_is_pushed(extended: Any) ->
 
 def test_low_friction_of_one_wheel_is_where_its_limit_starts() -> None:
     vehicle = load_vehicle()
-    effects = [make_effect(EffectName.SLIP, "wheel_fr", {"friction": 0.2})]
+    effects = [make_effect("slip", "wheel_fr", {"friction": 0.2})]
     table = variable_table(vehicle, vehicle.prior, effects)
     starts = [table[f"friction_limit_{wheel}"].start for wheel in ("fl", "rl", "fr", "rr")]
     usual = vehicle.limits.floor_friction

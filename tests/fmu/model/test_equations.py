@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ident.vehicle import dynamics, kinematics
+from ident.plant import dynamics, kinematics
+from ident.plant.kinematics import detect_mode
+from ident.plant.modes import Mode
 from ident.vehicle.geometry import WHEELS
-from ident.vehicle.modes import Mode, detect_mode
 from ident.vehicle.parameters import COULOMB_EPSILON
 
 Array = NDArray[np.float64]

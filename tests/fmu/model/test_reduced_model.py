@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from ident.campaign.plan import make_plan
 from ident.campaign.reference import LaneChange, lane_change_reference
+from ident.plant import dynamics, kinematics, symbolic
+from ident.plant.modes import Mode
 from ident.records.record import Step
-from ident.vehicle import dynamics, kinematics, symbolic
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import COULOMB_EPSILON
 
 Array = NDArray[np.float64]

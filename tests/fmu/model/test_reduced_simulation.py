@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from ident.effects import Effect, make_effect
+from ident.effects.extended import ExtendedModel, simulation_of
 from ident.estimate.filters import zero_phase
-from ident.vehicle import dynamics
+from ident.plant import dynamics
+from ident.plant.modes import Mode
+from ident.plant.simulation import Motion, Trajectory
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.effects import Effect, EffectName, make_effect
-from ident.vehicle.extended import ExtendedModel
 from ident.vehicle.geometry import WHEELS
-from ident.vehicle.modes import Mode
-from ident.vehicle.simulation import Motion, Simulation, Trajectory
 
 Array = NDArray[np.float64]
 
@@ -27,11 +27,11 @@ HELD_STEERING = {"d_cl": 1e3, "d_cr": 1e3}
 QUICK = {"stick_time": 1e9}
 """The FMU's friction without its memory, which the reduced model does not have."""
 
-SOFT = make_effect(EffectName.ELASTICITY, "drive_fr", {"compliance": 2e-3})
-LOOSE = make_effect(EffectName.BACKLASH, "drive_fl", {"gap": 0.01})
-SOFT_SIDE = make_effect(EffectName.ELASTICITY, "steering_left", {"compliance": 5e-4})
-LOOSE_SIDE = make_effect(EffectName.BACKLASH, "steering_right", {"gap": 0.005})
-LATE = make_effect(EffectName.TIME_DELAY, "drive_rl", {"delay": 0.008})
+SOFT = make_effect("elasticity", "drive_fr", {"compliance": 2e-3})
+LOOSE = make_effect("backlash", "drive_fl", {"gap": 0.01})
+SOFT_SIDE = make_effect("elasticity", "steering_left", {"compliance": 5e-4})
+LOOSE_SIDE = make_effect("backlash", "steering_right", {"gap": 0.005})
+LATE = make_effect("time_delay", "drive_rl", {"delay": 0.008})
 
 
 def swinging(mode: Mode, vehicle: VehicleDescription) -> tuple[Motion, Array]:
@@ -52,7 +52,7 @@ def reduced(
 ) -> Trajectory:
     start, torques = swinging(mode, vehicle)
     model = ExtendedModel(vehicle.prior.replaced(**parameters), effects)
-    return Simulation(model, mode, vehicle.geometry).run(start, torques[None], SAMPLE_TIME)
+    return simulation_of(model, mode, vehicle.geometry).run(start, torques[None], SAMPLE_TIME)
 
 
 def in_the_fmu(core: Any, mode: Mode, **parameters: float) -> dict[str, Array]:

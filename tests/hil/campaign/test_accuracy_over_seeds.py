@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from hil.bench.truth import truth_of
 from hil.campaign.folder import Run
 from hil.campaign.reading import read_run
 from hil.campaign.study import TOLERANCES, Outcome, accuracy, coverage, outcome_of
-from hil.truth import truth_of
 from ident.campaign.steps import ORDER
 from ident.estimate.identify import identify
 from ident.records.record import Step
@@ -36,7 +36,7 @@ def test_twenty_seeds_keep_the_tolerances_and_the_intervals_their_word(
     for row in rows:
         assert row.median_error < TOLERANCES[row.name], row
         assert row.half_width <= TOLERANCES[row.name], row
-    assert 0.90 <= coverage(rows) <= 0.99
+    assert 0.92 <= coverage(rows) <= 0.98
 
 
 def test_a_sample_of_seeds_keeps_the_tolerances(drive: Callable[..., Run], tmp_path: Path) -> None:

@@ -11,17 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hil.bench.truth import truth_of
 from hil.campaign.folder import Run, open_run
 from hil.campaign.reading import read_any, read_logs, read_run
 from hil.campaign.runner import ALIGNED, PARALLEL
 from hil.campaign.study import TOLERANCES
-from hil.recorder import finished_steps
-from hil.truth import truth_of
+from hil.frames.recorder import finished_steps
+from ident.assessment import Assessment
 from ident.campaign.steps import ORDER
 from ident.estimate.identify import Identification, identify
-from ident.estimate.result_file import write_parameters
 from ident.records.files import write_record
 from ident.records.record import Record, Step
+from ident.report.result_file import write_parameters
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters, read_parameters
 
 INCREMENT = 2 * np.pi / 2**17
@@ -137,7 +138,7 @@ def test_a_plain_record_gives_the_same_estimate(
 
 def test_the_result_file_reads_back_and_states_everything(result: Identification, run: Run, tmp_path: Path) -> None:
     path = tmp_path / "parameters.toml"
-    write_parameters(result, path, {"run": run.folder.path.name})
+    write_parameters(result, Assessment(), path, {"run": run.folder.path.name})
     read = read_parameters(path)
     np.testing.assert_allclose(read.values, result.values, rtol=1e-8)
     document = tomllib.loads(path.read_text())

@@ -9,13 +9,13 @@ import pytest
 
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
-from hil.bench import LockstepBench
+from hil.bench.emulation import BenchOperator
+from hil.bench.lockstep import LockstepBench
 from hil.campaign.folder import Run, RunFolder, create_run, network_file_of, open_run
 from hil.campaign.reading import PAYLOAD, read_driven
 from hil.campaign.runner import CampaignRunner
-from hil.emulation import BenchOperator
+from hil.frames.recorder import Recorder
 from hil.network import load_network
-from hil.recorder import Recorder
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import PERIODS
 from ident.estimate.equations import equations_of

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
-from hil import emulation
-from hil.campaign.folder import Run, RunFolder, create_run, network_file_of
+from hil.bench import emulation
+from hil.campaign.folder import Run
 from hil.campaign.runner import CampaignRunner
-from hil.network import load_network
-from hil.recorder import Recorder, finished_steps
-from ident.campaign.plan import make_plan
+from hil.frames.recorder import Recorder, finished_steps
 from ident.records.record import Step
-from ident.vehicle.description import find_data_file, load_vehicle
 
 
 @dataclass
@@ -23,6 +19,11 @@ class Hands:
 
     operator: emulation.BenchOperator
     asked: list[str] = field(default_factory=list)
+    seen: list[str] = field(default_factory=list)
+
+    def watch(self, step: str, done: int, total: int) -> None:
+        if done == total:
+            self.seen.append(step)
 
     def lift(self) -> None:
         self.asked.append("lift")
@@ -33,29 +34,29 @@ class Hands:
         self.operator.lower()
 
 
-def drive(folder: Path, already: list[Step]) -> Hands:
+def drive(plan_run: Callable[..., Run], folder: Path, already: list[Step]) -> Hands:
     steps = [Step.WHEEL_LIFTED, Step.ROTATION]
-    network_file = network_file_of("prototype")
-    network = load_network(network_file)
-    generator = np.random.default_rng(1)
-    plan = make_plan(load_vehicle(), generator, steps=steps, periods=4, cycle=network.cycle_period)
-    run = Run(RunFolder(folder), plan, network, 1, "emulator, in lockstep", "prototype", None)
-    create_run(run, find_data_file("ident.vehicle", "prototype"))
+    run = plan_run(folder, steps, periods=1)
     run.folder.frames.mkdir()
     for number, step in enumerate(already):
         (run.folder.frames / f"{number:03d}_{step}.blf").write_bytes(b"")
-    with emulation.bench("prototype", 1, False, network_file) as bench:
+    with emulation.bench(run.prototype, run.seed, False, run.network.path) as bench:
         hands = Hands(bench.operator)
         recorder = Recorder(run.folder.frames)
-        CampaignRunner(run, bench.bus, bench.clock, recorder, hands, lambda *_: None).drive()
+        CampaignRunner(run, bench.bus, bench.clock, recorder, hands, hands.watch).drive()
         recorder.close()
     assert {step for step, _ in finished_steps(run.folder.frames)} >= set(steps)
     return hands
 
 
-def test_the_vehicle_is_lifted_and_lowered_once(tmp_path: Path) -> None:
-    assert drive(tmp_path / "run", []).asked == ["lift", "lower"]
+def test_the_vehicle_is_lifted_and_lowered_once(plan_run: Callable[..., Run], tmp_path: Path) -> None:
+    hands = drive(plan_run, tmp_path / "run", [])
+    assert hands.asked == ["lift", "lower"]
+    # Whoever watches sees which attempt at an alignment it is, before the step that it is for.
+    lifted, first, *_, rotation = hands.seen
+    assert (lifted, rotation) == ("wheel_lifted", "rotation")
+    assert first == "aligning for rotation, attempt 1 of 12"
 
 
-def test_a_run_that_was_killed_on_the_stand_asks_for_the_floor(tmp_path: Path) -> None:
-    assert drive(tmp_path / "run", [Step.WHEEL_LIFTED]).asked == ["lower"]
+def test_a_run_that_was_killed_on_the_stand_asks_for_the_floor(plan_run: Callable[..., Run], tmp_path: Path) -> None:
+    assert drive(plan_run, tmp_path / "run", [Step.WHEEL_LIFTED]).asked == ["lower"]

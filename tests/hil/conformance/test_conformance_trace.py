@@ -10,7 +10,7 @@ import can
 import pytest
 
 from emulator.firmware.flywheels import Flywheels
-from hil.bench import LockstepBench
+from hil.bench.lockstep import LockstepBench
 from hil.conformance.cases import NOT_APPLICABLE, OWN_TESTS, STAND_INS
 from hil.conformance.emulated import replay_trace
 from hil.conformance.replay import NODE_ID, Replay

@@ -20,7 +20,7 @@ def table() -> SizeTable:
 
 @pytest.fixture(scope="session")
 def cases(table: SizeTable) -> list[Case]:
-    return draw_cases(table, Composition(), 500_001, np.random.default_rng(5))
+    return draw_cases(table, Composition(), lambda case: 500_001 + 2 * case, np.random.default_rng(5))
 
 
 @pytest.fixture(scope="session")

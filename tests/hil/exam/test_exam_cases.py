@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from emulator.effects.injection import inject
+from emulator.effects import inject
 from emulator.prototype import load_prototype
 from hil.exam.cases import SIZES, Case, Composition, Kind, case_from_json, draw_cases
 from hil.exam.sealing import SealingOrder, effect_of, seal
 from hil.exam.sizes import EffectSize, SizeTable
+from ident.diagnosis.names import EffectName, places_of
+from ident.effects import EFFECTS
 from ident.errors import UserError
-from ident.vehicle.effects import EFFECTS
 
 
 def test_there_are_as_many_of_each_kind_as_asked_for(cases: list[Case]) -> None:
@@ -37,7 +38,7 @@ def test_effects_and_sizes_are_balanced(cases: list[Case], table: SizeTable) -> 
 
 def test_every_effect_of_the_library_is_in_the_table_at_every_place(table: SizeTable) -> None:
     listed = {(row.name, row.where) for row in (*table.visible, *table.invisible)}
-    assert listed == {(str(spec.name), where) for spec in EFFECTS.values() for where in spec.places}
+    assert listed == {(str(name), where) for name in EffectName for where in places_of(name)}
 
 
 def test_at_least_four_effects_have_no_candidate(table: SizeTable) -> None:
@@ -86,7 +87,7 @@ def test_a_size_goes_through_the_points_measured() -> None:
 
 def test_a_kind_without_effects_is_refused(table: SizeTable) -> None:
     with pytest.raises(UserError, match="no effect of a kind"):
-        draw_cases(SizeTable((), (), ()), Composition(4, 0, 0, 0, 0), 1, np.random.default_rng(0))
+        draw_cases(SizeTable((), (), ()), Composition(4, 0, 0, 0, 0), range(9).__getitem__, np.random.default_rng(0))
 
 
 def test_every_excitation_is_driven_as_often_as_another(cases: list[Case]) -> None:
@@ -104,11 +105,15 @@ def test_no_kind_of_case_keeps_to_a_few_excitations(cases: list[Case]) -> None:
 def test_an_exam_has_no_more_excitations_than_cases(table: SizeTable) -> None:
     few = Composition(effects=2, pairs=0, none=1, unknown=0, invisible=0)
     assert few.driven == 3
-    assert {case.excitation for case in draw_cases(table, few, 1, np.random.default_rng(1))} == {0, 1, 2}
+    assert {case.excitation for case in draw_cases(table, few, range(9).__getitem__, np.random.default_rng(1))} == {
+        0,
+        1,
+        2,
+    }
 
 
 def test_an_exam_without_cases_is_refused_before_anything_is_planned(table: SizeTable, tmp_path: Path) -> None:
-    order = SealingOrder(tmp_path / "exam", "prototype", Composition(0, 0, 0, 0, 0), 1, 1, None)
+    order = SealingOrder(tmp_path / "exam", "prototype", Composition(0, 0, 0, 0, 0), None, 1, 1, None)
     with pytest.raises(UserError, match="without cases"):
         seal(order, table, lambda *_: None)
     assert not order.out.exists()

@@ -23,12 +23,16 @@ def quasiomni(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+def key_of(folder: ExamFolder) -> list[str]:
+    return ["--key", str(folder.path.parent / "exam.key")]
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> ExamFolder:
-    path = tmp_path_factory.mktemp("exam") / "exam"
-    sealed = quasiomni("exam", "seal", "--out", str(path), "--first-seed", "901", "--jobs", "1", *CASES)
+    folder = ExamFolder(tmp_path_factory.mktemp("exam") / "exam")
+    sealed = quasiomni("exam", "seal", "--out", str(folder.path), *key_of(folder), "--jobs", "1", *CASES)
     assert sealed.returncode == 0, sealed.stderr
-    return ExamFolder(path)
+    return folder
 
 
 def test_all_records_have_one_size_and_one_date(folder: ExamFolder) -> None:
@@ -46,7 +50,7 @@ def test_a_record_holds_the_four_steps_and_their_repeats(folder: ExamFolder) -> 
 
 def test_sealing_again_changes_nothing(folder: ExamFolder) -> None:
     before = folder.answer.read_bytes()
-    again = quasiomni("exam", "seal", "--out", str(folder.path), "--first-seed", "901", "--jobs", "1", *CASES)
+    again = quasiomni("exam", "seal", "--out", str(folder.path), *key_of(folder), "--jobs", "1", *CASES)
     assert again.returncode == 0, again.stderr
     assert folder.answer.read_bytes() == before
 
@@ -54,21 +58,22 @@ def test_sealing_again_changes_nothing(folder: ExamFolder) -> None:
 def test_another_exam_is_not_sealed_into_the_same_folder(folder: ExamFolder) -> None:
     other = quasiomni("exam", "seal", "--out", str(folder.path), "--first-seed", "7", "--jobs", "1", *CASES)
     assert other.returncode == 2
-    assert "another exam" in " ".join(other.stderr.split())
+    assert "holds a sealed exam" in " ".join(other.stderr.split())
 
 
 def test_the_exam_is_diagnosed_and_scored(folder: ExamFolder) -> None:
-    for option in ([], ["--without-true-candidate"]):
+    for option in ([], ["--without-true-candidate", *key_of(folder)]):
         diagnosed = quasiomni("exam", "diagnose", str(folder.path), "--jobs", "1", *option)
         assert diagnosed.returncode == 0, diagnosed.stderr
     answers = [json.loads(folder.diagnosis(name).read_text()) for name in read_exam(folder).identifiers]
     assert all(answer["verdict"] in ("effect", "none", "unknown") for answer in answers)
     assert all(len(answer["alone"]) > 10 for answer in answers)
     assert len(list((folder.path / "diagnoses_without").iterdir())) == 1
-    scored = quasiomni("exam", "score", str(folder.path))
+    scored = quasiomni("exam", "score", str(folder.path), *key_of(folder))
     assert scored.returncode == 0, scored.stderr
     score = json.loads((folder.path / "score.json").read_text())
     assert score["cases"] == 3
+    assert score["sealed"] is True
     assert score["missing"] == {}
     assert [score["rates"][name][1] for name in (FALSE_ALARMS, REJECTED, RIGHT)] == [1, 1, 1]
     assert sum(count for _, _, count in score["confusion"]) == 3

@@ -13,10 +13,10 @@ from hil.exam.identity import Identities, identities, planned_record
 from hil.exam.plans import CONFIRMING
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import PERIODS
-from ident.gap.vehicle.build import build_problem
-from ident.gap.vehicle.ideal import FOUR, ideal_record
+from ident.diagnosis.vehicle.build import build_problem
+from ident.diagnosis.vehicle.ideal import FOUR, ideal_record
+from ident.effects import EFFECTS
 from ident.vehicle.description import load_vehicle
-from ident.vehicle.effects import EFFECTS
 
 CYCLE = 0.004
 
@@ -27,7 +27,7 @@ SIDES = (("fl", "rl"), ("fr", "rr"))
 def known(request: pytest.FixtureRequest) -> Identities:
     """Of the four steps, for either geometry."""
     vehicle = load_vehicle(request.param)
-    return identities(build_problem([ideal_record(FOUR, vehicle)], vehicle, vehicle.prior))
+    return identities(build_problem([ideal_record(FOUR, vehicle)], vehicle, vehicle.prior), vehicle)
 
 
 def names(known: Identities, name: str, where: str, size: float = 1.0) -> frozenset[str]:

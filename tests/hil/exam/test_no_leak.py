@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hil.exam.cases import Case
-from hil.exam.folder import Exam, ExamFolder, answer_hash, open_answer, read_exam, sealed, write_exam
+from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.record_bytes import record_bytes, record_from_bytes
 from ident.errors import UserError
 from ident.records.record import Record, Segment
@@ -51,37 +50,12 @@ def test_a_record_comes_back_bit_by_bit_without_its_commands() -> None:
     assert back.command_torques is None
 
 
-def test_the_answer_opens_only_as_it_was_sealed(cases: list[Case], tmp_path: Path) -> None:
-    folder, content = ExamFolder(tmp_path), sealed(cases, b"salt")
-    write_whole(content, folder.answer)
-    assert open_answer(folder, answer_hash(content)) == cases
-    write_whole(sealed(cases[::-1], b"salt"), folder.answer)
-    with pytest.raises(UserError, match="not the answer that was sealed"):
-        open_answer(folder, answer_hash(content))
-
-
-def test_a_manifest_survives_being_written(tmp_path: Path) -> None:
-    folder, exam = ExamFolder(tmp_path), Exam("prototype", 0.002, ("one", "two"), ("a", "b", "c"), "hash")
-    write_exam(folder, exam)
-    assert read_exam(folder) == exam
-
-
 def test_an_exam_of_another_version_is_refused(tmp_path: Path) -> None:
     folder = ExamFolder(tmp_path)
-    write_whole('{"schema": "quasiomni.exam/1", "plans": "one"}', folder.manifest)
-    with pytest.raises(UserError, match="exam/1, not") as refused:
+    write_whole('{"schema": "quasiomni.exam/2", "plans": ["one"]}', folder.manifest)
+    with pytest.raises(UserError, match="exam/2, not") as refused:
         read_exam(folder)
     assert "seal the exam again" in refused.value.remedy
-
-
-def test_the_salt_keeps_the_hash_from_being_guessed(cases: list[Case]) -> None:
-    assert answer_hash(sealed(cases, b"one")) != answer_hash(sealed(cases, b"two"))
-
-
-def test_the_answer_cannot_be_read_by_accident(cases: list[Case]) -> None:
-    content = sealed(cases, b"salt")
-    assert not any(case.identifier.encode() in content for case in cases)
-    assert b"stribeck" not in content
 
 
 PROGRAM = """

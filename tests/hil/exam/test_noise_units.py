@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from emulator.effects.injection import AnyEffect
+from emulator.effects import Wanted
 from emulator.prototype import load_prototype
 from hil.exam.noise_units import Noise, SizeInNoise, size_in_noise
 from hil.exam.plans import plan_exam, plans_from_text, plans_text
 from hil.exam.quiet import drive_quietly
 from ident.campaign.plan import Plan
+from ident.effects.text import parse_effect
 from ident.estimate.equations import usable_equations
 from ident.estimate.filters import Processing
 from ident.records.record import Record
 from ident.vehicle.description import load_vehicle
-from ident.vehicle.effect_text import parse_effect
 
 pytestmark = pytest.mark.slow
 
@@ -34,7 +34,7 @@ def plain(plan: Plan) -> Record:
     return drive_quietly(plan, "prototype", ())
 
 
-def size(plan: Plan, plain: Record, *effects: AnyEffect) -> SizeInNoise:
+def size(plan: Plan, plain: Record, *effects: Wanted) -> SizeInNoise:
     steps = {"steering_left": "alpha_l", "steering_right": "alpha_r", "straight": "x", "rotation": "gamma"}
     noise = Noise({(step, name): 1.0 for step, name in steps.items()}, {step: np.ones(8) for step in steps})
     changed = drive_quietly(plan, "prototype", effects)

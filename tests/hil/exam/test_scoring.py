@@ -17,7 +17,7 @@ import pytest
 from hil.exam import score_names as names
 from hil.exam.answers import Alone, Answer, Said, chance, permuted, read_answers, said_from
 from hil.exam.cases import Case, Injected, Kind
-from hil.exam.folder import Exam, ExamFolder, answer_hash, sealed, write_exam
+from hil.exam.folder import ExamFolder
 from hil.exam.identity import Identities, Identity
 from hil.exam.score_figures import confusion_svg, reliability_svg
 from hil.exam.score_report import ScoreReport, score_json, score_markdown, summary_lines
@@ -296,7 +296,7 @@ def test_an_answer_is_read_as_it_was_written() -> None:
 
 def test_the_score_is_written_for_people_and_programs(answers: list[Answer]) -> None:
     result = score(answers, {"slip@chassis, size 1: not driven": 2})
-    report = ScoreReport(result, result.rates[names.RIGHT], chance(answers), removal_rates(answers[:0]))
+    report = ScoreReport(result, result.rates[names.RIGHT], chance(answers), removal_rates(answers[:0]), None)
     assert "asked at least 0.90" in "\n".join(summary_lines(report))
     assert "2 without an answer" in summary_lines(report)[0]
     page = score_markdown(report, "Exam")
@@ -304,6 +304,17 @@ def test_the_score_is_written_for_people_and_programs(answers: list[Answer]) -> 
     assert f"chance, {chance(answers):.3f}" in page
     assert "- slip@chassis, size 1: not driven: 2" in page
     assert json.loads(score_json(report))["rates"][names.RIGHT][:2] == [240, 240]
+
+
+@pytest.mark.parametrize(("first_seed", "words"), [(None, "Sealed: "), (7, "Not sealed: the cases follow from seed 7")])
+def test_the_score_says_whether_the_cases_could_be_known(
+    answers: list[Answer], first_seed: int | None, words: str
+) -> None:
+    result = score(answers)
+    report = ScoreReport(result, result.rates[names.RIGHT], chance(answers), {}, first_seed)
+    assert words in summary_lines(report)[1]
+    assert words in score_markdown(report, "Exam")
+    assert json.loads(score_json(report))["sealed"] is (first_seed is None)
 
 
 def test_the_pictures_are_well_formed_and_hold_every_case(answers: list[Answer]) -> None:
@@ -318,11 +329,8 @@ def test_the_pictures_are_well_formed_and_hold_every_case(answers: list[Answer])
 def test_an_answer_is_judged_by_the_excitation_that_its_case_drove(tmp_path: Path) -> None:
     folder = ExamFolder(tmp_path)
     case = Case("a", Kind.EFFECT, (Injected("torque_bias", "drive_fl", "bias", 0.01),), 1.0, 1, 1)
-    content = sealed([case], b"salt")
-    write_whole(content, folder.answer)
-    write_exam(folder, Exam("prototype", 0.002, ("first", "second"), ("a",), answer_hash(content)))
     said = {"verdict": "none", "effects": [], "invisible": [], "gap": {"closed": None}}
     write_whole(json.dumps(said), folder.diagnosis("a"))
     alike = {("torque_bias@drive_fl", True): ["asymmetric_coulomb@wheel_fl"]}
-    (answer,) = read_answers(folder, [Identities({}), Identities(alike)])
+    (answer,) = read_answers(folder, [case], [Identities({}), Identities(alike)])
     assert answer.identity.names == {"torque_bias", "asymmetric_coulomb"}

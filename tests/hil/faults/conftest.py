@@ -7,7 +7,7 @@ import can
 import pytest
 
 from emulator.firmware.flywheels import Flywheels
-from hil.bench import LockstepBench
+from hil.bench.lockstep import LockstepBench
 
 
 class Sight:

@@ -9,10 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from emulator.firmware.flywheels import Flywheels
-from emulator.ground import Ground
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
-from hil.bench import LockstepBench
+from hil.bench.lockstep import LockstepBench
 from hil.faults import FaultKind
 from hil.faults.fault import SPECIFICATIONS, FaultError, Target
 from hil.master import Master
@@ -134,7 +133,7 @@ def test_on_slippery_ground_a_wheel_brings_no_more_force_than_friction_allows() 
     prototype, friction = load_prototype(), 0.02
     with (
         EmulatedVehicle(prototype, seed=1, noise_scale=0.0) as vehicle,
-        LockstepBench(vehicle, ground=Ground(vehicle.engine)) as bench,
+        LockstepBench(vehicle, ground=vehicle) as bench,
     ):
         master = Master(bench.bus, bench.clock, load_network())
         master.boot()
@@ -152,7 +151,7 @@ def test_on_slippery_ground_a_wheel_brings_no_more_force_than_friction_allows() 
 def test_ground_under_one_wheel_is_that_wheels_alone() -> None:
     with (
         EmulatedVehicle(load_prototype(), seed=1, noise_scale=0.0) as vehicle,
-        LockstepBench(vehicle, ground=Ground(vehicle.engine)) as bench,
+        LockstepBench(vehicle, ground=vehicle) as bench,
     ):
         master = Master(bench.bus, bench.clock, load_network())
         master.boot()

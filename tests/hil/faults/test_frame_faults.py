@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from emulator.firmware.flywheels import Flywheels
-from hil.bench import LockstepBench
+from hil.bench.lockstep import LockstepBench
 
 HEARTBEAT = 0x701
 """Heartbeats of the first drive, every 10 ms, are the traffic in most of these tests."""

@@ -8,7 +8,7 @@ import can
 import pytest
 
 from emulator.firmware.flywheels import Flywheels
-from hil.bench import LockstepBench
+from hil.bench.lockstep import LockstepBench
 from hil.master import Master
 from hil.network import Network, load_network
 from hil.pytest_plugin.health import Symptom, examine

@@ -10,7 +10,7 @@ import pytest
 
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
-from hil.bench import LockstepBench
+from hil.bench.lockstep import LockstepBench
 from hil.master import Master
 from hil.network import load_network
 from hil.testing import (

@@ -12,7 +12,7 @@ import canopen
 import pytest
 from canopen.profiles.p402 import BaseNode402
 
-from hil.buses import open_bus
+from hil.bus.opening import open_bus
 from hil.network import DEFAULT_NETWORK
 
 COUNTS = 1048576

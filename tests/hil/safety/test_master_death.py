@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from hil.buses import open_bus
-from hil.clock import WallClock
+from hil.bus.clock import WallClock
+from hil.bus.opening import open_bus
 from hil.network import DEFAULT_NETWORK, Network
 from hil.safety import DeathOfMaster, MasterDeathReport, StopSettings, evaluate
 from hil.safety.emulated import let_master_die

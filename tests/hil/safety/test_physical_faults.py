@@ -10,7 +10,7 @@ import pytest
 
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
-from hil.bench import LockstepBench
+from hil.bench.lockstep import LockstepBench
 from hil.master import Master
 from hil.master.errors import DriveStateError
 from hil.network import load_network
@@ -123,7 +123,7 @@ def test_accelerating_to_and_fro_for_too_long_overheats_the_motors_and_they_warn
     warned = to_and_fro_until_fault(vehicle)
     end = vehicle.bench.clock.now()
     assert 0x4310 in vehicle.read(0x603F)
-    time_constant = -3.0 / math.log(1 - 1.05 / (3.82 / 1.27) ** 2)
+    time_constant = -3.0 / math.log(1 - 1.05 / (3.8 / 1.27) ** 2)
     assert end - start == pytest.approx(time_constant * math.log(4 / 2.95), rel=0.15)
     assert start < warned < end
 

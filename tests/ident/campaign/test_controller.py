@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from ident.campaign.controller import Controller, FollowingError
 from ident.campaign.plan import Plan
 from ident.campaign.reference import Reference, Track
+from ident.plant import kinematics
+from ident.plant.modes import Mode
 from ident.records.record import Step
-from ident.vehicle import kinematics
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import Parameters
 
 Array = NDArray[np.float64]

@@ -12,6 +12,7 @@ from ident.campaign.excitation import FourierSeries, motion_basis, resting_proje
 from ident.campaign.optimise import (
     ADHESION_RESERVE,
     GRAVITY,
+    LIMITS,
     SAMPLES,
     TORQUE_RESERVE,
     Excitation,
@@ -109,8 +110,22 @@ def test_excitation_keeps_every_limit_and_touches_one(step: Step, seed: int, veh
     problem = problem_of(spec, vehicle)
     time = np.arange(SAMPLES) * spec.period / SAMPLES
     usage = problem.usage(series.evaluate(time))
-    assert max(usage.values()) == pytest.approx(1.0, abs=1e-4)
-    assert max(usage, key=lambda name: usage[name]) == binding
+    assert usage.max() == pytest.approx(1.0, abs=1e-4)
+    assert LIMITS[int(usage.argmax())] == binding
+
+
+@steps
+def test_many_motions_are_judged_as_each_of_them_is(step: Step, vehicle: VehicleDescription) -> None:
+    spec = EXCITATIONS[step]
+    problem = problem_of(spec, vehicle)
+    time = np.arange(SAMPLES) * spec.period / SAMPLES
+    motions = [sized(spec, vehicle, seed)[0].evaluate(time) for seed in range(3)]
+    stacked = tuple(np.stack(parts) for parts in zip(*motions, strict=True))
+    usage, normal = problem.usage(stacked), problem.normal_matrix(stacked)
+    for index, motion in enumerate(motions):
+        assert usage[:, index] == pytest.approx(problem.usage(motion))
+        assert normal[index] == pytest.approx(problem.normal_matrix(motion))
+        assert condition_number(normal)[index] == pytest.approx(float(condition_number(normal[index])))
 
 
 def test_a_condition_number_is_that_of_unit_columns() -> None:

@@ -1,4 +1,4 @@
-"""Margins recomputed on the frequency response, with the dead time as it is instead of a Pade approximation."""
+"""Margins recomputed on the frequency response of what is promised, by a search of its own."""
 
 from __future__ import annotations
 

@@ -9,9 +9,9 @@ from ident.campaign.plan import Plan, Room, assemble_plan
 from ident.campaign.reference import Reference
 from ident.campaign.steps import ORDER, PERIODS
 from ident.errors import CampaignError
+from ident.plant.kinematics import constraint_matrix
 from ident.records.record import Step
 from ident.vehicle.geometry import Geometry
-from ident.vehicle.kinematics import constraint_matrix
 
 References = dict[Step, Reference]
 CYCLE = 0.002

@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from ident.campaign.excitation import FourierSeries, resting_projection, series_of
+from ident.plant import dynamics, kinematics
+from ident.plant.modes import Mode
 from ident.records.record import Record, Segment, Step, make_segment
-from ident.vehicle import dynamics, kinematics
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.geometry import Geometry
-from ident.vehicle.modes import Mode
 from ident.vehicle.parameters import Parameters
 
 Array = NDArray[np.float64]

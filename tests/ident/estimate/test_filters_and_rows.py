@@ -43,6 +43,14 @@ def test_a_filter_treats_time_reversal_alike() -> None:
     np.testing.assert_allclose(there[800:-800], back[800:-800], atol=1e-9)
 
 
+def test_no_end_sample_alone_moves_what_lies_beyond_it() -> None:
+    """What lies beyond an end is told by samples that their neighbours have judged; the last three are not."""
+    line = 0.3 * np.arange(400.0)
+    damaged = line.copy()
+    damaged[[0, 1, 2, -1]] += [50.0, -3.0, 7.0, -80.0]
+    np.testing.assert_array_equal(zero_phase(damaged, CUTOFF, DT, 3), zero_phase(line, CUTOFF, DT, 3))
+
+
 def test_derivatives_of_a_parabola_are_exact() -> None:
     time = DT * np.arange(100)
     values = np.stack([3 * time**2 - time, 5 - time**2], axis=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,13 +11,7 @@ from numpy.typing import NDArray
 from scipy import signal, stats
 
 from ident.estimate.least_squares import LinearSystem, solve
-from ident.estimate.uncertainty import (
-    LongRun,
-    Scores,
-    interval_factor,
-    long_run_covariance,
-    parameter_covariance,
-)
+from ident.estimate.uncertainty import ErrorCovariance, FittedRows, error_covariance, interval_factor
 
 Array = NDArray[np.float64]
 
@@ -65,11 +59,13 @@ def trial(error: Error, periods: int, draws: int = 250, labelled: bool = True) -
     found, inside, naive_inside, deviations = [], [], [], []
     for _ in range(draws):
         solution = solve(LinearSystem(("a", "b", "c"), x, x @ TRUTH + error(generator, periods)))
-        long_run = long_run_covariance([Scores(x * solution.residual[:, None], labels, SAMPLE_TIME)])
-        std = np.sqrt(np.diag(parameter_covariance(solution.normal_inverse, long_run)))
+        rows = FittedRows(x, solution.influence, solution.residual, np.ones(len(x), dtype=bool), labels, SAMPLE_TIME)
+        stated = error_covariance([rows])
+        std = np.sqrt(np.diag(stated.matrix))
         naive = np.sqrt(np.diag(solution.normal_inverse) * np.var(solution.residual))
         miss = np.abs(solution.values - TRUTH)
-        inside.append(miss < interval_factor(long_run.degrees_of_freedom) * std)
+        factors = np.array([interval_factor(freedom) for freedom in stated.degrees_of_freedom])
+        inside.append(miss < factors * std)
         naive_inside.append(miss < 1.96 * naive)
         found.append(solution.values)
         deviations.append(std)
@@ -113,24 +109,49 @@ def test_white_noise_needs_no_correction() -> None:
     np.testing.assert_allclose(found.mean_std, expected, rtol=0.2)
 
 
+def part(generator: np.random.Generator, samples: int = 4000) -> FittedRows:
+    x = generator.normal(size=(samples, 2))
+    residual = generator.normal(size=samples)
+    kept, period = np.ones(samples, dtype=bool), np.repeat(np.arange(4), samples // 4)
+    return FittedRows.of_least_squares(x, residual, kept, period, SAMPLE_TIME, np.eye(2))
+
+
 def test_independent_parts_add_their_covariances() -> None:
     generator = np.random.default_rng(0)
-    parts = [Scores(generator.normal(size=(4000, 2)), np.full(4000, -1), SAMPLE_TIME) for _ in range(2)]
-    together = long_run_covariance(parts)
-    one, other = (long_run_covariance([part]) for part in parts)
-    np.testing.assert_allclose(together.covariance, one.covariance + other.covariance)
-    assert together.degrees_of_freedom > max(one.degrees_of_freedom, other.degrees_of_freedom)
+    parts = [part(generator) for _ in range(2)]
+    together = error_covariance(parts)
+    one, other = (error_covariance([part]) for part in parts)
+    np.testing.assert_allclose(together.matrix, one.matrix + other.matrix)
+    assert np.all(together.degrees_of_freedom > np.maximum(one.degrees_of_freedom, other.degrees_of_freedom))
 
 
-def test_the_sandwich_is_that_of_white() -> None:
-    inverse = np.array([[2.0, 0.3], [0.3, 1.0]])
-    scores = np.array([[1.0, 0.5], [0.5, 3.0]])
-    found = parameter_covariance(inverse, LongRun(scores, 10.0))
-    expected = [
-        [sum(inverse[i, k] * scores[k, m] * inverse[m, j] for k in range(2) for m in range(2)) for j in range(2)]
-        for i in range(2)
-    ]
-    np.testing.assert_allclose(found, expected)
+def test_every_parameter_has_the_degrees_of_freedom_of_the_part_that_shows_it() -> None:
+    sharp = ErrorCovariance(np.diag([1.0, 0.0, 1.0]), np.full(3, 5.0))
+    broad = ErrorCovariance(np.diag([0.0, 1.0, 1.0]), np.full(3, 80.0))
+    found = ErrorCovariance.total([sharp, broad])
+    np.testing.assert_allclose(found.degrees_of_freedom, [5.0, 80.0, 4 / (1 / 5 + 1 / 80)])
+
+
+def test_an_error_that_is_known_not_to_be_needs_no_degrees_of_freedom() -> None:
+    found = ErrorCovariance.total([ErrorCovariance(np.zeros((1, 1)), np.zeros(1))])
+    assert interval_factor(float(found.degrees_of_freedom[0])) == pytest.approx(1.959964, abs=1e-6)
+
+
+def test_the_covariance_goes_with_the_inverse_normal_matrix_from_both_sides() -> None:
+    generator = np.random.default_rng(1)
+    rows, inverse = part(generator), np.array([[2.0, 0.3], [0.3, 1.0]])
+    plain = error_covariance([rows]).matrix
+    moved = replace(rows, influence=rows.regressor @ inverse)
+    np.testing.assert_allclose(error_covariance([moved]).matrix, inverse @ plain @ inverse, rtol=1e-9)
+
+
+def test_what_stands_in_dropped_rows_does_not_matter() -> None:
+    rows = part(np.random.default_rng(2))
+    kept = np.arange(4000) % 1000 > 300
+    clean = replace(rows, kept=kept)
+    spoilt = replace(clean, regressor=np.where(kept[:, None], rows.regressor, 1e6))
+    spoilt = replace(spoilt, residual=np.where(kept, rows.residual, -1e6), influence=spoilt.regressor)
+    np.testing.assert_allclose(error_covariance([spoilt]).matrix, error_covariance([clean]).matrix, rtol=1e-9)
 
 
 def test_few_degrees_of_freedom_widen_the_interval() -> None:

@@ -101,7 +101,7 @@ def test_a_file_that_was_cut_off_is_refused_and_nothing_else_is_said(
     path = tmp_path / f"axes{suffix}"
     write_axis_record(two_axes(), path)
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    with pytest.raises(RecordError, match="not a readable"):
+    with pytest.raises(RecordError, match=r"not a readable|cut off"):
         read_axis_record(path)
     gc.collect()
     assert not said

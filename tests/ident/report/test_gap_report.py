@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ident.gap.diagnosis import Diagnosis, Gap, NamedEffect, Share, Unseen, Verdict
-from ident.gap.findings import Findings
-from ident.gap.judge import judge
-from ident.gap.problem import Block, Candidate, Channel, Problem, Variant
+from ident.diagnosis.diagnosis import Diagnosis, Gap, NamedEffect, Share, Unseen, Verdict
+from ident.diagnosis.findings import Findings
+from ident.diagnosis.judge import judge
+from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant
+from ident.effects import EffectParameter
 from ident.report.gap import GapReport, render_gap_report
 from ident.report.gap_figures import map_figure, residual_figures
 from ident.report.gap_summary import summary_lines
-from ident.vehicle.effects import EffectParameter
 from ident.vehicle.quantities import Quantity
 
 Array = NDArray[np.float64]

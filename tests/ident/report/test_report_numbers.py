@@ -15,7 +15,7 @@ from ident.report.digits import MISSING, digits, percent, significant, unit_text
 from ident.report.paper import load_paper_result
 from ident.report.rows import Role, parameter_rows, role_of, step_rows
 from ident.report.summary import summarise
-from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+from ident.vehicle.parameters import Parameters
 
 
 @given(st.floats(-1e4, 1e4), st.floats(1e-6, 1e3))
@@ -98,28 +98,6 @@ def test_lifted_wheels_give_b_w_only_when_it_was_not_given(identification: Ident
     assert [row.role for row in step_rows(identification)] == [Role.INERTIA] * 4 + [Role.FIT] * 4 + [
         Role.VALIDATION
     ] * 2
-
-
-def test_a_poor_parameter_and_a_missed_lane_change_are_said_in_words(
-    identification: Identification, record: Record
-) -> None:
-    index = PARAMETER_NAMES.index("C_l")
-    estimates = list(identification.estimates)
-    estimates[index] = replace(estimates[index], ci95=(0.0, 2 * estimates[index].value))
-    floors = [
-        replace(floor, residual=0.2 * floor.signal) if floor.step == "lane_change" else floor
-        for floor in identification.floors
-    ]
-    floors[4] = replace(floors[4], noise=0.1, model_error=0.3)
-    worse = replace(identification, estimates=tuple(estimates), floors=tuple(floors))
-    summary = summarise("prototype", worse, record, parameter_rows(worse), step_rows(worse))
-    assert [warning.split()[:2] for warning in summary.warnings] == [
-        ["C_l", "is"],
-        ["In", "steering_left,"],
-        ["The", "steering"],
-        ["The", "drive"],
-    ]
-    assert "20 % NRMSE" in summary.warnings[-1]
 
 
 def test_a_good_result_carries_no_warning(identification: Identification, record: Record, truth: Parameters) -> None:

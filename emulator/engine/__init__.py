@@ -1,0 +1,1 @@
+"""Physics engines: what the emulated vehicle needs of one, and those that there are, one folder each."""

@@ -1,0 +1,1 @@
+"""PyBullet: sequential impulses on generalized coordinates, semi-implicit Euler."""

@@ -1,0 +1,330 @@
+"""The vehicle in PyBullet, with an explicit client."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import pybullet
+
+from emulator.as_built import AsBuilt
+from emulator.engine.protocol import STAND_CLEARANCE
+from emulator.engine.pybullet.urdf import generate_urdf, rolling_joint, steering_joint
+from emulator.engine.pybullet.window import open_window
+from ident.vehicle.geometry import WHEELS
+from ident.vehicle.quantities import GRAVITY
+
+_FRONT_OF_SIDE: Final = (0, 2)
+_ROLLING: Final = 4
+_FLOOR: Final = 0
+_LATERAL_FRICTION: Final = 1
+"""Where `getDynamicsInfo` has it."""
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """Settings of the engine's constraint solver; the defaults are the ones measured in docs/emulator.md.
+
+    Attributes:
+        iterations: sweeps of the solver a step.
+        coupling_erp: share of the front/rear coupling error that a step takes back [-].
+        coupling_force: largest torque in that coupling [Nm].
+        residual_threshold: the solver stops early below it; 0 does all sweeps.
+    """
+
+    iterations: int = 50
+    coupling_erp: float = 0.2
+    coupling_force: float = 1e5
+    residual_threshold: float = 0.0
+
+
+DEFAULT_SOLVER: Final = SolverSettings()
+
+
+class PyBulletEngine:
+    """An `emulator.engine.protocol.Engine`.
+
+    PyBullet integrates by semi-implicit Euler: a step's velocities are those of the middle of the step, its positions
+    those of the end. Coulomb friction is a velocity motor with target zero, true dry friction.
+
+    Args:
+        built: the vehicle.
+        step_size: [s].
+        gui: show it in a window.
+        settings: of the constraint solver.
+
+    Attributes:
+        client: PyBullet's id of this physics world.
+        body: PyBullet's id of the vehicle in it.
+        joints: PyBullet's indices of the eight joints.
+
+    Raises:
+        UserError: a window is asked for where there is no display.
+    """
+
+    client: int
+    body: int
+    joints: list[int]
+
+    def __init__(
+        self, built: AsBuilt, *, step_size: float, gui: bool, settings: SolverSettings = DEFAULT_SOLVER
+    ) -> None:
+        self.step_size = step_size
+        self._settings = settings
+        self.build(built)
+        truth = self._prototype.truth
+        self.coulomb = [truth[symbol] / 2 for symbol in ("d_cl", "d_cl", "d_cr", "d_cr")]
+        self.coulomb += [truth["d_cw"]] * 4
+        self.client = open_window() if gui else pybullet.connect(pybullet.DIRECT)
+        self.place(on_stand=False, angles=[0.0] * 8)
+
+    def build(self, built: AsBuilt) -> None:
+        """Build the vehicle so the next time that it is placed."""
+        self._built = built
+        self._prototype = built.prototype
+        self._urdf = generate_urdf(built)
+
+    def place(self, *, on_stand: bool, angles: Sequence[float]) -> None:
+        """Put the vehicle at rest at the origin, on the floor or on the jack-stand.
+
+        On the stand the chassis is a fixed base, not a soft constraint: it takes any reaction.
+
+        Args:
+            on_stand: chassis held, wheels in the air.
+            angles: (8,) joint angles [rad].
+        """
+        self._prepare_world()
+        self._dry: dict[int, float] = {}
+        lift = STAND_CLEARANCE if on_stand else -self._deflection()
+        self.body = self._load(self._prototype.body.centre_height + lift, on_stand)
+        by_name = self._joint_indices()
+        names = [steering_joint(wheel) for wheel in WHEELS] + [rolling_joint(wheel) for wheel in WHEELS]
+        self.joints = [by_name[name] for name in names]
+        self._set_surfaces()
+        for side, front in enumerate((0, 2)):
+            if self._built.couplings[side] is None:
+                self._couple(front, front + 1)
+        for joint, angle in zip(self.joints, angles, strict=True):
+            pybullet.resetJointState(self.body, joint, angle, 0.0, physicsClientId=self.client)
+        self.set_friction(self.coulomb)
+        self._states = self._previous = self._read()
+
+    def step(self, torques: Sequence[float]) -> None:
+        """One engine step under the joint torques (8,) [Nm]."""
+        client = self.client
+        pybullet.setJointMotorControlArray(
+            self.body, self.joints, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client
+        )
+        pybullet.stepSimulation(client)
+        self._previous = self._states
+        self._states = pybullet.getJointStates(self.body, self.joints, client)
+
+    def set_friction(self, torques: Sequence[float]) -> None:
+        """Largest torque of the dry friction in each joint from now on (8,) [Nm]."""
+        pybullet.setJointMotorControlArray(
+            self.body,
+            self.joints,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=[0.0] * 8,
+            forces=torques,
+            physicsClientId=self.client,
+        )
+
+    def set_ground(self, wheel: int, friction: float | None) -> None:
+        """Give a wheel (fl, rl, fr, rr: 0 to 3) ground of another friction coefficient [-]; None is that of before."""
+        link = self.joints[_ROLLING + wheel]
+        self._dry.setdefault(wheel, self._surface(self.body, link))
+        # The engine multiplies the coefficients of the two surfaces.
+        grip = self._dry[wheel] if friction is None else friction / self._surface(_FLOOR, -1)
+        pybullet.changeDynamics(self.body, link, lateralFriction=grip, physicsClientId=self.client)
+
+    def push(self, force: tuple[float, float, float]) -> None:
+        """A force on the chassis in its own frame, at its centre of mass, for the next step [N]."""
+        pybullet.applyExternalForce(
+            self.body, -1, force, (0.0, 0.0, 0.0), pybullet.LINK_FRAME, physicsClientId=self.client
+        )
+
+    def angles(self) -> list[float]:
+        """(8,) joint angles [rad]."""
+        return [state[0] for state in self._states]
+
+    def mean_rates(self) -> list[float]:
+        """(8,) joint rates over the last step, that is half a step ago [rad/s]."""
+        return [state[1] for state in self._states]
+
+    def rates(self) -> list[float]:
+        """(8,) joint rates now [rad/s], extrapolated to second order from the last two steps."""
+        return [1.5 * now[1] - 0.5 * before[1] for now, before in zip(self._states, self._previous, strict=True)]
+
+    def steering_angle(self, side: int) -> float:
+        """Steering angle of the front wheel of a side (0 left, 1 right) [rad]."""
+        return float(self._states[_FRONT_OF_SIDE[side]][0])
+
+    def wheel_angle(self, wheel: int) -> float:
+        """Rolling angle of a wheel [rad], unbounded."""
+        return float(self._states[_ROLLING + wheel][0])
+
+    def wheel_rate(self, wheel: int) -> float:
+        """Rolling rate of a wheel now [rad/s]."""
+        joint = _ROLLING + wheel
+        return float(1.5 * self._states[joint][1] - 0.5 * self._previous[joint][1])
+
+    def base_pose(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Position [m] of the centre and orientation quaternion (x, y, z, w) of the chassis in the world."""
+        position, orientation = pybullet.getBasePositionAndOrientation(self.body, self.client)
+        return self._centre(position, orientation), orientation
+
+    def base_velocity(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Linear [m/s] and angular [rad/s] velocity of the chassis in the world, over the last step."""
+        linear, angular = pybullet.getBaseVelocity(self.body, self.client)
+        arm = self._arm()
+        if arm is not None:
+            _, orientation = pybullet.getBasePositionAndOrientation(self.body, self.client)
+            turned = pybullet.rotateVector(orientation, arm)
+            linear = tuple(v + c for v, c in zip(linear, _cross(angular, turned), strict=True))
+        return linear, angular
+
+    def twist(self) -> tuple[float, float, float]:
+        """(x', y', gamma') of the chassis in its own frame [m/s, m/s, rad/s], of half a step ago."""
+        (vx, vy, _), (_, _, yaw_rate) = self.base_velocity()
+        _, (_, _, qz, qw) = self.base_pose()
+        heading = 2 * math.atan2(qz, qw)
+        cosine, sine = math.cos(heading), math.sin(heading)
+        return cosine * vx + sine * vy, cosine * vy - sine * vx, yaw_rate
+
+    def close(self) -> None:
+        """Disconnect from the physics world."""
+        if pybullet.isConnected(self.client):
+            pybullet.disconnect(self.client)
+
+    def _arm(self) -> tuple[float, float, float] | None:
+        """From the chassis' centre of mass to its centre, in its frame [m]; None where they are one."""
+        x, y, z = self._prototype.rigid_bodies.chassis.centre
+        return (-x, -y, -z) if x or y or z else None
+
+    def _centre(self, position: tuple[float, ...], orientation: tuple[float, ...]) -> tuple[float, ...]:
+        arm = self._arm()
+        if arm is None:
+            return position
+        turned = pybullet.rotateVector(orientation, arm)
+        return tuple(p + t for p, t in zip(position, turned, strict=True))
+
+    def _surface(self, body: int, link: int) -> float:
+        return float(pybullet.getDynamicsInfo(body, link, self.client)[_LATERAL_FRICTION])
+
+    def _read(self) -> Any:
+        return pybullet.getJointStates(self.body, self.joints, self.client)
+
+    def _prepare_world(self) -> None:
+        client = self.client
+        pybullet.resetSimulation(physicsClientId=client)
+        pybullet.setGravity(*self._built.gravity, physicsClientId=client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=self.step_size,
+            numSolverIterations=self._settings.iterations,
+            solverResidualThreshold=self._settings.residual_threshold,
+            deterministicOverlappingPairs=1,
+            physicsClientId=client,
+        )
+        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
+        floor = pybullet.createMultiBody(baseMass=0, baseCollisionShapeIndex=plane, physicsClientId=client)
+        # The engine multiplies the coefficients of the two surfaces; the wheels have 1.
+        pybullet.changeDynamics(
+            floor,
+            -1,
+            lateralFriction=self._prototype.floor_friction,
+            spinningFriction=0.0,
+            rollingFriction=0.0,
+            restitution=0.0,
+            physicsClientId=client,
+        )
+
+    def _load(self, height: float, fixed: bool) -> int:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "vehicle.urdf"
+            path.write_text(self._urdf, encoding="utf-8")
+            return int(
+                pybullet.loadURDF(
+                    str(path),
+                    basePosition=[0.0, 0.0, height],
+                    useFixedBase=fixed,
+                    flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+                    physicsClientId=self.client,
+                )
+            )
+
+    def _joint_indices(self) -> Mapping[str, int]:
+        count = pybullet.getNumJoints(self.body, self.client)
+        infos = (pybullet.getJointInfo(self.body, index, self.client) for index in range(count))
+        return {info[1].decode(): info[0] for info in infos}
+
+    def _deflection(self) -> float:
+        """What a tyre gives way under a quarter of the weight [m]."""
+        return self._prototype.truth["m_ch"] * GRAVITY / 4 / self._prototype.tyre.stiffness
+
+    def _set_surfaces(self) -> None:
+        """Make the bodies free of damping and the tyres radially elastic.
+
+        On rigid wheels the four loads are indeterminate: the solver then puts most of the weight on one
+        diagonal, and the wheels of the other slip at moderate acceleration.
+        """
+        quarter_mass, tyre = self._prototype.truth["m_ch"] / 4, self._prototype.tyre
+        for wheel in self.joints[_ROLLING:]:
+            pybullet.changeDynamics(
+                self.body,
+                wheel,
+                contactStiffness=tyre.stiffness,
+                contactDamping=2 * tyre.damping_ratio * math.sqrt(tyre.stiffness * quarter_mass),
+                physicsClientId=self.client,
+            )
+        for link in range(-1, pybullet.getNumJoints(self.body, self.client)):
+            pybullet.changeDynamics(
+                self.body,
+                link,
+                lateralFriction=1.0,
+                spinningFriction=0.0,
+                rollingFriction=0.0,
+                restitution=0.0,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                physicsClientId=self.client,
+            )
+        grip_of_weight = quarter_mass * GRAVITY * self._prototype.floor_friction
+        for joint, build in zip(self.joints[_ROLLING:], self._built.wheels, strict=True):
+            pybullet.changeDynamics(
+                self.body,
+                joint,
+                lateralFriction=build.grip,
+                spinningFriction=build.patch_torque / grip_of_weight,
+                physicsClientId=self.client,
+            )
+
+    def _couple(self, front: int, rear: int) -> None:
+        """Couple the steering of two units of a side: the rear turns against the front."""
+        constraint = pybullet.createConstraint(
+            self.body,
+            self.joints[front],
+            self.body,
+            self.joints[rear],
+            pybullet.JOINT_GEAR,
+            [0.0, 0.0, 1.0],
+            [0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0],
+            physicsClientId=self.client,
+        )
+        pybullet.changeConstraint(
+            constraint,
+            gearRatio=1.0,
+            erp=self._settings.coupling_erp,
+            maxForce=self._settings.coupling_force,
+            physicsClientId=self.client,
+        )
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -1,0 +1,158 @@
+"""The emulated side as the command line composes it: bench in this process, or server for other processes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import can
+
+from emulator.firmware.storage import FolderMemory
+from emulator.vehicle import EmulatedVehicle
+from hil.bench.lockstep import LockstepBench
+from hil.bench.prototypes import load_emulated
+from hil.bench.serving import VehicleServer
+from hil.bus.clock import Clock
+from hil.bus.opening import open_served_bus
+from hil.cosimulation.plant import FmuVehicle
+from hil.faults import Fault, parse_fault, parse_script
+from hil.faults.fault import FaultError
+from hil.network import Network
+from ident.effects import Effect
+from ident.errors import UserError
+from ident.reading import read_bounded
+
+Plant = EmulatedVehicle | FmuVehicle
+"""What the nodes can sit on."""
+
+
+@dataclass(frozen=True)
+class BenchOperator:
+    """Lifts and lowers the emulated vehicle."""
+
+    vehicle: Plant
+
+    def lift(self) -> None:
+        """On the jack-stand."""
+        self.vehicle.lift()
+
+    def lower(self) -> None:
+        """On the floor."""
+        self.vehicle.lower()
+
+    def load(self, mass: float) -> None:
+        """A load over the centre [kg]."""
+        self.vehicle.load(mass)
+
+    def unload(self) -> None:
+        """Without it."""
+        self.vehicle.load(0.0)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What a campaign needs of the emulated side: bus, clock and hands."""
+
+    bus: can.BusABC
+    clock: Clock
+    operator: BenchOperator
+
+
+def assumed(prototype: str, network: Path) -> tuple[str, ...]:
+    """What no file says of an emulated vehicle, a line each; none for one with a prototype file.
+
+    Raises:
+        DataFileError: a file is missing or malformed, or two places disagree.
+    """
+    return load_emulated(prototype, network).assumed
+
+
+@contextmanager
+def vehicle(
+    prototype: str, seed: int, gui: bool, network: Path, effects: Sequence[Effect] = (), fmu: Path | None = None
+) -> Iterator[Plant]:
+    """The emulated prototype with effects, or an FMU with the prototype's drives and encoders; closed at the end.
+
+    Raises:
+        UserError: prototype and network file disagree, an effect or a window is asked of an FMU, or it cannot be run.
+    """
+    built = load_emulated(prototype, network).prototype
+    if fmu is None:
+        with EmulatedVehicle(built, seed=seed, gui=gui, effects=effects) as emulated:
+            yield emulated
+        return
+    if effects or gui:
+        raise UserError(
+            "An FMU takes no --effect and has no window.", "Tune the effect's parameters in the FMU itself."
+        )
+    with FmuVehicle(fmu, built, seed=seed) as plant:
+        yield plant
+
+
+@contextmanager
+def bench(
+    prototype: str, seed: int, gui: bool, network: Path, effects: Sequence[Effect] = (), fmu: Path | None = None
+) -> Iterator[Bench]:
+    """What `vehicle` gives, behind an in-process bus in lockstep."""
+    with vehicle(prototype, seed, gui, network, effects, fmu) as emulated, LockstepBench(emulated, network) as lockstep:
+        yield Bench(lockstep.bus, lockstep.clock, BenchOperator(emulated))
+
+
+@contextmanager
+def server_bus(name: str, network: Network) -> Iterator[can.BusABC]:
+    """The bus that an emulator serves: the hub of a `unix:` bus, a member of any other.
+
+    Raises:
+        BusError: the bus cannot be opened.
+    """
+    bus = open_served_bus(name, network.bit_rate)
+    try:
+        yield bus
+    finally:
+        bus.shutdown()
+
+
+def server(
+    emulated: Plant,
+    bus: can.BusABC,
+    clock: Clock,
+    network: Path,
+    lockstep: bool,
+    *,
+    seed: int = 0,
+    delays: bool = False,
+    storage: Path | None = None,
+) -> VehicleServer:
+    """A server of an emulated vehicle on a bus; `seed` is that of its faults, see `VehicleServer`.
+
+    Args:
+        storage: folder where the nodes store parameters.
+
+    Raises:
+        OSError: the folder cannot be made.
+    """
+    if storage is not None:
+        # Now, and not when a master stores for the first time, it shows whether that is possible.
+        storage.mkdir(parents=True, exist_ok=True)
+    memory = None if storage is None else FolderMemory(storage)
+    return VehicleServer(emulated, bus, clock, network, lockstep, emulated, seed, delays, memory)
+
+
+def read_faults(texts: Sequence[str]) -> list[Fault]:
+    """Faults as they are given on the command line: each one line, or the path of a script.
+
+    Raises:
+        FaultError: one cannot be read.
+    """
+    faults: list[Fault] = []
+    for text in texts:
+        path = Path(text)
+        if path.is_file():
+            faults += parse_script(read_bounded(path).decode(errors="replace"))
+        elif path.suffix and not {"@", ":"} & set(text):
+            raise FaultError(f"{text} does not exist.", "Name a file with one fault a line, or write KIND@PLACE.")
+        else:
+            faults.append(parse_fault(text))
+    return faults

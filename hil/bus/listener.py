@@ -1,0 +1,133 @@
+"""A client of the hub, and the frames that wait until it reads them."""
+
+from __future__ import annotations
+
+import socket
+import struct
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+from hil.bus.packets import DROPS, FRAME_SIZE, Hello
+
+ROOM: Final = 8192
+"""Frames that the hub keeps for a client beside those in its socket: about a second of a full bus at 1 Mbit/s."""
+
+_FLUSHED: Final = 64
+"""Most packets that are handed over at once to a client that reads again: the others must not wait for it."""
+
+_BUFFER: Final = 1 << 20
+_CREDENTIALS: Final = struct.Struct("=iII")
+
+
+@dataclass(frozen=True)
+class ListenerReport:
+    """What became of the frames for one client.
+
+    Attributes:
+        pid: its process; 0 where the system does not say.
+        waiting: frames that wait in the hub because its socket is full.
+        dropped: frames that it has lost because it did not read.
+    """
+
+    pid: int
+    waiting: int
+    dropped: int
+
+
+class Listener:
+    """A client of the hub; deaf until it has said what it wants to hear.
+
+    Frames go into its socket, and where that is full into a queue of the hub. A frame that finds both full is lost for
+    this client alone and counted, as in the receive queue of a CAN_RAW socket (`sk_drops`). Nothing here ever blocks.
+
+    Args:
+        connection: its socket, which becomes non-blocking.
+        room: frames that the queue holds.
+
+    Attributes:
+        wants: what it has asked for.
+        dropped: frames that it has lost.
+        taken: frames taken from it since the hub last looked how fast it sends.
+        watched: events of its socket that the hub waits for.
+    """
+
+    def __init__(self, connection: socket.socket, room: int = ROOM) -> None:
+        enlarge(connection)
+        connection.setblocking(False)
+        self.socket = connection
+        self.wants: Hello | None = None
+        self.dropped = 0
+        self.taken = 0
+        self.watched = 0
+        self._room = room
+        self._waiting: deque[bytes] = deque()
+        self._waiting_frames = 0
+
+    @property
+    def behind(self) -> bool:
+        """Whether frames wait for room in its socket."""
+        return bool(self._waiting)
+
+    def report(self) -> ListenerReport:
+        """What became of its frames."""
+        return ListenerReport(_process_of(self.socket), self._waiting_frames, self.dropped)
+
+    def hand(self, packet: bytes) -> bool:
+        """Hand over a packet, let it wait, or drop it; whether it is the first that has to wait.
+
+        Raises:
+            OSError: the client is gone.
+        """
+        if self.dropped and self.wants is not None and self.wants.drops:
+            packet += DROPS.pack(self.dropped & 0xFFFFFFFF)
+        if self._waiting:
+            self._queue(packet)
+            return False
+        try:
+            self.socket.send(packet)
+        except BlockingIOError:
+            self._queue(packet)
+            return True
+        return False
+
+    def flush(self) -> None:
+        """Hand over some of what waits.
+
+        Raises:
+            OSError: the client is gone.
+        """
+        for _ in range(min(_FLUSHED, len(self._waiting))):
+            try:
+                self.socket.send(self._waiting[0])
+            except BlockingIOError:
+                return
+            self._waiting_frames -= len(self._waiting.popleft()) // FRAME_SIZE
+
+    def deafen(self) -> None:
+        """It is gone, and gets nothing any more; what it has sent before can still be read."""
+        self.wants = None
+        self._waiting.clear()
+        self._waiting_frames = 0
+
+    def _queue(self, packet: bytes) -> None:
+        frames = len(packet) // FRAME_SIZE
+        if self._waiting_frames + frames > self._room:
+            self.dropped += frames
+            return
+        self._waiting.append(packet)
+        self._waiting_frames += frames
+
+
+def enlarge(connection: socket.socket) -> None:
+    """Give a connection room for frames that are not read at once."""
+    for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
+        connection.setsockopt(socket.SOL_SOCKET, option, _BUFFER)
+
+
+def _process_of(connection: socket.socket) -> int:
+    try:
+        credentials = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    except OSError:
+        return 0
+    return int(_CREDENTIALS.unpack(credentials)[0])

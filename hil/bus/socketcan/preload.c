@@ -1,0 +1,434 @@
+/*
+ * Maps raw CAN sockets of an unmodified SocketCAN program onto the hub of a `unix:` bus: to be preloaded (ld.so(8)).
+ *
+ * QUASIOMNI_CAN=can0=/tmp/can0,can1=/tmp/can1 names the interfaces and their hubs. socket(AF_CAN, SOCK_RAW, CAN_RAW)
+ * gives a SEQPACKET socket, bind() connects it to the hub of its interface. A packet is a struct can_frame, so read,
+ * write, send, recv, select, poll and epoll are the system's own; only calls that know of addresses, interfaces and
+ * CAN options pass through here. Filters are applied in the hub: a frame that does not pass wakes nobody up.
+ *
+ * A socket with SO_RXQ_OVFL gets packets of a frame and, once frames were dropped, their number, which recvmsg passes
+ * on as the system does for a socket of its own. Its plain reads must ask for no more than a frame.
+ *
+ * The sending half of CAN_BCM is in broadcast.c: there, send and write are commands.
+ *
+ * Not here: CAN FD, CAN_ISOTP, netlink. "any" (interface index 0) is the first interface.
+ */
+#define _GNU_SOURCE
+#include "broadcast.h"
+
+#include <dlfcn.h>
+#include <errno.h>
+#include <linux/can.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <net/if_arp.h>
+#include <poll.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#define SOCKETS 4096
+#define INTERFACES 16
+#define FIRST_INDEX 1001
+#define HELLO_MAGIC 0x4e414351u /* "QCAN" */
+#define OWN_FRAMES 1u
+#define JOIN_FILTERS 2u
+#define ACKNOWLEDGE 4u
+#define DROPS 16u
+#define ACKNOWLEDGE_TIMEOUT_MS 20000
+#define OWN_MARK 1
+
+struct interface {
+    char name[IFNAMSIZ];
+    char path[sizeof(((struct sockaddr_un *)0)->sun_path)];
+};
+
+/* What a client tells the hub, when it connects and whenever it changes; the filters follow. 12 + 8 n bytes. */
+struct hello {
+    uint32_t magic;
+    uint32_t error_mask;
+    uint32_t flags;
+    struct can_filter filters[CAN_RAW_FILTER_MAX];
+};
+
+struct can_socket {
+    int broadcast; /* CAN_BCM instead of CAN_RAW */
+    int connected;
+    int interface;
+    unsigned count;
+    struct hello hello;
+};
+
+static struct interface interfaces[INTERFACES];
+static int interface_count;
+static struct can_socket *sockets[SOCKETS];
+
+static void *next_symbol(const char *name) { return dlsym(RTLD_NEXT, name); }
+
+#define REAL(type, name) ((type)next_symbol(name))
+
+__attribute__((constructor)) static void read_interfaces(void) {
+    const char *text = getenv("QUASIOMNI_CAN");
+    while (text && *text && interface_count < INTERFACES) {
+        const char *equals = strchr(text, '='), *end = strchr(text, ',');
+        struct interface *found = &interfaces[interface_count];
+        size_t whole = end ? (size_t)(end - text) : strlen(text);
+        if (equals && equals < text + whole) {
+            size_t name = (size_t)(equals - text), path = whole - name - 1;
+            if (name > 0 && name < sizeof found->name && path > 0 && path < sizeof found->path) {
+                memcpy(found->name, text, name);
+                memcpy(found->path, equals + 1, path);
+                interface_count++;
+            }
+        }
+        text += whole + (end ? 1 : 0);
+    }
+}
+
+static int interface_of_name(const char *name) {
+    for (int k = 0; k < interface_count; k++)
+        if (strncmp(interfaces[k].name, name, IFNAMSIZ) == 0) return k;
+    return -1;
+}
+
+static int interface_of_index(int index) {
+    int k = index - FIRST_INDEX;
+    return k >= 0 && k < interface_count ? k : -1;
+}
+
+/* The entry of a descriptor that is still the socket it was made for. */
+static struct can_socket *find(int fd) {
+    if (fd < 0 || fd >= SOCKETS || !sockets[fd]) return NULL;
+    int domain = 0, type = 0;
+    socklen_t size = sizeof domain;
+    typedef int (*getsockopt_t)(int, int, int, void *, socklen_t *);
+    getsockopt_t real = REAL(getsockopt_t, "getsockopt");
+    if (real(fd, SOL_SOCKET, SO_DOMAIN, &domain, &size) == 0 && domain == AF_UNIX) {
+        size = sizeof type;
+        if (real(fd, SOL_SOCKET, SO_TYPE, &type, &size) == 0 && type == SOCK_SEQPACKET) return sockets[fd];
+    }
+    free(sockets[fd]);
+    sockets[fd] = NULL;
+    return NULL;
+}
+
+static int tell(int fd, struct can_socket *entry) {
+    size_t size = offsetof(struct hello, filters) + entry->count * sizeof(struct can_filter);
+    /* sendto, which is not mapped: send may be a command to the broadcast manager. */
+    return sendto(fd, &entry->hello, size, MSG_NOSIGNAL, NULL, 0) < 0 ? -1 : 0;
+}
+
+int socket(int domain, int type, int protocol) {
+    typedef int (*socket_t)(int, int, int);
+    socket_t real = REAL(socket_t, "socket");
+    int flags = type & (SOCK_CLOEXEC | SOCK_NONBLOCK);
+    int raw = (type & ~flags) == SOCK_RAW && protocol == CAN_RAW;
+    int broadcast = (type & ~flags) == SOCK_DGRAM && protocol == CAN_BCM;
+    if (domain != PF_CAN || !(raw || broadcast) || interface_count == 0) return real(domain, type, protocol);
+    int fd = real(AF_UNIX, SOCK_SEQPACKET | flags, 0);
+    if (fd < 0) return fd;
+    struct can_socket *entry = fd < SOCKETS ? calloc(1, sizeof *entry) : NULL;
+    if (!entry) {
+        close(fd);
+        errno = fd < SOCKETS ? ENOMEM : EMFILE;
+        return -1;
+    }
+    free(sockets[fd]);
+    entry->broadcast = broadcast;
+    entry->count = raw ? 1 : 0; /* One filter of zeros: everything, as the kernel has it. */
+    entry->hello.magic = HELLO_MAGIC;
+    sockets[fd] = entry;
+    return fd;
+}
+
+/* Waits until the hub knows of the socket: what is sent after bind() must arrive, and its answer is no frame. */
+static int await_acknowledgement(int fd) {
+    struct pollfd waiting = {.fd = fd, .events = POLLIN};
+    uint32_t answer;
+    if (poll(&waiting, 1, ACKNOWLEDGE_TIMEOUT_MS) == 1 && recv(fd, &answer, sizeof answer, 0) > 0) return 0;
+    errno = ENETDOWN;
+    return -1;
+}
+
+/* Connects a socket to the hub of the interface in an address. */
+static int join(int fd, struct can_socket *entry, const struct sockaddr_can *wanted) {
+    typedef int (*connect_t)(int, const struct sockaddr *, socklen_t);
+    int chosen = wanted->can_ifindex ? interface_of_index(wanted->can_ifindex) : 0;
+    if (chosen < 0) {
+        errno = ENODEV;
+        return -1;
+    }
+    struct sockaddr_un hub = {.sun_family = AF_UNIX};
+    memcpy(hub.sun_path, interfaces[chosen].path, sizeof hub.sun_path);
+    if (REAL(connect_t, "connect")(fd, (struct sockaddr *)&hub, sizeof hub) < 0) {
+        errno = ENETDOWN;
+        return -1;
+    }
+    entry->interface = chosen;
+    entry->connected = 1;
+    entry->hello.flags |= ACKNOWLEDGE;
+    if (tell(fd, entry) < 0) return -1;
+    entry->hello.flags &= ~ACKNOWLEDGE;
+    return await_acknowledgement(fd);
+}
+
+int bind(int fd, const struct sockaddr *address, socklen_t length) {
+    typedef int (*bind_t)(int, const struct sockaddr *, socklen_t);
+    struct can_socket *entry = find(fd);
+    if (!entry || address->sa_family != AF_CAN) return REAL(bind_t, "bind")(fd, address, length);
+    return join(fd, entry, (const struct sockaddr_can *)address);
+}
+
+int connect(int fd, const struct sockaddr *address, socklen_t length) {
+    typedef int (*connect_t)(int, const struct sockaddr *, socklen_t);
+    struct can_socket *entry = address && address->sa_family == AF_CAN ? find(fd) : NULL;
+    if (!entry) return REAL(connect_t, "connect")(fd, address, length);
+    return join(fd, entry, (const struct sockaddr_can *)address);
+}
+
+static int is_broadcast(int fd) { return fd >= 0 && fd < SOCKETS && sockets[fd] && sockets[fd]->broadcast && find(fd); }
+
+ssize_t send(int fd, const void *data, size_t size, int flags) {
+    typedef ssize_t (*send_t)(int, const void *, size_t, int);
+    return is_broadcast(fd) ? broadcast_command(fd, data, size) : REAL(send_t, "send")(fd, data, size, flags);
+}
+
+ssize_t write(int fd, const void *data, size_t size) {
+    typedef ssize_t (*write_t)(int, const void *, size_t);
+    return is_broadcast(fd) ? broadcast_command(fd, data, size) : REAL(write_t, "write")(fd, data, size);
+}
+
+int close(int fd) {
+    typedef int (*close_t)(int);
+    if (is_broadcast(fd)) broadcast_close(fd);
+    if (fd >= 0 && fd < SOCKETS && sockets[fd]) {
+        free(sockets[fd]);
+        sockets[fd] = NULL;
+    }
+    return REAL(close_t, "close")(fd);
+}
+
+static void write_address(const struct can_socket *entry, void *address, socklen_t *length) {
+    struct sockaddr_can sender = {.can_family = AF_CAN, .can_ifindex = FIRST_INDEX + entry->interface};
+    if (!address || !length) return;
+    memcpy(address, &sender, *length < sizeof sender ? *length : sizeof sender);
+    *length = sizeof sender;
+}
+
+int getsockname(int fd, struct sockaddr *address, socklen_t *length) {
+    typedef int (*getsockname_t)(int, struct sockaddr *, socklen_t *);
+    struct can_socket *entry = find(fd);
+    if (!entry) return REAL(getsockname_t, "getsockname")(fd, address, length);
+    write_address(entry, address, length);
+    return 0;
+}
+
+static int set_flag(struct can_socket *entry, uint32_t flag, const void *value, socklen_t size) {
+    int wanted = 0;
+    if (size != sizeof wanted) return EINVAL;
+    memcpy(&wanted, value, sizeof wanted);
+    entry->hello.flags = wanted ? entry->hello.flags | flag : entry->hello.flags & ~flag;
+    return 0;
+}
+
+static int set_filters(struct can_socket *entry, const void *value, socklen_t size) {
+    if (size % sizeof(struct can_filter) || size > sizeof entry->hello.filters) return EINVAL;
+    memcpy(entry->hello.filters, value, size);
+    entry->count = size / sizeof(struct can_filter);
+    return 0;
+}
+
+static int set_option(struct can_socket *entry, int name, const void *value, socklen_t size) {
+    switch (name) {
+    case CAN_RAW_FILTER: return set_filters(entry, value, size);
+    case CAN_RAW_RECV_OWN_MSGS: return set_flag(entry, OWN_FRAMES, value, size);
+    case CAN_RAW_JOIN_FILTERS: return set_flag(entry, JOIN_FILTERS, value, size);
+    case CAN_RAW_LOOPBACK: return 0; /* The hub is the bus: everybody else hears a frame. */
+    case CAN_RAW_FD_FRAMES: return 0; /* Allowed, as on an interface without CAN FD: none ever come. */
+    case CAN_RAW_ERR_FILTER:
+        if (size != sizeof entry->hello.error_mask) return EINVAL;
+        memcpy(&entry->hello.error_mask, value, size);
+        return 0;
+    default: return ENOPROTOOPT;
+    }
+}
+
+int setsockopt(int fd, int level, int name, const void *value, socklen_t size) {
+    typedef int (*setsockopt_t)(int, int, int, const void *, socklen_t);
+    int drops = level == SOL_SOCKET && name == SO_RXQ_OVFL;
+    struct can_socket *entry = level == SOL_CAN_RAW || drops ? find(fd) : NULL;
+    if (!entry) return REAL(setsockopt_t, "setsockopt")(fd, level, name, value, size);
+    int error = drops ? set_flag(entry, DROPS, value, size) : set_option(entry, name, value, size);
+    if (error) {
+        errno = error;
+        return -1;
+    }
+    return entry->connected ? tell(fd, entry) : 0;
+}
+
+static int copy_out(void *value, socklen_t *size, const void *from, size_t length) {
+    if (*size < length) {
+        errno = ERANGE;
+        return -1;
+    }
+    memcpy(value, from, length);
+    *size = length;
+    return 0;
+}
+
+int getsockopt(int fd, int level, int name, void *value, socklen_t *size) {
+    typedef int (*getsockopt_t)(int, int, int, void *, socklen_t *);
+    struct can_socket *entry = level == SOL_CAN_RAW || level == SOL_SOCKET ? find(fd) : NULL;
+    int answer = 0;
+    if (entry && level == SOL_SOCKET && (name == SO_DOMAIN || name == SO_TYPE || name == SO_PROTOCOL)) {
+        answer = name == SO_DOMAIN ? AF_CAN : name == SO_TYPE ? SOCK_RAW : CAN_RAW;
+        return copy_out(value, size, &answer, sizeof answer);
+    }
+    if (entry && level == SOL_SOCKET && name == SO_RXQ_OVFL) {
+        answer = (entry->hello.flags & DROPS) != 0;
+        return copy_out(value, size, &answer, sizeof answer);
+    }
+    if (!entry || level != SOL_CAN_RAW) return REAL(getsockopt_t, "getsockopt")(fd, level, name, value, size);
+    switch (name) {
+    case CAN_RAW_FILTER:
+        return copy_out(value, size, entry->hello.filters, entry->count * sizeof(struct can_filter));
+    case CAN_RAW_ERR_FILTER: return copy_out(value, size, &entry->hello.error_mask, sizeof answer);
+    case CAN_RAW_RECV_OWN_MSGS: answer = (entry->hello.flags & OWN_FRAMES) != 0; break;
+    case CAN_RAW_JOIN_FILTERS: answer = (entry->hello.flags & JOIN_FILTERS) != 0; break;
+    case CAN_RAW_LOOPBACK: answer = 1; break;
+    case CAN_RAW_FD_FRAMES: break;
+    default: errno = ENOPROTOOPT; return -1;
+    }
+    return copy_out(value, size, &answer, sizeof answer);
+}
+
+/* Whether a frame is the receiver's own, as the hub has marked it; the mark is taken away. */
+static int take_mark(void *data, ssize_t received) {
+    struct can_frame *frame = data;
+    if (received != (ssize_t)sizeof *frame || frame->__pad != OWN_MARK) return 0;
+    frame->__pad = 0;
+    return 1;
+}
+
+ssize_t recvfrom(int fd, void *data, size_t size, int flags, struct sockaddr *address, socklen_t *length) {
+    typedef ssize_t (*recvfrom_t)(int, void *, size_t, int, struct sockaddr *, socklen_t *);
+    recvfrom_t real = REAL(recvfrom_t, "recvfrom");
+    struct can_socket *entry = find(fd);
+    if (!entry) return real(fd, data, size, flags, address, length);
+    ssize_t received = real(fd, data, size, flags, NULL, NULL);
+    if (received >= 0) write_address(entry, address, length);
+    take_mark(data, received);
+    return received;
+}
+
+ssize_t __recvfrom_chk(int fd, void *data, size_t size, size_t room, int flags, struct sockaddr *address,
+                       socklen_t *length) {
+    if (size > room) abort();
+    return recvfrom(fd, data, size, flags, address, length);
+}
+
+/* Puts a number of dropped frames behind the control messages of a message, as the system does for SO_RXQ_OVFL. */
+static void add_drops(struct msghdr *message, size_t room, uint32_t dropped) {
+    size_t used = message->msg_control ? message->msg_controllen : 0;
+    if (!message->msg_control || used + CMSG_SPACE(sizeof dropped) > room) {
+        message->msg_flags |= MSG_CTRUNC;
+        return;
+    }
+    struct cmsghdr *control = (struct cmsghdr *)((char *)message->msg_control + used);
+    memset(control, 0, CMSG_SPACE(sizeof dropped));
+    control->cmsg_level = SOL_SOCKET;
+    control->cmsg_type = SO_RXQ_OVFL;
+    control->cmsg_len = CMSG_LEN(sizeof dropped);
+    memcpy(CMSG_DATA(control), &dropped, sizeof dropped);
+    message->msg_controllen = used + CMSG_SPACE(sizeof dropped);
+}
+
+/* A frame into the caller's memory, and the number of dropped frames that may follow it into its control messages. */
+static ssize_t receive_with_drops(int fd, struct msghdr *message, int flags) {
+    typedef ssize_t (*recvmsg_t)(int, struct msghdr *, int);
+    uint32_t dropped = 0;
+    size_t room = message->msg_controllen;
+    struct iovec *asked = message->msg_iov;
+    struct iovec parts[2] = {{.iov_base = asked->iov_base, .iov_len = sizeof(struct can_frame)},
+                             {.iov_base = &dropped, .iov_len = sizeof dropped}};
+    message->msg_iov = parts;
+    message->msg_iovlen = 2;
+    ssize_t received = REAL(recvmsg_t, "recvmsg")(fd, message, flags);
+    message->msg_iov = asked;
+    message->msg_iovlen = 1;
+    if (received <= (ssize_t)sizeof(struct can_frame)) return received;
+    add_drops(message, room, dropped);
+    return sizeof(struct can_frame);
+}
+
+static int wants_drops(const struct can_socket *entry, const struct msghdr *message) {
+    return entry->hello.flags & DROPS && message->msg_iovlen == 1 &&
+           message->msg_iov->iov_len >= sizeof(struct can_frame);
+}
+
+ssize_t recvmsg(int fd, struct msghdr *message, int flags) {
+    typedef ssize_t (*recvmsg_t)(int, struct msghdr *, int);
+    recvmsg_t real = REAL(recvmsg_t, "recvmsg");
+    struct can_socket *entry = find(fd);
+    if (!entry) return real(fd, message, flags);
+    void *address = message->msg_name;
+    socklen_t length = message->msg_namelen;
+    message->msg_name = NULL;
+    message->msg_namelen = 0;
+    int with_drops = wants_drops(entry, message);
+    ssize_t received = with_drops ? receive_with_drops(fd, message, flags) : real(fd, message, flags);
+    message->msg_name = address;
+    if (received < 0) {
+        message->msg_namelen = length;
+        return received;
+    }
+    write_address(entry, address, &length);
+    message->msg_namelen = address ? length : 0;
+    if (message->msg_iovlen == 1 && take_mark(message->msg_iov[0].iov_base, received))
+        message->msg_flags |= MSG_CONFIRM | MSG_DONTROUTE;
+    return received;
+}
+
+/* Answers what programs ask about an interface; -1 where it is not one of ours. */
+static int ask_interface(unsigned long request, struct ifreq *asked) {
+    int k = request == SIOCGIFNAME ? interface_of_index(asked->ifr_ifindex) : interface_of_name(asked->ifr_name);
+    if (k < 0) return -1;
+    switch (request) {
+    case SIOCGIFNAME: memcpy(asked->ifr_name, interfaces[k].name, IFNAMSIZ); return 0;
+    case SIOCGIFINDEX: asked->ifr_ifindex = FIRST_INDEX + k; return 0;
+    case SIOCGIFFLAGS: asked->ifr_flags = IFF_UP | IFF_RUNNING | IFF_NOARP; return 0;
+    case SIOCGIFMTU: asked->ifr_mtu = CAN_MTU; return 0;
+    case SIOCGIFHWADDR: asked->ifr_hwaddr.sa_family = ARPHRD_CAN; return 0;
+    default: return -1;
+    }
+}
+
+int ioctl(int fd, unsigned long request, ...) {
+    typedef int (*ioctl_t)(int, unsigned long, void *);
+    va_list arguments;
+    va_start(arguments, request);
+    void *argument = va_arg(arguments, void *);
+    va_end(arguments);
+    int about_interface = request == SIOCGIFNAME || request == SIOCGIFINDEX || request == SIOCGIFFLAGS ||
+                          request == SIOCGIFMTU || request == SIOCGIFHWADDR;
+    if (about_interface && argument && ask_interface(request, argument) == 0) return 0;
+    return REAL(ioctl_t, "ioctl")(fd, request, argument);
+}
+
+unsigned if_nametoindex(const char *name) {
+    typedef unsigned (*if_nametoindex_t)(const char *);
+    int k = interface_of_name(name);
+    return k >= 0 ? (unsigned)(FIRST_INDEX + k) : REAL(if_nametoindex_t, "if_nametoindex")(name);
+}
+
+char *if_indextoname(unsigned index, char name[IFNAMSIZ]) {
+    typedef char *(*if_indextoname_t)(unsigned, char *);
+    int k = interface_of_index((int)index);
+    return k >= 0 ? memcpy(name, interfaces[k].name, IFNAMSIZ) : REAL(if_indextoname_t, "if_indextoname")(index, name);
+}

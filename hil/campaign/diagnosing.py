@@ -1,0 +1,282 @@
+"""Diagnoses records of the platform or of axes as they are asked for, and writes the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.campaign.folder import describe, sources_of
+from hil.campaign.reading import first_run, read_of, whole_records
+from hil.network.described import told_differences
+from ident.assessment.file import refuse_unusable
+from ident.diagnosis.axis.diagnose import diagnose_axis
+from ident.diagnosis.diagnosis import Diagnosis, Verdict, faulty, write_diagnosis
+from ident.diagnosis.findings import Findings
+from ident.diagnosis.vehicle.closing import extended_model
+from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
+from ident.diagnosis.vehicle.unseen import unseen_gaps
+from ident.effects.extended import ExtendedModel, read_model, write_model
+from ident.errors import RecordError, UserError
+from ident.faults import Fault, find_faults
+from ident.records.axis_record import AxisKind, AxisRecord, read_axis_record
+from ident.records.record import Record
+from ident.report.faults import fault_lines, write_fault_report
+from ident.report.gap import GapReport, write_gap_report
+from ident.report.gap_summary import summary_lines
+from ident.stages import Stage, untold
+from ident.vehicle.description import VehicleDescription, find_data_file
+from ident.vehicle.quantities import read_toml
+from ident.writing import refuse_folder, refuse_inputs
+
+Array = NDArray[np.float64]
+
+SAME: Final = 1e-6
+"""Largest difference of two series over their range at which they are the same recording, written twice."""
+SAME_RATE: Final = 0.01
+"""Largest relative difference of two sample times."""
+
+ASSUMED: Final = {
+    AxisKind.LINEAR: "No units are stated, m and N are taken; name a channel `position [rad]` if its axis turns.",
+    AxisKind.ROTARY: "No units are stated, rad and Nm are taken; name a channel `position [m]` if its axis slides.",
+}
+"""What is said where the kind of an axis is assumed."""
+
+
+@dataclass(frozen=True)
+class DiagnosisOrder:
+    """A diagnosis as it is asked for.
+
+    Attributes:
+        records: run folders or files to look for causes in.
+        confirm: the same, independent of them; none: a part of `records` confirms.
+        vehicle: shipped vehicle file by name, or a path; None: that of the first run folder, or the prototype.
+        model: `parameters.toml` that is judged; None: the parameters are refitted.
+        axis: the records are of servo axes.
+        seed: of the surrogates.
+        json, report, extended: files to write, or None; `extended` is the model with the effects that are named.
+        force: take a model that was assessed as unusable.
+        network: network file in place of that of the vehicle or of the run folders.
+    """
+
+    records: tuple[Path, ...]
+    confirm: tuple[Path, ...]
+    vehicle: str | None
+    model: Path | None
+    axis: bool
+    seed: int
+    json: Path | None
+    report: Path | None
+    extended: Path | None = None
+    force: bool = False
+    network: Path | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What is to be written."""
+        return tuple(path for path in (self.json, self.report, self.extended) if path is not None)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was found.
+
+    Attributes:
+        findings: None where the records have faults, and were not looked into further.
+        diagnosis: as it goes into `diagnosis.json`.
+        model: with the effects that are named; None where none is.
+        notes: what the reader must know, a line each.
+    """
+
+    findings: Findings | None
+    diagnosis: Diagnosis
+    model: ExtendedModel | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def summary(self) -> list[str]:
+        """Ten lines for people, and the notes."""
+        if self.findings is None:
+            return [*fault_lines(self.diagnosis.faults), *self.notes]
+        return [*summary_lines(self.findings, self.diagnosis), *self.notes]
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """One uninterrupted recording, for comparison with others.
+
+    Attributes:
+        source: for messages.
+        sample_time: [s].
+        series: (N, n) what was measured.
+    """
+
+    source: str
+    sample_time: float
+    series: Array
+
+    def is_same(self, other: _Stretch) -> bool:
+        """Whether the samples are the same, whatever the file is called and when its time begins."""
+        if self.series.shape != other.series.shape:
+            return False
+        reach = np.maximum(np.ptp(self.series, axis=0), np.finfo(float).tiny)
+        return bool(np.all(np.abs(self.series - other.series) <= SAME * reach))
+
+
+def diagnose_records(order: DiagnosisOrder, stage: Stage = untold) -> Answer:
+    """Diagnose; nothing is written yet.
+
+    Raises:
+        UserError: a record, the model or the vehicle cannot be used, a file cannot be written, or a record is to
+            confirm itself.
+    """
+    _refuse_unworkable(order)
+    return _axis_answer(order, stage) if order.axis else _vehicle_answer(order, stage)
+
+
+def write_answer(order: DiagnosisOrder, answer: Answer) -> list[Path]:
+    """Write the files that were asked for, each whole; no model where no effect is named. Gives their paths.
+
+    Raises:
+        UserError: one cannot be written.
+    """
+    fitted, confirmed = (tuple(map(str, paths)) for paths in (order.records, order.confirm))
+    judged = None if order.model is None else str(order.model)
+    written = []
+    if order.json is not None:
+        write_diagnosis(answer.diagnosis, order.json)
+        written.append(order.json)
+    if order.report is not None:
+        if answer.findings is None:
+            write_fault_report(answer.diagnosis.faults, (*fitted, *confirmed), order.report)
+        else:
+            write_gap_report(GapReport(answer.findings, answer.diagnosis, fitted, confirmed, judged), order.report)
+        written.append(order.report)
+    if order.extended is not None and answer.model is not None:
+        write_model(answer.model, order.extended, _provenance(order))
+        written.append(order.extended)
+    return written
+
+
+def _provenance(order: DiagnosisOrder) -> dict[str, str]:
+    """What the numbers of the model come from: names of the records, and of the model that was judged."""
+    sources = {"run": "diagnosis", "records": _names(order.records)}
+    if order.confirm:
+        sources["confirm"] = _names(order.confirm)
+    if order.model is not None:
+        sources["model"] = order.model.name
+    return sources
+
+
+def _names(paths: Sequence[Path]) -> str:
+    return ", ".join(path.name for path in paths)
+
+
+def _refuse_unworkable(order: DiagnosisOrder) -> None:
+    """Refuse what could not be judged or written, before the work.
+
+    Raises:
+        UserError: a name is that of a folder or of a file that is read, there is no such model, or it was assessed as
+            unusable.
+    """
+    if order.model is not None and not order.axis:
+        # What is written would be a model without an assessment, so force does not reach so far.
+        force = order.force and order.extended is None
+        refuse_unusable(read_toml(order.model), str(order.model), force=force)
+    for path in order.files:
+        refuse_folder(path)
+    read = [source for path in (*order.records, *order.confirm) for source in sources_of(path)]
+    vehicle = None if order.vehicle is None or order.axis else find_data_file("ident.vehicle", order.vehicle)
+    refuse_inputs(order.files, [*read, order.model, vehicle])
+    if order.axis and order.extended is not None:
+        raise UserError(
+            "--extended writes a model of the platform, --axis says that the records are of servo axes.",
+            "Leave one of them out; --json holds the causes of an axis.",
+        )
+
+
+def _axis_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
+    if order.model is not None or order.vehicle is not None:
+        raise UserError(
+            "--model and --vehicle are of the platform, --axis says that the records are of servo axes.",
+            "Leave one side out; the model of an axis is refitted from its records.",
+        )
+    stage("reading")
+    records, confirming = ([read_axis_record(path) for path in paths] for paths in (order.records, order.confirm))
+    _refuse_repeated([_of_axes(record) for record in (*records, *confirming)])
+    findings = diagnose_axis(records, confirming, seed=order.seed, stage=stage)
+    assumed = [axis.kind for record in records for axis in record.axes if axis.assumed]
+    return Answer(findings, findings.diagnosis(), notes=(ASSUMED[assumed[0]],) if assumed else ())
+
+
+def _vehicle_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
+    first = first_run(order.records)
+    described = describe(first, order.vehicle, order.network)
+    vehicle = described.vehicle
+    told = "" if first is None else told_differences(vehicle, first.plan.vehicle)
+    model = None if order.model is None else read_model(order.model)
+    stage("reading")
+    records, confirming = (
+        [read_of(path, order.vehicle, order.network, described) for path in paths]
+        for paths in (order.records, order.confirm)
+    )
+    _refuse_repeated([part for record in (*records, *confirming) for part in _of_vehicle(record)])
+    stage("looking for faults of the records")
+    faults = _faults((*records, *confirming), vehicle)
+    notes = (told,) if told else ()
+    if faults:
+        return Answer(None, faulty(faults), notes=notes)
+    found = diagnose_vehicle(records, confirming, vehicle, model, seed=order.seed, stage=stage)
+    given = model.effects if model is not None else ()
+    stage("what the steps left out show")
+    diagnosis = replace(found.diagnosis, unseen=unseen_gaps(found.findings, records, confirming, vehicle, given))
+    named = diagnosis.verdict is Verdict.EFFECT
+    extended = extended_model(found.findings, vehicle.prior, given=given) if named else None
+    return Answer(found.findings, diagnosis, extended, notes)
+
+
+def _faults(records: Sequence[Record], vehicle: VehicleDescription) -> list[Fault]:
+    """Of all records, each once, that make everything fit when they are undone, or that nothing can undo."""
+    found = [fault for record in whole_records(records) for fault in find_faults(record, vehicle) if fault.sure]
+    return list({(fault.name, fault.channel, fault.step): fault for fault in found}.values())
+
+
+def _refuse_repeated(parts: Sequence[_Stretch]) -> None:
+    """Refuse what is there twice, under whatever name, and recordings of different rates.
+
+    Raises:
+        RecordError: named.
+    """
+    for index, part in enumerate(parts):
+        for other in parts[:index]:
+            if part.is_same(other):
+                raise RecordError(
+                    f"{part.source} holds the same samples as {other.source}.",
+                    "A record cannot confirm itself, nor count twice: name independent ones, or leave it out.",
+                )
+            if abs(part.sample_time - other.sample_time) > SAME_RATE * other.sample_time:
+                raise RecordError(
+                    f"{part.source} is sampled every {part.sample_time * 1e3:.4g} ms, {other.source} every "
+                    f"{other.sample_time * 1e3:.4g} ms.",
+                    "Record all of them at the same rate, or resample them to it.",
+                )
+
+
+def _of_axes(record: AxisRecord) -> _Stretch:
+    series = [values for axis in record.axes for values in (axis.position, axis.effort)]
+    return _Stretch(record.source, record.sample_time, np.stack(series, axis=1))
+
+
+def _of_vehicle(record: Record) -> list[_Stretch]:
+    return [
+        _Stretch(
+            f"{record.source}, step {segment.step}",
+            segment.sample_time,
+            np.hstack([segment.motor_torques, segment.wheel_angles, segment.steering_angles]),
+        )
+        for segment in record.segments
+    ]

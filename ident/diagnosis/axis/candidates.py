@@ -1,0 +1,276 @@
+"""Possible causes of the gap of an axis, as columns beside M a + Fv v + Fc sign(v) + offset.
+
+Written from the literature of servo axes: Stribeck's curve and asymmetric friction (Armstrong-Hélouvry, Dupont, Canudas
+de Wit 1994), friction of two joints that share a shaft (Gautier, Janot, Vandanjon: Stäubli TX 40), a spring between
+drive and load by its first term in frequency.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.axis.motion import AxisMotion
+from ident.diagnosis.derivatives import delayed, derivative
+from ident.diagnosis.names import EffectName
+from ident.diagnosis.problem import Candidate, Variant
+from ident.effects import EffectParameter
+from ident.records.axis_record import AxisKind
+
+Array = NDArray[np.float64]
+Filter = Callable[[Array], Array]
+
+STRIBECK_SPEEDS: Final = (0.02, 0.05, 0.1, 0.2, 0.4)
+"""Tried first, over the 95th percentile of the speed."""
+BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
+"""Tried first, over the range of the position."""
+LEAST_SHARE: Final = 0.1
+"""Of the effort that must lie behind a play for it to be one."""
+LONGEST_HOLD: Final = 0.55
+"""Sample intervals up to which a lag is no delay: half of one is what holding the effort over the interval does."""
+FEWEST_RIPPLES: Final = 2.0
+"""Periods over the range of the position below which a force that follows the position is no ripple."""
+RIPPLE_STEP: Final = 0.7
+MOST_RIPPLES: Final = 90.0
+"""Periods over the range of the position that are tried, and their step."""
+
+
+class AxisEffect(enum.StrEnum):
+    """Effects that only coupled axes have."""
+
+    COUPLED_FRICTION = "coupled_friction"
+
+
+@dataclass(frozen=True)
+class AxisModel:
+    """What candidates are written in: one axis of a record.
+
+    Attributes:
+        place: its place, for results.
+        block: its number among the blocks of the problem.
+        blocks: how many blocks there are.
+        kind: says the units.
+        motion: smoothed.
+        sample_time: [s].
+        filtered: passes (N,) or (N, k) through the filter of the rows.
+        inertia: M of a first estimate [kg or kg m²].
+        effort: (N,) of that estimate, from the smoothed motion [N or Nm].
+        absorbed: (N,) the same, of the columns of the baseline itself.
+        speed: of which the axis is seldom faster [m/s or rad/s].
+        reach: range of its position [m or rad].
+        others: name and motion of the other axes.
+    """
+
+    place: str
+    block: int
+    blocks: int
+    kind: AxisKind
+    motion: AxisMotion
+    sample_time: float
+    filtered: Filter
+    inertia: float
+    effort: Array
+    absorbed: Array
+    speed: float
+    reach: float
+    others: tuple[tuple[str, AxisMotion], ...]
+
+    def alone(self, column: Array) -> tuple[Array | None, ...]:
+        """A filtered column in the block of this axis, nothing in the others."""
+        filtered = self.filtered(column)
+        return tuple(filtered if index == self.block else None for index in range(self.blocks))
+
+    def unit(self, per: str = "") -> str:
+        """Unit of the effort, over some power of position and time."""
+        return f"{self.kind.effort_unit}{per.replace('q', self.kind.position_unit)}"
+
+
+def axis_candidates(axis: AxisModel) -> list[Candidate]:
+    """Every cause that the library has for an axis."""
+    made = [make(axis) for make in _LIBRARY]
+    return [*made, *_coupled_friction(axis)] if axis.others else made
+
+
+def _linear(
+    axis: AxisModel, effect: str, parameters: Sequence[EffectParameter], *columns: Array, least: float | None = None
+) -> Candidate:
+    variant = Variant(axis.alone(np.stack(columns, axis=1)))
+    return Candidate(effect, axis.place, tuple(parameters), (variant,), least=least)
+
+
+def _asymmetric_viscous(axis: AxisModel) -> Candidate:
+    unit = axis.unit(" s/q")
+    parameter = EffectParameter("imbalance", unit, "friction is Fv + imbalance forward, Fv - imbalance backward")
+    return _linear(axis, EffectName.ASYMMETRIC_VISCOUS, [parameter], np.abs(axis.motion.velocity))
+
+
+def _asymmetric_coulomb(axis: AxisModel) -> Candidate:
+    parameter = EffectParameter("imbalance", axis.unit(), "friction is Fc + imbalance forward, Fc - imbalance backward")
+    return _linear(axis, EffectName.ASYMMETRIC_COULOMB, [parameter], np.sign(axis.motion.velocity) ** 2)
+
+
+def _torque_bias(axis: AxisModel) -> Candidate:
+    parameter = EffectParameter("bias", axis.unit(), "effort beyond the effort reported")
+    return _linear(axis, EffectName.TORQUE_BIAS, [parameter], -np.ones_like(axis.effort))
+
+
+def _torque_gain(axis: AxisModel) -> Candidate:
+    parameter = EffectParameter("error", "1", "effort is (1 + error) times the effort reported")
+    return _linear(axis, EffectName.TORQUE_GAIN, [parameter], -axis.absorbed)
+
+
+def _payload(axis: AxisModel) -> Candidate:
+    unit = "kg" if axis.kind is AxisKind.LINEAR else "kg m^2"
+    parameter = EffectParameter("mass", unit, "inertia that the model does not have")
+    return _linear(axis, EffectName.PAYLOAD, [parameter], axis.motion.linear[:, 0])
+
+
+def _quadratic_drag(axis: AxisModel) -> Candidate:
+    parameter = EffectParameter("coefficient", axis.unit(" s^2/q^2"), "resistance is coefficient times v abs(v)")
+    velocity = axis.motion.velocity
+    return _linear(axis, EffectName.QUADRATIC_DRAG, [parameter], velocity * np.abs(velocity), least=0.0)
+
+
+def _gravity(axis: AxisModel) -> Candidate:
+    """A tilted axis, or a centre of mass beside the axis of rotation."""
+    position = axis.motion.position
+    if axis.kind is AxisKind.LINEAR:
+        parameter = EffectParameter("force", "N", "of gravity along the axis")
+        return _linear(axis, EffectName.SLOPE, [parameter], np.ones_like(position))
+    parameters = [
+        EffectParameter("sine", "Nm", "moment of gravity, times the sine of the angle"),
+        EffectParameter("cosine", "Nm", "moment of gravity, times the cosine of the angle"),
+    ]
+    return _linear(axis, EffectName.COM_OFFSET, parameters, np.sin(position), np.cos(position))
+
+
+def _stribeck(axis: AxisModel) -> Candidate:
+    velocity = axis.motion.velocity
+
+    def curve(speed: float) -> Array:
+        return np.asarray(np.sign(velocity) * np.exp(-np.square(velocity / speed)))
+
+    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
+        return axis.alone(values[0] * curve(float(values[1])))
+
+    def variant(speed: float) -> Variant:
+        return Variant(axis.alone(curve(speed)[:, None]), lambda found: np.append(found, speed))
+
+    parameters = (
+        EffectParameter("amplitude", axis.unit(), "friction at rest beyond the Coulomb friction"),
+        EffectParameter("velocity", f"{axis.kind.position_unit}/s", "speed at which it has fallen to 1/e"),
+    )
+    variants = tuple(variant(share * axis.speed) for share in STRIBECK_SPEEDS)
+    return Candidate(EffectName.STRIBECK, axis.place, parameters, variants, contribution, least=0.0)
+
+
+def _time_delay(axis: AxisModel) -> Candidate:
+    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
+        return axis.alone(delayed(axis.effort, -float(values[0]), axis.sample_time) - axis.effort)
+
+    parameters = (EffectParameter("delay", "s", "of the motion behind the effort, as reported"),)
+    slope = derivative(axis.effort, axis.sample_time)
+    variants = (Variant(axis.alone(slope[:, None])),)
+    shortest = LONGEST_HOLD * axis.sample_time
+    return Candidate(EffectName.TIME_DELAY, axis.place, parameters, variants, contribution, negligible=shortest)
+
+
+def _elasticity(axis: AxisModel) -> Candidate:
+    """u = M q'' + ... - c M u'': the load follows the drive through a spring; first order in its compliance c."""
+    unit = f"{axis.kind.position_unit}/{axis.kind.effort_unit}"
+    meaning = "between drive and load, all inertia behind it; negative where the position is measured behind it"
+    bend = derivative(derivative(axis.effort, axis.sample_time), axis.sample_time)
+    sampling = axis.sample_time**2 / abs(axis.inertia)
+    column = axis.alone((-axis.inertia * bend)[:, None])
+    parameters = (EffectParameter("compliance", unit, meaning),)
+    return Candidate(EffectName.ELASTICITY, axis.place, parameters, (Variant(column),), negligible=sampling)
+
+
+def _backlash(axis: AxisModel) -> Candidate:
+    """While the drive crosses the gap after a reversal, the load and its friction are not felt."""
+
+    def missing(gap: float) -> Array:
+        return np.asarray(-axis.effort * in_gap(axis.motion.position, gap))
+
+    def variant(gap: float) -> Variant:
+        return Variant(axis.alone(missing(gap)[:, None]), lambda found: np.array([gap, *found]))
+
+    parameters = (
+        EffectParameter("gap", axis.kind.position_unit, "whole play"),
+        EffectParameter("share", "1", "of the effort that lies behind it"),
+    )
+    variants = tuple(variant(share * axis.reach) for share in BACKLASH_GAPS)
+    return Candidate(EffectName.BACKLASH, axis.place, parameters, variants, least=LEAST_SHARE)
+
+
+def in_gap(position: Array, gap: float) -> Array:
+    """1 where a position (N,) is on its way across a gap after a reversal, 0 where it pushes one of its sides."""
+    inside, centre = np.zeros(len(position)), position[0]
+    for index, value in enumerate(position):
+        centre = min(max(centre, value - gap / 2), value + gap / 2)
+        inside[index] = abs(value - centre) < 0.499 * gap
+    return inside
+
+
+def _torque_ripple(axis: AxisModel) -> Candidate:
+    """A sine and a cosine of the position; cogging of a motor, pitch of a screw or of teeth."""
+    turn = 2 * np.pi if axis.kind is AxisKind.ROTARY else 1.0
+    angle = 2 * np.pi * axis.motion.position / turn
+
+    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
+        return axis.alone(values[0] * np.sin(values[1] * angle + values[2]))
+
+    def variant(order: float) -> Variant:
+        columns = np.stack([np.sin(order * angle), np.cos(order * angle)], axis=1)
+        return Variant(axis.alone(columns), lambda found: _polar(found, order))
+
+    parameters = (
+        EffectParameter("amplitude", axis.unit(), "not reported by the drive"),
+        EffectParameter("order", "1" if axis.kind is AxisKind.ROTARY else "1/m", "periods a turn, or a metre"),
+        EffectParameter("phase", "rad", "at position zero"),
+    )
+    periods = np.arange(1.0, MOST_RIPPLES + RIPPLE_STEP, RIPPLE_STEP)
+    variants = tuple(variant(float(count) * turn / axis.reach) for count in periods)
+    lowest = (0.0, FEWEST_RIPPLES * turn / axis.reach, 0.0)
+    return Candidate(EffectName.TORQUE_RIPPLE, axis.place, parameters, variants, contribution, lowest=lowest)
+
+
+def _polar(found: Array, order: float) -> Array:
+    return np.array([np.hypot(found[0], found[1]), order, np.arctan2(found[1], found[0])])
+
+
+def _coupled_friction(axis: AxisModel) -> list[Candidate]:
+    """Friction that follows another axis' speed, or the sum or difference of both where the two share a shaft."""
+    return [_coupled_with(axis, name, other) for name, other in axis.others]
+
+
+def _coupled_with(axis: AxisModel, name: str, other: AxisMotion) -> Candidate:
+    own, speed = axis.motion.velocity, other.velocity
+    forms = (np.sign(speed), np.sign(own + speed), np.sign(own - speed))
+    parameters = (
+        EffectParameter(f"viscous_{name}", axis.unit(" s/q"), f"friction over the speed of axis {name}"),
+        EffectParameter(f"coulomb_{name}", axis.unit(), f"friction with the direction of axis {name}, or of both"),
+    )
+    variants = tuple(Variant(axis.alone(np.stack([speed, form], axis=1))) for form in forms)
+    return Candidate(AxisEffect.COUPLED_FRICTION, f"{axis.place}<{name}", parameters, variants)
+
+
+_LIBRARY: Final[tuple[Callable[[AxisModel], Candidate], ...]] = (
+    _stribeck,
+    _asymmetric_coulomb,
+    _asymmetric_viscous,
+    _quadratic_drag,
+    _gravity,
+    _payload,
+    _torque_gain,
+    _torque_bias,
+    _torque_ripple,
+    _time_delay,
+    _backlash,
+    _elasticity,
+)

@@ -1,0 +1,62 @@
+"""The diagnosis of a servo axis, or of several coupled ones, from their records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from ident.diagnosis.axis.problem import axis_problem, delayed_axes
+from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_other_axes
+from ident.diagnosis.findings import Findings
+from ident.diagnosis.judge import judge
+from ident.diagnosis.limits import Limits
+from ident.diagnosis.split import split_problem
+from ident.records.axis_record import AxisRecord
+from ident.stages import Stage, untold
+
+LIMITS: Final = Limits(named=0.6, nearly=0.6, humble=True)
+"""Of an axis. Its effort has little noise, beside which cogging and errors of its pitch always repeat, without a name:
+what they leave does not take the name from a cause that closes one and a half times as much, but makes it less sure."""
+
+
+def diagnose_axis(
+    fit: Sequence[AxisRecord],
+    confirm: Sequence[AxisRecord],
+    *,
+    seed: int,
+    cutoff: float | None = None,
+    stage: Stage = untold,
+) -> Findings:
+    """What the model M a + Fv v + Fc sign(v) + offset lacks.
+
+    Args:
+        fit: records that causes are looked for in.
+        confirm: independent records of the same axes; none: a part of `fit` confirms.
+        seed: of the surrogates.
+        cutoff: of the position filter [rad/s]; None: chosen from the records.
+        stage: told what begins.
+
+    Raises:
+        RecordError: the records do not have the same axes.
+        EstimationError: a record is too short, or an axis does not move.
+    """
+    refuse_other_axes([*fit, *confirm])
+    stage("filter of the records")
+    reference = axis_reference(fit, cutoff)
+    findings = _judged(fit, confirm, reference, seed, stage)
+    late = delayed_axes(findings.after, findings.problem, fit[0].axes, reference.scales)
+    if not any(late):
+        return findings
+    pairs = zip(reference.scales, late, strict=True)
+    scales = tuple(replace(scale, hold=None) if delayed else scale for scale, delayed in pairs)
+    stage("again, an axis being late")
+    return _judged(fit, confirm, replace(reference, scales=scales), seed, stage)
+
+
+def _judged(
+    fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord], reference: Reference, seed: int, stage: Stage
+) -> Findings:
+    fitted = axis_problem(fit, reference)
+    pair = (fitted, axis_problem(confirm, reference)) if confirm else split_problem(fitted)
+    return judge(*pair, seed=seed, limits=LIMITS, stage=stage)

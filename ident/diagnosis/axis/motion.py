@@ -1,0 +1,201 @@
+"""Speed and acceleration of an axis whose sampling, noise and repeats are not known beforehand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, signal
+
+from ident.diagnosis.derivatives import derivative
+from ident.diagnosis.rows import ROWS_PER_CUTOFF
+from ident.errors import EstimationError
+from ident.estimate.axis.processing import smoothed
+from ident.records.axis_record import AxisRecord, AxisSignals
+
+Array = NDArray[np.float64]
+
+LARGEST_CUTOFF: Final = 0.4
+"""Of the position filter, over the sampling frequency."""
+ROWS_CUTOFF: Final = 0.4
+"""Cutoff of the rows over that of the position filter: sign(v) then sees the velocity itself."""
+LARGEST_ROWS_CUTOFF: Final = 1.0
+"""Largest cutoff of the rows times the sample time."""
+NOISE_SHARE: Final = 0.1
+"""Of the effort's noise that the noise of the acceleration may reach."""
+SPECTRUM_SEGMENTS: Final = 8
+BAND: Final = 1.3
+"""Ratio of the ends of the bands over which spectra are averaged."""
+LEAST_ROWS: Final = 300
+"""Rows that the shortest repeat, or a record without any, shall have."""
+MOST_ROWS: Final = 4000
+"""Rows of a repeat beyond which more say nothing new and take long."""
+EFFORT_SHARE: Final = 0.99
+"""Of the power of the effort that the rows keep. What lies above belongs to drives and structures, not to the axis."""
+STUCK_SPEED: Final = 0.01
+"""Over the 95th percentile of the speed: below it an axis may stick."""
+REPEAT_MISMATCH: Final = 0.03
+"""Rms difference of two repeats of a motion over its standard deviation, at most."""
+ALMOST_WHOLE: Final = 0.95
+"""Part of a repeat that must be there for it to count."""
+SMALLEST_MOTION: Final = 1e-9
+REST: Final = 12.0
+"""Range of a position over its noise, as its second differences show it, below which it does not move: a million
+samples of white noise have a range of 10."""
+FEWEST_ROWS: Final = 60
+"""Independent rows that a diagnosis needs."""
+
+
+@dataclass(frozen=True)
+class AxisMotion:
+    """Motion of an axis.
+
+    Attributes:
+        position, velocity, acceleration: (N,) smoothed, for what is nonlinear in them [m or rad, and per s, s²].
+        linear: (N, 2) acceleration and velocity of the unfiltered position, to be filtered like the effort.
+        effort: (N,) measured, unfiltered [N or Nm].
+        moving: (N,) false where the axis may stick, and at the ends, where filters have not settled.
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    linear: Array
+    effort: Array
+    moving: NDArray[np.bool_]
+
+
+def position_cutoff(record: AxisRecord) -> float:
+    """Cutoff for the positions of a record [rad/s]: where the noise of their second derivative begins to prevail.
+
+    The power spectrum of the acceleration falls with the motion and rises with the fourth power of the frequency where
+    only noise is left; its smoothed minimum lies between, and the smallest over the axes is taken.
+    """
+    rate = 1 / record.sample_time
+    lowest = min(20 / (len(record) * record.sample_time), LARGEST_CUTOFF * rate)
+    found = [_quietest(axis.position, rate) for axis in record.axes]
+    return 2 * math.pi * float(np.clip(min(found), lowest, LARGEST_CUTOFF * rate))
+
+
+def noise_limit(axis: AxisSignals, inertia: float, cutoff: float, sample_time: float) -> float:
+    """Frequency [rad/s] below which the noise of the acceleration, times the inertia, is well below that of the effort.
+
+    Beyond it, errors of the regressor look like an elastic drive. Between ROWS_CUTOFF of the position's cutoff and it.
+    """
+    position, effort = (_noise_power(series, sample_time) for series in (axis.position, axis.effort))
+    level = NOISE_SHARE * effort / max(inertia**2 * position, np.finfo(float).tiny)
+    return float(np.clip(level**0.25, ROWS_CUTOFF * cutoff, min(cutoff, LARGEST_ROWS_CUTOFF / sample_time)))
+
+
+def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth: float) -> AxisMotion:
+    """Motion of an axis by a zero-phase filter of `cutoff` and differences, for rows up to `bandwidth` [rad/s].
+
+    Where an axis reverses it may stick, and friction is then whatever holds it: such rows are left out, with the memory
+    of the rows' filter around them.
+
+    Raises:
+        EstimationError: the record is too short for the filter, the axis does not move, or its effort never changes.
+    """
+    dt = record.sample_time
+    memory = 4 / bandwidth
+    noise = float(np.std(np.diff(axis.position, 2))) / math.sqrt(6)
+    if np.ptp(axis.position) < max(SMALLEST_MOTION, REST * noise):
+        raise EstimationError(f"{record.source}: {axis.label} does not move.", "Record it while it is driven.")
+    if not np.ptp(axis.effort):
+        raise EstimationError(
+            f"{record.source}: the effort of {axis.label} never changes.", "Record the force or torque of its drive."
+        )
+    if len(record) * dt * bandwidth / (2 * math.pi) < FEWEST_ROWS / ROWS_PER_CUTOFF:
+        raise EstimationError(
+            f"{record.source} lasts {len(record) * dt:.3g} s, too short for its bandwidth of "
+            f"{bandwidth / (2 * math.pi):.3g} Hz.",
+            "Record longer, at least some ten strokes.",
+        )
+    position = smoothed(axis.position, cutoff, dt)
+    velocity = derivative(position, dt)
+    speed = float(np.percentile(np.abs(velocity), 95))
+    slow = (np.abs(velocity) < STUCK_SPEED * speed) | (np.diff(np.sign(velocity), prepend=np.sign(velocity[0])) != 0)
+    moving = ~ndimage.binary_dilation(slow, np.ones(2 * round(memory / dt) + 1))
+    ends = max(1, round(2 * memory / dt))
+    moving[:ends] = moving[-ends:] = False
+    rate = derivative(axis.position, dt)
+    linear = np.stack([derivative(rate, dt), rate], axis=1)
+    return AxisMotion(position, velocity, derivative(velocity, dt), linear, axis.effort, moving)
+
+
+def effort_bandwidth(effort: Array, duration: float, limit: float, sample_time: float) -> float:
+    """Cutoff for the rows of an axis [rad/s].
+
+    Args:
+        effort: (N,) modelled, of which the rows keep EFFORT_SHARE of the power.
+        duration: of a repeat, or of the record without any [s]; short ones need a wider band for enough rows.
+        limit: that must not be exceeded [rad/s].
+        sample_time: [s].
+    """
+    frequency, power = signal.periodogram(effort, 1 / sample_time, detrend="constant")
+    share = np.cumsum(power) / max(float(power.sum()), np.finfo(float).tiny)
+    found = float(frequency[min(int(np.searchsorted(share, EFFORT_SHARE)), len(frequency) - 1)])
+    wanted = float(np.clip(ROWS_PER_CUTOFF * duration * found, LEAST_ROWS, MOST_ROWS))
+    return min(2 * math.pi * wanted / (ROWS_PER_CUTOFF * duration), limit)
+
+
+def repeat_duration(record: AxisRecord) -> float:
+    """Duration of a repeat of a record, or of the whole of it without any [s]."""
+    period = with_repeats(record)
+    numbers, counts = np.unique(period[period >= 0], return_counts=True)
+    return float(counts.min() if len(numbers) >= 2 else len(record)) * record.sample_time
+
+
+def with_repeats(record: AxisRecord) -> NDArray[np.int64]:
+    """Number of the repeat of every sample (N,): as recorded, or found in the positions; -1 throughout without any."""
+    if np.unique(record.period[record.period >= 0]).size >= 2:
+        return record.period
+    length = _repeat_length(np.stack([axis.position for axis in record.axes], axis=1))
+    if length is None:
+        return np.full(len(record), -1, dtype=np.int64)
+    period = np.arange(len(record)) // length
+    if len(record) - period[-1] * length < ALMOST_WHOLE * length:
+        period[period == period[-1]] = -1
+    return np.asarray(period, dtype=np.int64)
+
+
+def _noise_power(series: Array, sample_time: float) -> float:
+    """Power density of what is left of a series (N,) in the upper half of its band, per hertz."""
+    length = max(16, len(series) // SPECTRUM_SEGMENTS)
+    frequency, power = signal.welch(series, 1 / sample_time, nperseg=min(length, len(series)), detrend="linear")
+    return float(np.median(power[len(frequency) // 2 :]))
+
+
+def _quietest(position: Array, rate: float) -> float:
+    acceleration = np.diff(position, 2) * rate**2
+    length = max(16, len(acceleration) // SPECTRUM_SEGMENTS)
+    frequency, power = signal.welch(acceleration, rate, nperseg=min(length, len(acceleration)), detrend="constant")
+    bands = frequency[1 : 1 + max(1, int(len(frequency) / BAND))]
+    level = [np.mean(power[(frequency >= low) & (frequency <= BAND * low)]) for low in bands]
+    return float(bands[int(np.argmin(level))])
+
+
+def _repeat_length(positions: Array) -> int | None:
+    """Samples after which all positions (N, n) come back, at least twice; None where they do not."""
+    samples = len(positions)
+    lags = np.arange(samples // 2 + 1)
+    mismatch = np.zeros(len(lags))
+    for position in (positions - positions.mean(axis=0)).T:
+        spectrum = np.fft.rfft(position, 2 * samples)
+        products = np.fft.irfft(np.abs(spectrum) ** 2)[: len(lags)]
+        energy = np.concatenate([[0.0], np.cumsum(position**2)])
+        pairs = energy[samples - lags] + energy[samples] - energy[lags]
+        variance = max(float(np.mean(position**2)), np.finfo(float).tiny)
+        mismatch = np.maximum(mismatch, (pairs - 2 * products) / ((samples - lags) * variance))
+    left = np.flatnonzero(mismatch > 0.5)
+    if not left.size:
+        return None
+    close = np.flatnonzero(mismatch[left[0] :] < REPEAT_MISMATCH**2) + left[0]
+    if not close.size:
+        return None
+    ends = np.flatnonzero(np.diff(close) > 1)
+    first = close[: ends[0] + 1] if ends.size else close
+    return int(first[np.argmin(mismatch[first])])

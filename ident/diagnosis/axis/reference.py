@@ -1,0 +1,207 @@
+"""What records of axes to fit and to confirm have in common: filters, scales, and how late sampling makes a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.axis.motion import (
+    FEWEST_ROWS,
+    LARGEST_CUTOFF,
+    ROWS_CUTOFF,
+    AxisMotion,
+    axis_motion,
+    effort_bandwidth,
+    noise_limit,
+    position_cutoff,
+    repeat_duration,
+)
+from ident.diagnosis.derivatives import delayed, derivative
+from ident.errors import EstimationError, RecordError
+from ident.estimate.axis.processing import smoothed
+from ident.estimate.filters import zero_phase
+from ident.records.axis_record import AxisRecord, AxisSignals
+
+Array = NDArray[np.float64]
+
+LARGEST_HOLD: Final = 1.0
+"""Sample intervals up to which a first estimate of the lag may be what sampling does; other effects shift it."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What the candidates of one axis are scaled by, found from the records of the fit.
+
+    Attributes:
+        values: own baseline parameters of the axis, a first estimate.
+        speed: of which the axis is seldom faster [m/s or rad/s].
+        reach: range of its position [m or rad].
+        hold: sample intervals by which its motion follows its effort as recorded, if sampling can be why: an effort
+            that is held over the interval acts half of one late. None: longer, and a cause of its own.
+    """
+
+    values: Array
+    speed: float
+    reach: float
+    hold: float | None
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What records to fit and to confirm must have in common.
+
+    Attributes:
+        cutoff: of the position filter [rad/s].
+        bandwidth: of the filter that all columns and the effort pass [rad/s].
+        scales: of every axis.
+    """
+
+    cutoff: float
+    bandwidth: float
+    scales: tuple[Scale, ...]
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Motions of the axes of one record and their filter.
+
+    Attributes:
+        record: efforts are those that act at the time of the positions, as far as sampling is why they do not.
+        motions: of its axes.
+        cutoff: of the position filter [rad/s].
+        bandwidth: of the filter of the rows [rad/s].
+    """
+
+    record: AxisRecord
+    motions: list[AxisMotion]
+    cutoff: float
+    bandwidth: float
+
+    def filtered(self, values: Array) -> Array:
+        """The filter of the positions and that of the rows, on everything alike."""
+        dt = self.record.sample_time
+        return zero_phase(smoothed(values, self.cutoff, dt), self.bandwidth, dt)
+
+    def equations(self, index: int) -> tuple[Array, Array]:
+        """Own columns (n, p) of an axis in its moving rows, and its effort (n,) there."""
+        motion = self.motions[index]
+        columns, effort = self.filtered(own_columns(self.motions, index)), self.filtered(motion.effort)
+        return columns[motion.moving], effort[motion.moving]
+
+    def first_estimate(self, index: int, values: Array) -> Array:
+        """Effort (N,) of an axis by a first estimate of its parameters, from its smoothed motion."""
+        motions = self.motions
+        own = motions[index]
+        columns = [own.acceleration, own.velocity, np.sign(own.velocity), np.ones_like(own.velocity)]
+        columns += [motion.acceleration for motion in motions if motion is not own]
+        return np.asarray(np.stack(columns, axis=1) @ values)
+
+
+def own_columns(motions: Sequence[AxisMotion], index: int) -> Array:
+    """Columns (N, p) that an axis has in the baseline, unfiltered: its own four, the acceleration of each other."""
+    motion = motions[index]
+    own = [*motion.linear.T, np.sign(motion.velocity), np.ones_like(motion.velocity)]
+    own += [other.linear[:, 0] for other in motions if other is not motion]
+    return np.stack(own, axis=1)
+
+
+def axis_reference(records: Sequence[AxisRecord], cutoff: float | None = None) -> Reference:
+    """Reference of the records of a fit.
+
+    Args:
+        records: of the same axes, at any rates.
+        cutoff: of the position filter [rad/s]; None: chosen from the records.
+
+    Raises:
+        RecordError: the records do not have the same axes.
+        EstimationError: a record is too short, or an axis does not move.
+    """
+    refuse_other_axes(records)
+    chosen = cutoff or min(position_cutoff(record) for record in records)
+    signals = [axis_signals(record, chosen, ROWS_CUTOFF * chosen) for record in records]
+    scales = tuple(_scale(signals, index) for index in range(len(records[0].axes)))
+    limit = min(
+        noise_limit(axis, scale.values[0], chosen, record.sample_time)
+        for record in records
+        for axis, scale in zip(record.axes, scales, strict=True)
+    )
+    bandwidth = max(
+        effort_bandwidth(
+            one.first_estimate(index, scale.values), repeat_duration(one.record), limit, one.record.sample_time
+        )
+        for one in signals
+        for index, scale in enumerate(scales)
+    )
+    return Reference(max(chosen, min(bandwidth / ROWS_CUTOFF, largest_cutoff(records))), bandwidth, scales)
+
+
+def largest_cutoff(records: Sequence[AxisRecord]) -> float:
+    """Of a position filter, at the rates of these records [rad/s]."""
+    return min(2 * np.pi * LARGEST_CUTOFF / record.sample_time for record in records)
+
+
+def axis_signals(record: AxisRecord, cutoff: float, bandwidth: float, scales: Sequence[Scale] = ()) -> Signals:
+    """Motions of the axes of a record, behind their filters.
+
+    Args:
+        record: of any axes.
+        cutoff, bandwidth: of the filters of the positions and of the rows [rad/s].
+        scales: of the axes, whose `hold` the efforts are shifted by; empty: as recorded.
+
+    Raises:
+        EstimationError: the record is too short, or an axis does not move.
+    """
+    if scales:
+        axes = [_on_time(axis, scale, record.sample_time) for axis, scale in zip(record.axes, scales, strict=True)]
+        record = replace(record, axes=tuple(axes))
+    return Signals(record, [axis_motion(record, axis, cutoff, bandwidth) for axis in record.axes], cutoff, bandwidth)
+
+
+def _on_time(axis: AxisSignals, scale: Scale, sample_time: float) -> AxisSignals:
+    """The axis with its effort when it acts, where sampling can be why that is not when it is recorded."""
+    if scale.hold is None:
+        return axis
+    return replace(axis, effort=delayed(axis.effort, scale.hold * sample_time, sample_time))
+
+
+def refuse_other_axes(records: Sequence[AxisRecord]) -> None:
+    """Refuse records of different axes.
+
+    Raises:
+        RecordError: they do not all have the same axes, of the same units.
+    """
+    first = [(axis.name, axis.kind) for axis in records[0].axes]
+    for record in records[1:]:
+        if [(axis.name, axis.kind) for axis in record.axes] != first:
+            raise RecordError(
+                f"{record.source} does not have the axes of {records[0].source}.", "Name records of the same axes."
+            )
+
+
+def _scale(signals: Sequence[Signals], index: int) -> Scale:
+    motions = [one.motions[index] for one in signals]
+    rows = [one.equations(index) for one in signals]
+    left, right = np.vstack([row[0] for row in rows]), np.concatenate([row[1] for row in rows])
+    record = signals[0].record
+    if sum(int(motion.moving.sum()) for motion in motions) * record.sample_time * signals[0].bandwidth < FEWEST_ROWS:
+        raise EstimationError(
+            f"{record.source}: {record.axes[index].label} hardly moves without reversing.",
+            "Record longer strokes, or more of them.",
+        )
+    values = np.linalg.lstsq(left, right, rcond=None)[0]
+    bend = np.concatenate([_lagging(one, index, values)[one.motions[index].moving] for one in signals])
+    *refined, lag = np.linalg.lstsq(np.column_stack([left, bend]), right, rcond=None)[0]
+    speed = max(float(np.percentile(np.abs(motion.velocity), 95)) for motion in motions)
+    reach = float(np.ptp(np.concatenate([motion.position for motion in motions])))
+    sampled = abs(lag) <= LARGEST_HOLD
+    return Scale(np.array(refined) if sampled else values, speed, reach, float(lag) if sampled else None)
+
+
+def _lagging(signals: Signals, index: int, values: Array) -> Array:
+    """Filtered change (N,) of the effort of a first estimate over a sample interval."""
+    dt = signals.record.sample_time
+    return signals.filtered(dt * derivative(signals.first_estimate(index, values), dt))

@@ -1,0 +1,171 @@
+"""The answer: what causes the gap, how sure that is, and what to do next; as a value and as JSON."""
+
+from __future__ import annotations
+
+import enum
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ident.faults import Fault
+from ident.vehicle.quantities import Quantity
+from ident.writing import write_whole
+
+
+class Verdict(enum.StrEnum):
+    """A named effect, no gap above the noise, a gap without a name, or a record that is at fault."""
+
+    EFFECT = "effect"
+    NONE = "none"
+    UNKNOWN = "unknown"
+    FAULT = "fault"
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """A cause that is part of the answer.
+
+    Attributes:
+        name, where: canonical.
+        parameters: value, standard uncertainty and unit by name.
+        probability: that this name is right, or one that is the same in these records.
+        ambiguity_set: names that these records do not tell apart from it, itself first.
+        gap_closed_held_out: share of the removable gap that this effect closes on records that took no part in the
+            fit, given the other effects.
+    """
+
+    name: str
+    where: str
+    parameters: Mapping[str, Quantity]
+    probability: float
+    ambiguity_set: tuple[str, ...]
+    gap_closed_held_out: float
+
+
+@dataclass(frozen=True)
+class Share:
+    """Part of the gap's power that lies in one place; the shares of region `all` sum to one.
+
+    Attributes:
+        channel, step, coordinate: which rows.
+        region: `all`, or a part of those rows.
+        share: of the power of the whole gap above the floor [-].
+    """
+
+    channel: str
+    step: str
+    coordinate: str
+    region: str
+    share: float
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Rms difference of model and measurement on held-out rows, each row over the rms of what its coordinate measures.
+
+    Attributes:
+        before: of the model without the effects.
+        after: with them, everything refitted jointly.
+        floor: noise, which no model can remove.
+    """
+
+    before: float
+    after: float
+    floor: float
+
+    @property
+    def closed(self) -> float:
+        """Share of the removable gap that is gone: 1 - (after² - floor²)/(before² - floor²); 0 where none was."""
+        removable = self.before**2 - self.floor**2
+        return 1 - (self.after**2 - self.floor**2) / removable if removable > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """The gap of one channel in whole steps that took no part in the fit.
+
+    Attributes:
+        steps: `repeated` for those that the diagnosis compares, `lane_change`.
+        channel: kinematic, dynamic or outcome.
+        gap: in units of the noise.
+    """
+
+    steps: str
+    channel: str
+    gap: Gap
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The content of `diagnosis.json`, which other programs read and which therefore stays as it is; and `unseen`.
+
+    Attributes:
+        verdict: what kind of answer it is.
+        effects: by probability, most probable first; empty unless the verdict is `effect`.
+        where: shares of the gap, largest first.
+        gap: on held-out rows.
+        invisible: names of effects that these records cannot show anywhere.
+        next_experiment: what would split an ambiguity or show what is invisible; None where nothing would.
+        unseen: gap by channel (kinematic, dynamic, outcome) of whole records that took no part in the fit; empty where
+            there is no model to simulate.
+        faults: of the records; where there are any the verdict is `fault`, and nothing else was looked at.
+    """
+
+    verdict: Verdict
+    effects: tuple[NamedEffect, ...]
+    where: tuple[Share, ...]
+    gap: Gap
+    invisible: tuple[str, ...]
+    next_experiment: str | None
+    unseen: tuple[Unseen, ...] = ()
+    faults: tuple[Fault, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values, numbers that JSON can hold."""
+        gap = {name: _number(getattr(self.gap, name)) for name in ("before", "after", "floor", "closed")}
+        return {
+            "verdict": str(self.verdict),
+            "effects": [_effect(effect) for effect in self.effects],
+            "where": [vars(share) | {"share": _number(share.share)} for share in self.where],
+            "gap": gap,
+            "invisible": list(self.invisible),
+            "next_experiment": self.next_experiment,
+            "faults": [fault.as_json() for fault in self.faults],
+        }
+
+
+def faulty(faults: Sequence[Fault]) -> Diagnosis:
+    """The answer where the records are at fault: whatever effects they seem to show are not asked for."""
+    nothing = Gap(math.nan, math.nan, math.nan)
+    return Diagnosis(Verdict.FAULT, (), (), nothing, (), faults[0].remedy, faults=tuple(faults))
+
+
+def write_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
+    """Write the file whole or not at all.
+
+    Raises:
+        UserError: it cannot be written.
+    """
+    write_whole(json.dumps(diagnosis.as_json(), indent=2, allow_nan=False) + "\n", path)
+
+
+def _effect(effect: NamedEffect) -> dict[str, Any]:
+    return {
+        "name": effect.name,
+        "where": effect.where,
+        "parameters": {
+            name: {"value": _number(quantity.value), "std": _number(quantity.std), "unit": quantity.unit}
+            for name, quantity in effect.parameters.items()
+        },
+        "probability": _number(effect.probability),
+        "ambiguity_set": list(effect.ambiguity_set),
+        "gap_closed_held_out": _number(effect.gap_closed_held_out),
+    }
+
+
+def _number(value: float) -> float | None:
+    """JSON has no NaN and no infinity."""
+    return float(value) if math.isfinite(value) else None

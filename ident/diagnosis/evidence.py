@@ -1,0 +1,306 @@
+"""What the rows say for each candidate: likelihood ratios beside the baseline, and surrogates to measure them against.
+
+A candidate's columns are first made orthogonal to the whitened baseline: what the parameters of the model can absorb is
+no evidence. Under no effect, the signs of stretches of the whitened residual are arbitrary; flipping them at random
+gives the distribution of the largest ratio over all candidates (max statistic, so that many candidates cost what they
+must) and the factor by which a candidate's ratio scatters more than white noise would make it. Repeats have been
+averaged before, so that what repeats keeps repeating in a surrogate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.linear import orthonormal
+from ident.diagnosis.rows import Column
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+VISIBLE: Final = 0.02
+"""Part of a column that the baseline must leave for it to count as visible."""
+BESIDE: Final = 4.0
+"""Log evidence that what comes along with an effect must bring more than the price of its number: few effects do not
+come alone, one in fifty by this."""
+
+
+@dataclass(frozen=True)
+class White:
+    """Whitened regression, rows of prior knowledge behind those of the records.
+
+    Attributes:
+        target: (n,).
+        baseline: (n, p + c) columns of the model, and of effects that are taken as given.
+        columns: (n, K) of all candidates.
+        stretch: (n,) number of the stretch whose sign is flipped as one, increasing.
+        confirming: (n,) rows that take no part in the fit.
+    """
+
+    target: Array
+    baseline: Array
+    columns: Array
+    stretch: NDArray[np.int64]
+    confirming: Mask
+
+
+@dataclass(frozen=True)
+class Bounded:
+    """A variant of k columns whose coefficients have a least value.
+
+    Attributes:
+        variant: which.
+        place: of its directions.
+        turn: (k, directions) amplitudes -> coefficients.
+        least: of all coefficients.
+    """
+
+    variant: int
+    place: slice
+    turn: Array
+    least: float
+
+
+@dataclass(frozen=True)
+class Directions:
+    """Orthonormal directions that each variant of a candidate adds to the baseline.
+
+    Attributes:
+        basis: (n, D).
+        places: of every variant in the basis; empty where the baseline absorbs it.
+        least, negligible: (D,) amplitudes, and sizes of them, below which a direction counts nothing.
+        bounded: variants of several columns whose coefficients have a least value.
+        residual: (n,) target minus its projection on the baseline.
+        volume: log of the determinant of each variant's columns beside the baseline.
+    """
+
+    basis: Array
+    places: tuple[slice, ...]
+    least: Array
+    negligible: Array
+    residual: Array
+    volume: Array
+    bounded: tuple[Bounded, ...] = ()
+
+    @property
+    def sizes(self) -> Array:
+        """Number of directions of every variant."""
+        return np.array([place.stop - place.start for place in self.places])
+
+    def possible(self, amplitudes: Array) -> Mask:
+        """Which amplitudes (..., D) are as large as they must be."""
+        found = (amplitudes >= self.least) & (np.abs(amplitudes) >= self.negligible)
+        for several in self.bounded:
+            coefficients = amplitudes[..., several.place] @ several.turn.T
+            found[..., several.place] &= np.all(coefficients >= several.least, axis=-1, keepdims=True)
+        return np.asarray(found)
+
+    def ratios(self, amplitudes: Array) -> Array:
+        """Sums of squared amplitudes (..., D) over the directions of every variant, (..., V)."""
+        return self.lengths(np.where(self.possible(amplitudes), amplitudes, 0.0))
+
+    def lengths(self, amplitudes: Array) -> Array:
+        """The same whatever the amplitudes are."""
+        squares = np.concatenate([np.zeros((*amplitudes.shape[:-1], 1)), np.cumsum(amplitudes**2, axis=-1)], axis=-1)
+        starts = [place.start for place in self.places]
+        stops = [place.stop for place in self.places]
+        return np.asarray(squares[..., stops] - squares[..., starts])
+
+
+def directions(white: White, layout: Sequence[Column], rows: Mask | None = None) -> Directions:
+    """Directions beside the baseline, in all rows or in some."""
+    chosen = slice(None) if rows is None else rows
+    base = orthonormal(white.baseline[chosen])
+    target, columns = white.target[chosen], white.columns[chosen]
+    residual = target - base @ (base.T @ target)
+    left = columns - base @ (base.T @ columns)
+    full = np.linalg.norm(white.columns, axis=0)
+    parts, places, volumes, end = [np.zeros((len(target), 0))], [], [], 0
+    bounds: list[tuple[float, float]] = []
+    bounded: list[Bounded] = []
+    for column in layout:
+        scale = np.where(full[column.place] > 0, full[column.place], 1.0)
+        vectors, singular, turn = np.linalg.svd(left[:, column.place] / scale, full_matrices=False)
+        count = int(np.sum(singular > VISIBLE))
+        single = count == 1 and vectors.shape[1] == 1
+        length = float(vectors[:, 0] @ left[:, column.place.start]) if single else 1.0
+        parts.append(vectors[:, :count] * np.sign(length))
+        least = column.least if single else -math.inf
+        bounds += [(least * abs(length), column.negligible * abs(length))] * count
+        places.append(slice(end, end + count))
+        if count and not single and math.isfinite(column.least):
+            coefficients = (turn[:count].T / singular[:count]) / scale[:, None]
+            bounded.append(Bounded(len(places) - 1, places[-1], coefficients, column.least))
+        volumes.append(2 * float(np.sum(np.log(np.maximum(singular, VISIBLE)))))
+        end += count
+    low, small = np.array(bounds).reshape(-1, 2).T
+    return Directions(np.hstack(parts), tuple(places), low, small, residual, np.array(volumes), tuple(bounded))
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Evidence for every variant on top of a baseline.
+
+    Attributes:
+        directions: what each variant adds.
+        amplitudes: (D,) of the residual along the directions.
+        surrogates: (M, D) the same, signs of stretches flipped, the best candidate taken away before.
+        scale: (V,) how much more than white noise the ratio scatters, at least 1; the variant itself taken away before.
+            Variants that point where the best one does have its scale: what tells them apart is the fit, not the noise.
+        log_evidence: (V,) half the scaled ratio, less the price of its coefficients; -inf where nothing is visible.
+        log_fitted: (V,) half the scaled ratio in the fitted rows alone; of all rows, where in those the parameters
+            absorb what is there.
+        log_predictive: (V,) log Bayes factor of the confirming rows, given the fitted ones; 0 without any.
+        confirming: (V,) share of the confirming rows in the power of what each variant adds, as it was fitted.
+        significance: probability of so large a maximum over all variants without any effect.
+    """
+
+    directions: Directions
+    amplitudes: Array
+    surrogates: Array
+    scale: Array
+    log_evidence: Array
+    log_fitted: Array
+    log_predictive: Array
+    confirming: Array
+    significance: float
+
+
+def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask) -> Evidence:
+    """Evidence for every variant.
+
+    Args:
+        white: the regression.
+        layout: of its columns.
+        signs: (M, J) of +1 and -1, one a stretch.
+        excluded: (V,) variants that do not compete.
+    """
+    found = directions(white, layout)
+    amplitudes = found.basis.T @ found.residual
+    sizes = found.sizes
+    ratios = found.ratios(amplitudes)
+    own = 0.5 * np.array([_own(white, column, found, amplitudes, v) for v, column in enumerate(layout)])
+    competing = (ratios > 0) & ~excluded
+    best = int(np.argmax(np.where(competing, ratios, -1.0)))
+    surrogates = signs @ _sums(found.basis * _without(found, amplitudes, best)[:, None], white.stretch)
+    scale = np.array([scatter(found.basis[:, place], found.residual, white.stretch) for place in found.places])
+    scale = _shared(found, amplitudes, best, scale)
+    spread = np.maximum(found.ratios(surrogates).mean(axis=0) / np.maximum(sizes, 1), 1.0)
+    beside = np.minimum([column.beside for column in layout], np.maximum(sizes - 1, 0))
+    price = 0.5 * sizes * math.log(len(white.target))
+    price += BESIDE * beside
+    tested = np.where(competing, 0.5 * ratios / spread - price, -np.inf)
+    by_chance = np.where((sizes > 0) & ~excluded, 0.5 * found.ratios(surrogates) / spread - price, -np.inf)
+    competing &= own / scale > 0.5 * (sizes - beside) * math.log(len(white.target))
+    log_fitted, log_predictive = _in_turn(white, layout, found, amplitudes, scale)
+    return Evidence(
+        directions=found,
+        amplitudes=amplitudes,
+        surrogates=surrogates,
+        scale=scale,
+        log_evidence=np.where(competing, 0.5 * ratios / scale - price, -np.inf),
+        log_fitted=log_fitted,
+        log_predictive=log_predictive,
+        confirming=np.array([_confirming(white, column, found, amplitudes, v) for v, column in enumerate(layout)]),
+        significance=significance(tested.max(initial=-np.inf), by_chance.max(axis=1, initial=-np.inf)),
+    )
+
+
+def _sums(values: Array, stretch: NDArray[np.int64]) -> Array:
+    starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
+    return np.asarray(np.add.reduceat(values, starts, axis=0))
+
+
+def _without(found: Directions, amplitudes: Array, variant: int) -> Array:
+    place = found.places[variant]
+    return np.asarray(found.residual - found.basis[:, place] @ amplitudes[place])
+
+
+def scatter(basis: Array, residual: Array, stretch: NDArray[np.int64]) -> float:
+    """Mean ratio along orthonormal directions (n, k) over all signs of the stretches, the directions taken off before.
+
+    It is in units of that of white noise, and at least 1.
+    """
+    if not basis.shape[1]:
+        return 1.0
+    sums = _sums(basis * (residual - basis @ (basis.T @ residual))[:, None], stretch)
+    return float(max(1.0, np.sum(sums**2) / basis.shape[1]))
+
+
+def significance(found: float, by_chance: Array) -> float:
+    """Probability of a value as large as the one found, from values (M,) of surrogates."""
+    return float((1 + np.sum(by_chance >= found)) / (1 + len(by_chance)))
+
+
+def _shared(found: Directions, amplitudes: Array, best: int, scale: Array) -> Array:
+    """Scale (V,) of every variant, that of the best one as far as either explains what the other does."""
+    alike = np.maximum(_overlap(found, amplitudes, best), _within(found, amplitudes, best))
+    return np.asarray(scale + alike * (scale[best] - scale))
+
+
+def _within(found: Directions, amplitudes: Array, variant: int) -> Array:
+    """Share (V,) of the square of what every variant explains that one of them can explain too."""
+    towards = amplitudes[:, None] * (found.basis.T @ found.basis[:, found.places[variant]])
+    sums = np.vstack([np.zeros((1, towards.shape[1])), np.cumsum(towards, axis=0)])
+    starts, stops = ([getattr(place, end) for place in found.places] for end in ("start", "stop"))
+    covered = np.sum((sums[stops] - sums[starts]) ** 2, axis=1)
+    whole = np.maximum(found.lengths(amplitudes), np.finfo(float).tiny)
+    return np.asarray(np.minimum(covered / whole, 1.0))
+
+
+def _overlap(found: Directions, amplitudes: Array, variant: int) -> Array:
+    """Share (V,) of the square of what one variant explains that every other can explain too."""
+    place = found.places[variant]
+    fitted = found.basis[:, place] @ amplitudes[place]
+    share = found.lengths(found.basis.T @ fitted) / max(float(fitted @ fitted), np.finfo(float).tiny)
+    return np.asarray(np.minimum(share, 1.0))
+
+
+def _in_turn(
+    white: White, layout: Sequence[Column], found: Directions, amplitudes: Array, scale: Array
+) -> tuple[Array, Array]:
+    """Half the scaled ratio of the fitted rows, and the log Bayes factor that the confirming rows add to it.
+
+    The coefficients are known from the fit as well as it shows them. For Gaussian noise and flat priors the factor is
+    half the gain of the likelihood ratio less half the gain of the log-determinant: a coefficient that the fit got
+    wrong predicts the confirming rows worse than none.
+    """
+    whole = 0.5 * found.ratios(amplitudes) / scale
+    if not white.confirming.any():
+        return whole, np.zeros(len(layout))
+    fitted = directions(white, layout, ~white.confirming)
+    before = 0.5 * fitted.ratios(fitted.basis.T @ fitted.residual) / scale
+    factor = whole - before - 0.5 * (found.volume - fitted.volume)
+    there = np.any(white.columns[~white.confirming] != 0, axis=0)
+    absorbed = (fitted.sizes == 0) & np.array([bool(there[column.place].any()) for column in layout])
+    return np.where(absorbed, whole, before), np.asarray(factor)
+
+
+def _confirming(white: White, column: Column, found: Directions, amplitudes: Array, variant: int) -> float:
+    place, whole = found.places[variant], white.columns[:, column.place]
+    if place.stop == place.start:
+        return 0.0
+    coefficients = np.linalg.lstsq(found.basis[:, place].T @ whole, amplitudes[place], rcond=None)[0]
+    power = (whole @ coefficients) ** 2
+    return float(power[white.confirming].sum() / max(power.sum(), np.finfo(float).tiny))
+
+
+def _own(white: White, column: Column, found: Directions, amplitudes: Array, variant: int) -> float:
+    """What a variant has of its ratio beside what comes along with the effect."""
+    amplitude = amplitudes[found.places[variant]]
+    if column.beside and column.itself and amplitude.size:
+        along = white.columns[:, column.own.stop : column.place.stop]
+        base = orthonormal(found.basis[:, found.places[variant]].T @ along)
+        amplitude = amplitude - base @ (base.T @ amplitude)
+    return float(amplitude @ amplitude)
+
+
+def cosines(evidence: Evidence, index: int) -> Array:
+    """Cosine between what one variant explains and what every other can (V,), 0 where nothing is visible."""
+    found = evidence.directions
+    return np.sqrt(_overlap(found, evidence.amplitudes, index))

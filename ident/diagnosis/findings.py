@@ -1,0 +1,128 @@
+"""What a diagnosis has found, and the answer that this makes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.diagnosis import Diagnosis, Gap, NamedEffect, Share, Verdict
+from ident.diagnosis.generic import Generic
+from ident.diagnosis.probability import Ranked, calibration
+from ident.diagnosis.problem import Candidate, Problem
+from ident.diagnosis.refit import Part, Refit
+from ident.vehicle.quantities import Quantity
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect that was found.
+
+    Attributes:
+        candidate: what and where.
+        part: its parameters, all records fitted.
+        ranked: what else may stand in its place.
+        probability: that its name is right, or one that is the same in these records.
+        log_evidence, log_predictive: of all records, and what the confirming rows add.
+        closed: share of the removable held-out gap that it closes, others given, the values of a judged model held.
+        needed: the same with everything else refitted without it.
+        biased: how much each parameter of the model shifts when the effect is left out, by name, in standard
+            deviations.
+        sizeless: it may be of no size itself, and what comes along with it is the explanation.
+    """
+
+    candidate: Candidate
+    part: Part
+    ranked: Ranked
+    probability: float
+    log_evidence: float
+    log_predictive: float
+    closed: float
+    needed: float
+    biased: Mapping[str, float]
+    sizeless: bool
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What was fitted without the confirming rows, and the problem that they come from.
+
+    Attributes:
+        problem: that confirms.
+        plain, extended: refits without and with the causes.
+        before, after: models (N,) of every block of `problem`; before is the model that was given, or that refit.
+    """
+
+    problem: Problem
+    plain: Refit
+    extended: Refit
+    before: tuple[Array, ...]
+    after: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Everything that was found.
+
+    Attributes:
+        verdict: of the search and of what is left.
+        causes: most probable first.
+        doubtful: what came out best beside the causes and was not believed, with its probability, best first.
+        events: what one drive shows clearly and the other does not, best first: no cause.
+        gap: held out.
+        where: shares of the gap.
+        invisible: names of effects that are nowhere visible.
+        before, after: of all rows without and with the causes; before is the model that was given, or a refit.
+        significance: that the best candidate is there by chance.
+        remainder: what a smooth function still predicts.
+        lasting: whether something repeats in every record, above its limit, that the effects leave.
+        repeated_before, repeated_after: rms over noise of what repeats, by step and coordinate.
+        problem: that was fitted.
+        held_out: models that the confirming rows took no part in.
+    """
+
+    verdict: Verdict
+    causes: tuple[Cause, ...]
+    doubtful: Mapping[str, float]
+    events: tuple[str, ...]
+    gap: Gap
+    where: tuple[Share, ...]
+    invisible: tuple[str, ...]
+    before: Refit
+    after: Refit
+    significance: float
+    remainder: Generic
+    lasting: bool
+    repeated_before: Mapping[str, float]
+    repeated_after: Mapping[str, float]
+    problem: Problem
+    held_out: HeldOut
+
+    def diagnosis(self, next_experiment: str | None = None) -> Diagnosis:
+        """The answer as it is written down."""
+        coverage = calibration().coverage
+        return Diagnosis(
+            verdict=self.verdict,
+            effects=tuple(_named(cause, coverage) for cause in self.causes) if self.verdict is Verdict.EFFECT else (),
+            where=self.where,
+            gap=self.gap,
+            invisible=self.invisible,
+            next_experiment=next_experiment,
+        )
+
+
+def _named(cause: Cause, coverage: float) -> NamedEffect:
+    values = zip(cause.candidate.parameters, cause.part.values, cause.part.std, strict=True)
+    name = str(cause.candidate.effect)
+    return NamedEffect(
+        name=name,
+        where=cause.candidate.where,
+        parameters={p.name: Quantity(float(value), p.unit, "diagnosis", float(std)) for p, value, std in values},
+        probability=round(cause.probability, 2),
+        ambiguity_set=cause.ranked.ambiguity_set(name, coverage),
+        gap_closed_held_out=cause.closed,
+    )

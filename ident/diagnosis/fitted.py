@@ -1,0 +1,182 @@
+"""The model without and with the effects of a search, by all rows and by those not held out, and what each closes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.diagnosis import Gap
+from ident.diagnosis.findings import HeldOut
+from ident.diagnosis.generic import SmoothFunction
+from ident.diagnosis.linear import least_squares, rms
+from ident.diagnosis.problem import Candidate, Problem
+from ident.diagnosis.refit import Refit, refit
+from ident.diagnosis.regression import Regression
+from ident.diagnosis.remainder import held_out_gap, noise_floors
+from ident.diagnosis.search import Found
+from ident.diagnosis.whitening import Predictor, Whitener
+
+Array = NDArray[np.float64]
+
+
+class Fitted:
+    """The model without and with the effects that a search has ended with.
+
+    Attributes:
+        rows: of both problems.
+        bare, rest: what a smooth function of the states predicts of what is left without and with the effects.
+        before, after: refits of all rows.
+        floors: rms of the noise of every block.
+        untouched: (N,) of every block, the model without effects that held-out rows are compared with.
+    """
+
+    def __init__(self, problems: Sequence[Problem], regression: Regression, found: Found, seed: int) -> None:
+        self.problems, self.regression, self.found = problems, regression, found
+        self._kept: dict[tuple[tuple[int, ...], bool], Refit] = {}
+        self.rows = regression.rows
+        self._weights = _weights(regression, found)
+        smooth = SmoothFunction(regression, found.whitener, seed)
+        self.bare = smooth.beside(())
+        self.rest = smooth.beside(found.variants) if found.variants else self.bare
+        self.after, self.before = self._refit(found.variants), self._refit(())
+        left = self.rows.target - self.rows.stack(list(self.after.blocks)) - self.rest.prediction
+        self.floors = noise_floors(self.rows, self.after.blocks, left)
+        self.untouched = self._held_out_models(())
+
+    @property
+    def count(self) -> int:
+        """Number of the effects."""
+        return len(self.found.variants)
+
+    def candidate(self, index: int) -> Candidate:
+        """That an effect is a variant of."""
+        return self.problems[0].candidates[self.regression.owners[self.found.variants[index]]]
+
+    @property
+    def reached(self) -> frozenset[str]:
+        """Labels of the blocks in which an effect acts."""
+        columns = [self.rows.layout[variant] for variant in self.found.variants]
+        return frozenset(
+            block.label
+            for problem in self.problems
+            for column in columns
+            for block, acting in zip(
+                problem.blocks, problem.candidates[column.candidate].variants[column.variant].columns, strict=True
+            )
+            if acting is not None
+        )
+
+    def others(self, index: int) -> tuple[int, ...]:
+        """The variants without that of one effect."""
+        return tuple(other for place, other in enumerate(self.found.variants) if place != index)
+
+    def judged(self) -> Sequence[Array]:
+        """The model that is judged: as given, or refitted to all records."""
+        nominal = self.problems[0].nominal
+        if nominal is None:
+            return self.before.blocks
+        return [block.baseline @ nominal.values for block, _ in self.rows.blocks]
+
+    @cached_property
+    def exactly(self) -> Gap:
+        """With all effects, as their exact forms."""
+        return held_out_gap(self.rows, self.floors, self.untouched, self._extended_models)
+
+    @cached_property
+    def whole(self) -> Gap:
+        """With all effects, as their columns."""
+        return self.gap(self.found.variants)
+
+    @property
+    def removable(self) -> float:
+        """Power of the held-out gap above the noise."""
+        return self.whole.before**2 - self.whole.floor**2
+
+    @property
+    def left(self) -> float:
+        """Share of the removable held-out gap that all effects leave."""
+        return max(1 - self.whole.closed, 0.0)
+
+    @cached_property
+    def closed(self) -> list[float]:
+        """Share of the removable held-out gap that each effect closes, all else refitted without it, as columns.
+
+        Whether an effect is worth its place is judged by this: what a refit can do without it is no reason for it.
+        """
+        return self._shares(held=False)
+
+    @cached_property
+    def lacking(self) -> list[float]:
+        """The same with the values of a model that is judged held: what they lack without the effect."""
+        return self._shares(held=True) if self._is_given else self.closed
+
+    def _shares(self, *, held: bool) -> list[float]:
+        without = [self.gap(self.others(index), held=held).after for index in range(self.count)]
+        whole, removable = self.whole, self.removable
+        return [(after**2 - whole.after**2) / removable if removable > 0 else 0.0 for after in without]
+
+    def gap(self, variants: Sequence[int], *, held: bool = False) -> Gap:
+        """Held-out gap with some effects, as their columns; `held`: what is known of the baseline is taken as exact."""
+        models = self._held_out_models(variants, held=held)
+        return held_out_gap(self.rows, self.floors, self.untouched, models)
+
+    def held_out(self) -> HeldOut:
+        """What was fitted without the confirming rows."""
+        confirming = slice(len(self.problems[0].blocks), None)
+        before, after = (tuple(models[confirming]) for models in (self.untouched, self._extended_models))
+        return HeldOut(self.problems[1], self._held_out_refit(()), self._extended, before, after)
+
+    def biased(self, index: int) -> Mapping[str, float]:
+        """Shift of every parameter when an effect is left out, in standard deviations."""
+        without, whole = (self._refit(variants, exact=False) for variants in (self.others(index), self.found.variants))
+        shift = (without.baseline - whole.baseline) / np.maximum(whole.baseline_std, np.finfo(float).tiny)
+        return dict(zip(self.problems[0].names, shift.tolist(), strict=True))
+
+    def _refit(self, variants: Sequence[int], *, exact: bool = True) -> Refit:
+        everything = np.ones(len(self.rows), dtype=bool)
+        return refit(self.problems, self.regression, variants, self.found.whitener, everything, exact=exact)
+
+    @property
+    def _is_given(self) -> bool:
+        return self.problems[0].nominal is not None
+
+    def _held_out_models(self, variants: Sequence[int], *, held: bool = False) -> Sequence[Array]:
+        """Models of all blocks, fitted without the confirming rows."""
+        if not variants and self._is_given:
+            return self.judged()
+        return self._held_out_refit(variants, held=held).blocks
+
+    def _held_out_refit(self, variants: Sequence[int], *, held: bool = False) -> Refit:
+        """With some effects, as their columns, without the confirming rows; several questions need the same one."""
+        key = tuple(variants), held
+        if key not in self._kept:
+            self._kept[key] = self._fitted_to_others(variants, exact=False, held=held)
+        return self._kept[key]
+
+    @cached_property
+    def _extended(self) -> Refit:
+        """With all effects, as their exact forms, without the confirming rows."""
+        return self._fitted_to_others(self.found.variants, exact=True, held=False)
+
+    def _fitted_to_others(self, variants: Sequence[int], *, exact: bool, held: bool) -> Refit:
+        """Fitted without the confirming rows, every coordinate in units of its residual."""
+        fitted = ~self.rows.confirming
+        return refit(self.problems, self.regression, variants, self._weights, fitted, exact=exact, held=held)
+
+    @property
+    def _extended_models(self) -> Sequence[Array]:
+        return self._extended.blocks if self.found.variants else self.untouched
+
+
+def _weights(regression: Regression, found: Found) -> Whitener:
+    """Every group of rows in units of the rms of what the search leaves of it, no colour."""
+    rows = regression.rows
+    design = np.hstack([rows.baseline, regression.columns_of(found.variants)])
+    white = found.whitener.apply(rows, np.column_stack([design, rows.target]))
+    residual = rows.target - design @ least_squares(white[:, :-1], white[:, -1])
+    deviations = [rms(residual[rows.group == group]) for group in np.unique(rows.group)]
+    tiny = np.finfo(float).tiny
+    return Whitener(tuple(Predictor((np.zeros(0),), np.array([max(one, tiny)])) for one in deviations))

@@ -1,0 +1,252 @@
+"""What is computed once the search has ended: how much is closed, what is left, and which verdict that makes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.chance import chances
+from ident.diagnosis.diagnosis import Verdict
+from ident.diagnosis.findings import Cause, Findings
+from ident.diagnosis.fitted import Fitted
+from ident.diagnosis.limits import Limits
+from ident.diagnosis.probability import calibration, rank
+from ident.diagnosis.problem import Problem
+from ident.diagnosis.regression import Regression
+from ident.diagnosis.remainder import lasting, repeated, shares
+from ident.diagnosis.search import Found
+from ident.diagnosis.steady import log_unsteady
+
+Array = NDArray[np.float64]
+
+
+class Judgement:
+    """What is computed once the search has ended."""
+
+    def __init__(
+        self, problems: Sequence[Problem], regression: Regression, found: Found, limits: Limits, seed: int
+    ) -> None:
+        self.problems, self.regression, self.found, self.limits = problems, regression, found, limits
+        self.rows = regression.rows
+        self.fitted = Fitted(problems, regression, found, seed)
+
+    def findings(self) -> Findings:
+        """The answer, with all that reports show of it."""
+        causes, verdict = self._causes(), self._verdict()
+        return Findings(
+            verdict=verdict,
+            causes=causes,
+            doubtful=self._doubtful(),
+            events=tuple(self.problems[0].candidates[owner].key for owner in self.found.rest.events),
+            gap=self.fitted.exactly,
+            where=shares(self.rows, self.fitted.floors, self.fitted.judged()),
+            invisible=invisible_names(self.regression),
+            before=self.fitted.before,
+            after=self.fitted.after,
+            significance=min(slot.evidence.significance for slot in (self.found.rest, *self.found.slots)),
+            remainder=self.fitted.rest,
+            lasting=self._repeating() > 1,
+            repeated_before=self._sizes(self.fitted.judged()),
+            repeated_after=self._sizes(self.fitted.after.blocks),
+            problem=self.problems[0],
+            held_out=self.fitted.held_out(),
+        )
+
+    def refuted(self) -> frozenset[str]:
+        """Effects of no size of which another candidate is what comes along with them, not refuted before."""
+        keys = {candidate.key for candidate in self.problems[0].candidates if not candidate.excluded}
+        taken = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._sizeless(index)]
+        return frozenset(one.key for one in taken if f"{one.along}@{one.where}" in keys)
+
+    def worthwhile(self) -> tuple[int, ...]:
+        """The effects without one that widens the held-out gap, is of no size itself, or is the least and a trifle."""
+        variants = self.found.variants
+        closed = self.fitted.closed
+        widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
+        refuted = [index for index in widened if self._measurable() or self._log_predictive(index) < self.limits.sure]
+        if refuted:
+            return self.fitted.others(min(refuted, key=lambda index: closed[index]))
+        if self.fitted.count < 2:
+            return variants
+        for index in range(self.fitted.count):
+            if index != self._strongest and (self._sizeless(index) or self._outside(index)):
+                return self.fitted.others(index)
+        evidence = [self._log_evidence(index) for index in range(self.fitted.count)]
+        least = int(np.argmin(evidence))
+        minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
+        trifle = self.limits.trifle * self.fitted.whole.floor**2 / max(self.fitted.removable, np.finfo(float).tiny)
+        needed = max(trifle, self.limits.share * self.fitted.left)
+        return self.fitted.others(least) if minor and closed[least] < needed else variants
+
+    def _log_evidence(self, index: int) -> float:
+        return float(self.found.slots[index].evidence.log_evidence[self.found.variants[index]])
+
+    def _log_predictive(self, index: int) -> float:
+        return float(self.found.slots[index].evidence.log_predictive[self.found.variants[index]])
+
+    def _measurable(self) -> bool:
+        """Whether the held-out gap that effects could close is more than an accident of the noise."""
+        return self.fitted.removable > self.limits.measurable * self.fitted.whole.floor**2
+
+    def _doubtful(self) -> Mapping[str, float]:
+        rest = self.found.rest
+        return rank(self.regression, rest, rest.variants[0], calibration()).probabilities if rest.variants else {}
+
+    @property
+    def _strongest(self) -> int:
+        """The effect that closes most."""
+        return int(np.argmax(self.fitted.closed))
+
+    def _explained(self) -> float:
+        """Share of what can be predicted of the confirming rows that the effects taken explain."""
+        named = max(self.fitted.bare.before - self.fitted.rest.before, 0.0)
+        return named / max(named + self.fitted.rest.gain, np.finfo(float).tiny)
+
+    def _verdict(self) -> Verdict:
+        if not self.found.variants:
+            return Verdict.UNKNOWN if self._predictable() or self._surely_repeating() else Verdict.NONE
+        unexplained = self._predictable() and self._explained() < self.limits.explained
+        strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
+        another = self._sizeless(self._strongest) or self._outside(self._strongest)
+        return Verdict.UNKNOWN if strange or another or self._short() else Verdict.EFFECT
+
+    def _short(self) -> bool:
+        """Whether the model with all effects, refitted exactly, is further from the held-out rows than without any.
+
+        Or hardly nearer, where nothing repeats that would tell noise from what is left.
+        """
+        least = -self.limits.widening if self._lasts else self.limits.most
+        return self._measurable() and self.fitted.exactly.closed < least
+
+    def _foreign(self) -> bool:
+        """Whether something lasts in rows that the model itself says nothing of: what shows there is all of a cause.
+
+        Not where no effect acts in them and one closes nearly all elsewhere: on a slope, a unit that is steered at rest
+        moves in its coupling too.
+        """
+        foreign = {block.label for block, _ in self.rows.blocks if not block.baseline.any()}
+        lasts = {label for label, size in self._lasts.items() if label in foreign and size > self.limits.foreign}
+        return bool(lasts & self.fitted.reached) or (bool(lasts) and self._named < self.limits.nearly)
+
+    def _unsteady(self) -> bool:
+        """Whether the effects would rather have other sizes in some steps, where their columns are all there is."""
+        columns = [self.rows.layout[variant] for variant in self.found.variants]
+        candidates = [self.problems[0].candidates[column.candidate] for column in columns]
+        exact = all(one.contribution is None for one in candidates) and not any(column.beside for column in columns)
+        evidence = max(self._log_evidence(index) for index in range(self.fitted.count))
+        limit = max(self.limits.unsteady, self.limits.bent * evidence)
+        return exact and log_unsteady(self.regression, self.found) > limit
+
+    def _tangled(self) -> bool:
+        """Whether many names share the friction of one kind of joint: so many changes of a curve are another curve."""
+        owners = {self.regression.owners[variant] for variant in self.found.variants}
+        curves = Counter(self.problems[0].candidates[owner].curve for owner in owners)
+        return any(count >= self.limits.curve for curve, count in curves.items() if curve)
+
+    def _sizeless(self, index: int) -> bool:
+        """Whether an effect may be of no size itself, and what comes along with it is the explanation."""
+        part, least = self.fitted.after.parts[index], self.fitted.candidate(index).least
+        along = slice(len(part.values), None)
+        accompanied = np.abs(part.numbers[along]) > self.limits.sure_of * part.scatter[along]
+        size = np.abs(part.values) if least is None else part.values - least
+        return bool(np.any(accompanied) and np.all(size < self.limits.sized * part.std))
+
+    def _outside(self, index: int) -> bool:
+        """Whether the refit has made something else of an effect: parameters that it does not have."""
+        lowest = self.fitted.candidate(index).lowest
+        return bool(lowest) and bool(np.any(np.abs(self.fitted.after.parts[index].values) < lowest))
+
+    @cached_property
+    def _named(self) -> float:
+        """What the effect that closes most closes, alone or beside the others, in that and what all of them leave."""
+        most = max(*self.fitted.closed, *(self.fitted.gap((variant,)).closed for variant in self.found.variants))
+        return max(most, 0.0) / max(most + self.fitted.left, np.finfo(float).tiny)
+
+    def _surest(self) -> float:
+        """Where something repeats that all effects leave, the name of the strongest may be part of another cause."""
+        return self._named if self.limits.humble and self._repeating() > 1 else 1.0
+
+    def _predictable(self) -> bool:
+        """Whether a smooth function of the states predicts what the effects leave, and it is no trifle."""
+        sizes = self._sizes(self.fitted.after.blocks)
+        large = not sizes or max(sizes.values()) > self.limits.size
+        return large and self.fitted.rest.deviations > self.limits.deviations and self.fitted.rest.gain > 0
+
+    def _lasting(self) -> bool:
+        """Whether what repeats is above its limit, and the effects close too little to have that pardoned."""
+        excess = self._repeating()
+        needed = self.limits.named if excess <= self.limits.far else self.limits.nearly
+        return excess > 1 and self._named < needed
+
+    def _repeating(self) -> float:
+        """What the model leaves and repeats in every record, over the noise, in units of what may."""
+        return max(self._excesses().values(), default=0.0)
+
+    def _surely_repeating(self) -> bool:
+        """Whether that is more than may be, in a coordinate in which it is no accident of the noise."""
+        large = {label for label, excess in self._excesses().items() if excess > 1}
+        found = chances(self.rows, self.fitted.floors, self.fitted.after.blocks) if large else {}
+        return any(found[label] * len(found) < self.limits.chance for label in large)
+
+    def _excesses(self) -> Mapping[str, float]:
+        """The same by coordinate."""
+        creeping = {block.label for block, _ in self.rows.blocks if block.tolerance > 0}
+        stricter = self.found.variants and self._measurable()
+        usual = self.limits.beside if stricter else self.limits.repeating
+        return {
+            label: size / (self.limits.creeping if label in creeping else usual) for label, size in self._lasts.items()
+        }
+
+    @cached_property
+    def _lasts(self) -> Mapping[str, float]:
+        """What the model leaves and repeats in every record, over the noise, by coordinate."""
+        return lasting(self.rows, self.fitted.floors, self.fitted.after.blocks)
+
+    def _sizes(self, models: Sequence[Array]) -> Mapping[str, float]:
+        return repeated(self.rows, self.fitted.floors, models)
+
+    def _causes(self) -> tuple[Cause, ...]:
+        made = [self._cause(index, variant) for index, variant in enumerate(self.found.variants)]
+        return _ordered(made)
+
+    def _cause(self, index: int, variant: int) -> Cause:
+        settings = calibration()
+        ranked = rank(self.regression, self.found.slots[index], variant, settings)
+        return Cause(
+            candidate=self.fitted.candidate(index),
+            part=self.fitted.after.parts[index],
+            ranked=ranked,
+            probability=min(ranked.probability, settings.ceiling, self._surest()),
+            log_evidence=self._log_evidence(index),
+            log_predictive=self._log_predictive(index),
+            closed=self.fitted.lacking[index],
+            needed=self.fitted.closed[index],
+            biased=self.fitted.biased(index),
+            sizeless=self._sizeless(index),
+        )
+
+
+def _ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
+    """By the share of the held-out gap that needs them, to a half, then by evidence; none surer than those before it.
+
+    What is found beside another cause is right only as far as that one is.
+    """
+    found: list[Cause] = []
+    for cause in sorted(causes, key=lambda cause: (-round(2 * cause.needed), -cause.log_evidence)):
+        surest = min([cause.probability, *(other.probability for other in found[-1:])])
+        found.append(replace(cause, probability=surest))
+    return tuple(found)
+
+
+def invisible_names(regression: Regression) -> tuple[str, ...]:
+    """Names of effects of which no place and no variant leaves anything beside the baseline."""
+    sizes = regression.evidence(regression.whitener(()), ()).directions.sizes
+    candidates = regression.problem.candidates
+    visible = {candidates[owner].effect for owner, size in zip(regression.owners, sizes, strict=True) if size}
+    names = dict.fromkeys(candidate.effect for candidate in candidates)
+    return tuple(str(name) for name in names if name not in visible)

@@ -1,0 +1,69 @@
+"""The causes that the diagnosis knows, by name, and where it looks for each."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+
+from ident.effects import EFFECTS, Effect
+from ident.errors import UserError
+from ident.plant.places import ALL_WHEELS, GROUPS
+
+
+class EffectName(enum.StrEnum):
+    """Effects of the library that the diagnosis tells from each other."""
+
+    STRIBECK = "stribeck"
+    ASYMMETRIC_COULOMB = "asymmetric_coulomb"
+    ASYMMETRIC_VISCOUS = "asymmetric_viscous"
+    QUADRATIC_DRAG = "quadratic_drag"
+    SLOPE = "slope"
+    COM_OFFSET = "com_offset"
+    PAYLOAD = "payload"
+    TORQUE_GAIN = "torque_gain"
+    TORQUE_BIAS = "torque_bias"
+    TORQUE_RIPPLE = "torque_ripple"
+    TIME_DELAY = "time_delay"
+    BACKLASH = "backlash"
+    ELASTICITY = "elasticity"
+    WHEEL_RADIUS = "wheel_radius"
+    WHEEL_ECCENTRICITY = "wheel_eccentricity"
+    STEERING_OFFSET = "steering_offset"
+    SLIP = "slip"
+    SCRUB = "scrub"
+    STEERING_UNIT_MASS = "steering_unit_mass"
+    PARAMETER_CHANGE = "parameter_change"
+
+
+_OF_ALL_WHEELS = (
+    EffectName.STRIBECK,
+    EffectName.ASYMMETRIC_COULOMB,
+    EffectName.ASYMMETRIC_VISCOUS,
+    EffectName.QUADRATIC_DRAG,
+)
+"""Effects that are looked for at all wheels at once."""
+
+
+MEMORIES = (EffectName.TIME_DELAY, EffectName.BACKLASH, EffectName.ELASTICITY, EffectName.SLIP)
+"""Effects with states of their own, which are taken out of the signals; the others are terms of the rows."""
+
+
+def refuse_strangers(effects: Sequence[Effect]) -> None:
+    """Refuse a model whose effects the diagnosis does not know.
+
+    Raises:
+        UserError: with the first of them.
+    """
+    known = set(EffectName)
+    for effect in effects:
+        if effect.name not in known:
+            raise UserError(
+                f"The model has {effect}, which the diagnosis cannot take into account: it averages over repeats.",
+                "Diagnose with a model that does not have it.",
+            )
+
+
+def places_of(name: EffectName) -> tuple[str, ...]:
+    """Places at which a cause is looked for: each by itself, friction also at all wheels at once."""
+    groups = ALL_WHEELS if name in _OF_ALL_WHEELS else ()
+    return tuple(where for where in EFFECTS[name].places if where not in GROUPS or where in groups)

@@ -1,0 +1,210 @@
+"""A gap as a regression: rows of a model, and columns that each possible cause would add to it.
+
+Builders (one for the vehicle, one for a servo axis) turn records into a `Problem`; everything statistical sees nothing
+else. The model of a block is
+
+    target = baseline p + Σ columns θ + noise,
+
+p shared by all blocks, θ by all blocks in which a candidate acts.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.effects import EffectParameter
+
+Array = NDArray[np.float64]
+Contribution = Callable[[Array, Array], Sequence[Array | None]]
+"""Values of the parameters (k,) and of the baseline (p,) -> what a candidate adds to the model of every block, (N,)."""
+
+
+class Channel(enum.StrEnum):
+    """What is compared: rolling constraints, generalized torques, or simulated and recorded motion."""
+
+    KINEMATIC = "kinematic"
+    DYNAMIC = "dynamic"
+    OUTCOME = "outcome"
+
+
+@dataclass(frozen=True)
+class Block:
+    """Rows of one coordinate of one uninterrupted segment, all samples, in time.
+
+    Every series has passed the same zero-phase filter.
+
+    Attributes:
+        record: where the rows come from, for messages.
+        channel, step, coordinate: what they compare.
+        unit: of the target, SI.
+        sample_time: [s].
+        bandwidth: cutoff of the filter that the series have passed [rad/s].
+        target: (N,) measured.
+        baseline: (N, p) regressor of the model; columns of zeros where a parameter does not act.
+        moving: (N,) rows to be used; the others are stiction, or the ends of the filter.
+        period: (N,) number of the repeat, -1 outside of any.
+        regions: masks (N,) by name (`low_speed`, `forward`, ...) in which the gap is counted; they may overlap.
+        features: (N, f) states that an unknown cause might depend on (speeds, angles, accelerations); any scale.
+        tolerance: rms up to which a gap means nothing, however well it repeats, in the unit of the target.
+        irregular: (N,) part of the target that may differ between repeats and is no noise; None: nothing.
+    """
+
+    record: str
+    channel: Channel
+    step: str
+    coordinate: str
+    unit: str
+    sample_time: float
+    bandwidth: float
+    target: Array
+    baseline: Array
+    moving: NDArray[np.bool_]
+    period: NDArray[np.int64]
+    regions: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    features: Array | None = None
+    tolerance: float = 0.0
+    irregular: Array | None = None
+
+    @property
+    def regular(self) -> Array:
+        """The target (N,) without what is irregular."""
+        return self.target if self.irregular is None else self.target - self.irregular
+
+    @property
+    def label(self) -> str:
+        """Step and coordinate."""
+        return f"{self.step}/{self.coordinate}"
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Columns of a candidate, its nonlinear parameters held at one choice.
+
+    Attributes:
+        columns: one (N, k) a block, None where it does not act; filtered like the block.
+        start: coefficients of the columns (k,) -> values of all parameters of the candidate. None: they are the same,
+            those of what may come along behind the parameters.
+        bent: the candidate's contribution says more than these columns; without it, a refit takes the columns alone.
+        beside: how many of the columns, the last ones, only come along with the effect.
+        itself: the other columns must show by themselves; not so where what comes along is what the effect does.
+    """
+
+    columns: tuple[Array | None, ...]
+    start: Callable[[Array], Array] | None = None
+    bent: bool = True
+    beside: int = 0
+    itself: bool = True
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A possible cause at a place.
+
+    Attributes:
+        effect: canonical name.
+        where: place.
+        parameters: what its result is given in.
+        variants: at least one; several choices of nonlinear parameters are tried, the best one counts.
+        contribution: exact and nonlinear in the parameters, for the refit; None where the columns are all there is.
+        drift: it is a changed value of the model, no structure that the model lacks.
+        least: what the coefficients of a variant must reach, 0 for a play or a mass; if the data want one smaller,
+            this is not the cause. None: anything is possible.
+        negligible: size of the coefficient of a single column up to which it means nothing, in its unit.
+        lowest: what the parameters must reach in size after the refit to be this effect; empty: anything.
+        excluded: the records speak against it, so that no others can bring it back.
+        spread: standard deviations of the parameters that come with the way they are told, beyond the scatter of the
+            rows; empty where there are none.
+        part: the same as part of each parameter.
+        yielding: the same over what comes along but the last `others` numbers: a load, of what flanks yield under it.
+        others: how many of the numbers that come along, the last ones, are no part of the effect itself.
+        curve: whose friction over the speed it changes, if it is a friction.
+        along: effect at the same place that comes along with it in its widest variant; both at once are that variant.
+    """
+
+    effect: str
+    where: str
+    parameters: tuple[EffectParameter, ...]
+    variants: tuple[Variant, ...]
+    contribution: Contribution | None = None
+    drift: bool = False
+    least: float | None = None
+    negligible: float = 0.0
+    lowest: tuple[float, ...] = ()
+    excluded: bool = False
+    spread: tuple[float, ...] = ()
+    part: float = 0.0
+    yielding: float = 0.0
+    others: int = 0
+    curve: str = ""
+    along: str = ""
+
+    @property
+    def key(self) -> str:
+        """`effect@where`, unique in a problem."""
+        return f"{self.effect}@{self.where}"
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """Values of the model that is judged, and how well they are known: (p,) each, in the units of the baseline."""
+
+    values: Array
+    std: Array
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known beforehand of some parameters of the baseline.
+
+    Attributes:
+        places: (k,) which.
+        values, std: (k,) of them.
+    """
+
+    places: NDArray[np.int64]
+    values: Array
+    std: Array
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything that the search for causes sees of one or several records.
+
+    Attributes:
+        names, units: of the baseline's p parameters.
+        blocks: rows.
+        candidates: possible causes; the same ones, in the same order, in a problem to fit and one to confirm.
+        nominal: model that is judged; None: the baseline is refitted freely.
+        spreads: standard deviations, about zero, of parameters by name that no model states, judged or not.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    blocks: tuple[Block, ...]
+    candidates: tuple[Candidate, ...]
+    nominal: Nominal | None = None
+    spreads: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def known(self) -> Known:
+        """Of all parameters where a model is judged, else of those with a spread of their own."""
+        if self.nominal is not None:
+            return Known(np.arange(len(self.names)), self.nominal.values, self.nominal.std)
+        places = np.array([self.names.index(name) for name in self.spreads], dtype=np.int64)
+        return Known(places, np.zeros(len(places)), np.array(list(self.spreads.values())))
+
+    def candidate(self, key: str) -> Candidate:
+        """The candidate of that key.
+
+        Raises:
+            KeyError: there is none.
+        """
+        for candidate in self.candidates:
+            if candidate.key == key:
+                return candidate
+        raise KeyError(key)

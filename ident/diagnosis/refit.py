@@ -1,0 +1,294 @@
+"""The joint refit of parameters and effects: exact where a candidate is nonlinear, with deviations that hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.linear import least_squares
+from ident.diagnosis.problem import Candidate, Problem
+from ident.diagnosis.regression import Regression
+from ident.diagnosis.rows import Column, Rows
+from ident.diagnosis.whitening import Whitener
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Series = Sequence[Array | None]
+
+MOST_STEPS: Final = 15
+HALVINGS: Final = 6
+DIFFERENCE: Final = 1e-4
+"""Relative step of numerical derivatives."""
+HELD: Final = 1e4
+"""Weight of what is known of the baseline beforehand, over its standard deviations, where it is held."""
+SETTLED: Final = 0.02
+"""Decrease of the sum of squares, in units of the noise, from which the refit has settled: a seventh of a deviation."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One effect in a refit.
+
+    Attributes:
+        key: of its candidate.
+        values, std: of its parameters (k,).
+        numbers: all of them (m,), those that come along with the parameters behind.
+        scatter: standard deviations (m,) of those by the scatter of the rows alone.
+        added: what it adds to every block, (N,), None where that is nothing.
+    """
+
+    key: str
+    values: Array
+    std: Array
+    numbers: Array
+    scatter: Array
+    added: Series
+
+
+@dataclass(frozen=True)
+class Refit:
+    """Everything fitted jointly.
+
+    Attributes:
+        baseline, baseline_std: of the model's parameters (p,).
+        parts: of the effects.
+        blocks: model of the target of every block, (N,), all samples.
+    """
+
+    baseline: Array
+    baseline_std: Array
+    parts: tuple[Part, ...]
+    blocks: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class _Unknown:
+    """The numbers of one effect: coefficients of its columns, or its parameters where it has an exact form.
+
+    The first of them are the parameters of the candidate, the others came along.
+    """
+
+    candidate: Candidate
+    place: slice
+    exact: Callable[[Array, Array], Series] | None
+    columns: tuple[Array | None, ...]
+    finish: Callable[[Array], Array]
+
+    def series(self, values: Array, baseline: Array) -> Series:
+        """What it adds to every block, (N,)."""
+        if self.exact is not None:
+            return self.exact(values, baseline)
+        return [None if column is None else column @ values for column in self.columns]
+
+
+def refit(
+    problems: Sequence[Problem],
+    regression: Regression,
+    variants: Sequence[int],
+    whitener: Whitener,
+    rows: Mask,
+    *,
+    exact: bool = True,
+    held: bool = False,
+) -> Refit:
+    """Gauss and Newton, damped, from the linear solution.
+
+    Args:
+        problems: to fit and to confirm, as the rows were made of.
+        regression: their rows.
+        variants: effects.
+        whitener: weights of the rows.
+        rows: (n,) which rows are fitted.
+        exact: whether candidates with an exact form are refitted by it; if not, all are their columns.
+        held: whether what is known of the baseline beforehand is taken to be exact.
+    """
+    model = _Model(problems, regression, variants, whitener, rows, exact=exact, held=held)
+    return model.result(_descended(model) if model.nonlinear else model.start)
+
+
+def _descended(model: _Model) -> Array:
+    found, residual = model.start, model.residual(model.start)
+    for _ in range(MOST_STEPS):
+        step, cost = least_squares(model.jacobian(found), residual), float(residual @ residual)
+        for halving in range(HALVINGS):
+            tried = found + 0.5**halving * step
+            left = model.residual(tried)
+            if float(left @ left) < cost:
+                break
+        else:
+            return found
+        found, residual = tried, left
+        # A step that was cut very short says nothing of what is left.
+        if 2 * halving < HALVINGS and cost - float(left @ left) < SETTLED:
+            return found
+    return found
+
+
+class _Model:
+    """Residual of the whitened rows as a function of one vector: the baseline's parameters, then those of effects."""
+
+    def __init__(
+        self,
+        problems: Sequence[Problem],
+        regression: Regression,
+        variants: Sequence[int],
+        whitener: Whitener,
+        chosen: Mask,
+        *,
+        exact: bool,
+        held: bool,
+    ) -> None:
+        self._weight = HELD if held else 1.0
+        self.regression, self.whitener, self.chosen = regression, whitener, chosen
+        self.rows: Rows = regression.rows
+        self.size = self.rows.baseline.shape[1]
+        linear = self._linear(variants)
+        self.unknowns: list[_Unknown] = []
+        parts, taken = [linear[: self.size]], self.size
+        for variant in variants:
+            column = self.rows.layout[variant]
+            width = column.width
+            unknown, start = _unknown(
+                problems, column, linear[taken : taken + width], sum(len(p) for p in parts), exact
+            )
+            self.unknowns.append(unknown)
+            parts.append(start)
+            taken += width
+        self.start = np.concatenate(parts)
+        self._kept: dict[int, tuple[bytes, Array]] = {}
+
+    @property
+    def nonlinear(self) -> bool:
+        return any(unknown.exact is not None for unknown in self.unknowns)
+
+    def residual(self, values: Array) -> Array:
+        """Whitened rows that are fitted, then what is known beforehand."""
+        model = self.rows.baseline @ values[: self.size]
+        for number in range(len(self.unknowns)):
+            model = model + self._added(number, values)
+        white = self.whitener.apply(self.rows, self.rows.target - model)[self.chosen]
+        return np.append(white, self._weight * self.regression.prior_residual(values[: self.size]))
+
+    def jacobian(self, values: Array) -> Array:
+        """Derivative of the model of the same rows, (n + prior, all values)."""
+        columns = [self.rows.baseline, *(self._derivative(number, values) for number in range(len(self.unknowns)))]
+        white = self.whitener.apply(self.rows, np.hstack(columns))[self.chosen]
+        prior = self._weight * self.regression.prior_jacobian(white.shape[1])
+        return np.vstack([white, prior])
+
+    def result(self, values: Array) -> Refit:
+        """Parameters with standard deviations, and the model of every block."""
+        covariance = self._covariance(values)
+        blocks = [block.baseline @ values[: self.size] for block, _ in self.rows.blocks]
+        parts = []
+        for unknown in self.unknowns:
+            own = values[unknown.place]
+            series = unknown.series(own, values[: self.size])
+            blocks = [model if one is None else model + one for model, one in zip(blocks, series, strict=True)]
+            turn = _gradient(unknown.finish, own)
+            spread = turn @ covariance[unknown.place, unknown.place] @ turn.T
+            deviations, numbers = np.sqrt(np.maximum(np.diag(spread), 0.0)), unknown.finish(own)
+            stated = slice(len(unknown.candidate.parameters))
+            total = np.hypot(deviations[stated], _beyond(unknown.candidate, numbers))
+            parts.append(Part(unknown.candidate.key, numbers[stated], total, numbers, deviations, tuple(series)))
+        baseline_std = np.sqrt(np.diag(covariance)[: self.size])
+        return Refit(values[: self.size], baseline_std, tuple(parts), tuple(blocks))
+
+    def _linear(self, variants: Sequence[int]) -> Array:
+        design = np.hstack([self.rows.baseline, self.regression.columns_of(variants)])
+        white = self.whitener.apply(self.rows, np.column_stack([design, self.rows.target]))[self.chosen]
+        prior = self._weight * self.regression.prior_jacobian(design.shape[1])
+        known = self._weight * self.regression.prior_residual(np.zeros(self.size))
+        return least_squares(np.vstack([white[:, :-1], prior]), np.append(white[:, -1], known))
+
+    def _added(self, number: int, values: Array) -> Array:
+        """What one effect adds to the rows; the last is kept, for the next derivative is taken there."""
+        unknown, asked = self.unknowns[number], values.tobytes()
+        kept = self._kept.get(number)
+        if kept is None or kept[0] != asked:
+            kept = asked, self.rows.stack(unknown.series(values[unknown.place], values[: self.size]))
+            self._kept[number] = kept
+        return kept[1]
+
+    def _derivative(self, number: int, values: Array) -> Array:
+        unknown = self.unknowns[number]
+        own = values[unknown.place]
+        if unknown.exact is None:
+            return self.rows.stack(unknown.columns, len(own))
+        here, columns = self._added(number, values), []
+        for index, step in enumerate(_steps(own)):
+            ahead = own.copy()
+            ahead[index] += step
+            columns.append((self.rows.stack(unknown.series(ahead, values[: self.size])) - here) / step)
+        return np.stack(columns, axis=1)
+
+    def _covariance(self, values: Array) -> Array:
+        """Sandwich over the stretches of the surrogates, nowhere below what white rows would give."""
+        jacobian, residual = self.jacobian(values), self.residual(values)
+        scale = np.linalg.norm(jacobian, axis=0)
+        scale[scale == 0] = 1.0
+        inverse = np.linalg.pinv(jacobian.T / scale[:, None] @ (jacobian / scale), rcond=1e-12, hermitian=True)
+        stretch = self.regression.stretch[self.chosen]
+        scaled = jacobian / scale
+        scores = scaled[: len(stretch)] * residual[: len(stretch), None]
+        starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
+        sums = np.add.reduceat(scores, starts, axis=0)
+        freedom = len(starts) / max(len(starts) - 1, 1)
+        # Squares, so that what rows hardly split gets no negative variance by rounding.
+        spread, held = sums @ inverse, scaled[len(stretch) :] @ inverse
+        robust = freedom * spread.T @ spread + held.T @ held
+        found, least = np.diag(robust).copy(), np.diag(inverse)
+        lift = np.sqrt(np.maximum(np.divide(least, found, out=np.ones_like(found), where=found > 0), 1.0))
+        robust *= np.outer(lift, lift)
+        np.fill_diagonal(robust, np.maximum(found, least))
+        return np.asarray(robust / np.outer(scale, scale))
+
+
+def _unknown(
+    problems: Sequence[Problem], column: Column, coefficients: Array, first: int, by_form: bool
+) -> tuple[_Unknown, Array]:
+    candidates = [problem.candidates[column.candidate] for problem in problems]
+    variant = candidates[0].variants[column.variant]
+    finish = variant.start or _same
+    columns = tuple(part for candidate in candidates for part in candidate.variants[column.variant].columns)
+    if candidates[0].contribution is None or not by_form or not variant.bent:
+        place = slice(first, first + len(coefficients))
+        return _Unknown(candidates[0], place, None, columns, finish), coefficients
+
+    def exact(values: Array, baseline: Array) -> Series:
+        forms = [candidate.contribution for candidate in candidates]
+        return [one for form in forms if form is not None for one in form(values, baseline)]
+
+    start = np.asarray(finish(coefficients), dtype=float)
+    return _Unknown(candidates[0], slice(first, first + len(start)), exact, columns, _same), start
+
+
+def _beyond(candidate: Candidate, numbers: Array) -> Array:
+    """Standard deviations of the parameters (k,) beyond the scatter of the rows, from all numbers (m,)."""
+    count = len(candidate.parameters)
+    along = numbers[count : len(numbers) - candidate.others]
+    alone = np.hypot(candidate.spread or 0.0, candidate.part * numbers[:count])
+    return np.asarray(np.hypot(alone, candidate.yielding * np.linalg.norm(along)))
+
+
+def _same(values: Array) -> Array:
+    return values
+
+
+def _steps(values: Array) -> list[float]:
+    return [max(DIFFERENCE * abs(float(value)), 1e-9) for value in values]
+
+
+def _gradient(function: Callable[[Array], Array], values: Array) -> Array:
+    """Numerical derivative (n, k)."""
+    columns = []
+    for index, step in enumerate(_steps(values)):
+        ahead, behind = values.copy(), values.copy()
+        ahead[index] += step
+        behind[index] -= step
+        columns.append((np.asarray(function(ahead)) - np.asarray(function(behind))) / (2 * step))
+    return np.stack(columns, axis=1)

@@ -1,0 +1,136 @@
+"""A record of the platform as a regression: blocks of the dynamic and the kinematic channel, columns of every cause."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.linear import rms
+from ident.diagnosis.names import EffectName, refuse_strangers
+from ident.diagnosis.problem import Block, Channel, Nominal, Problem
+from ident.diagnosis.vehicle import rows
+from ident.diagnosis.vehicle.candidates import candidate_of, causes_of, seen_together, slid_by_any
+from ident.diagnosis.vehicle.context import MODEL_COLUMNS, Context, fitted_parameters, make_context, table_of
+from ident.diagnosis.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
+from ident.diagnosis.vehicle.library import TermCause
+from ident.diagnosis.vehicle.moments import apart_from_moments
+from ident.diagnosis.vehicle.rattling import SHAKEN
+from ident.diagnosis.vehicle.regions import coordinate_motion, features_of, regions_of
+from ident.diagnosis.vehicle.sources import DIAGNOSED, Source, processing_of, sources_of
+from ident.effects import Effect
+from ident.estimate.filters import Processing
+from ident.records.record import Record, Step
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters
+
+Array = NDArray[np.float64]
+
+
+def build_problem(
+    records: Sequence[Record],
+    vehicle: VehicleDescription,
+    model: Parameters | None = None,
+    *,
+    given: Sequence[Effect] = (),
+    effects: Sequence[EffectName] = tuple(EffectName),
+    steps: Sequence[Step] = DIAGNOSED,
+    processing: Processing | None = None,
+) -> Problem:
+    """Rows and causes of some records.
+
+    Args:
+        records: of campaigns with this vehicle as it is.
+        vehicle: its geometry is taken as true, its prior only for what no row shows.
+        model: values being judged; None: they are refitted, and changed values are no cause.
+        given: effects that the model has already.
+        effects: that are looked for.
+        steps: whose rows are used, variants of them included.
+        processing: filters and thresholds; None: those of the estimate, signals as fast as the records allow.
+
+    Raises:
+        RecordError: none of the steps is in a record.
+        UserError: the model has an effect that the diagnosis does not know.
+    """
+    refuse_strangers(given)
+    processing = processing or processing_of(records)
+    lengths = vehicle.geometry
+    found = [sources_of(record, lengths, steps, processing) for record in records]
+    sources = [source for each in found for source in apart_from_moments(each, lengths, processing)]
+    context = make_context(sources, vehicle, model, given, processing)
+    if model and EffectName.TORQUE_GAIN in effects:
+        context = replace(context, asked=fitted_parameters(sources, vehicle, context))
+    causes = causes_of(tuple(effects), model is not None)
+    units = [unit for cause in causes if isinstance(cause, TermCause) for v in cause.variants for unit in v.units]
+    tables = [table_of(source, context, units) for source in sources]
+    blocks = [block for source, table in zip(sources, tables, strict=True) for block in _blocks(source, table, context)]
+    columns = iter(range(MODEL_COLUMNS, MODEL_COLUMNS + len(units)))
+    candidates = [candidate_of(cause, columns, sources, tables, context) for cause in causes]
+    slid = slid_by_any(sources, context)
+    return Problem(
+        names=(*PARAMETER_NAMES, *CREEP_NAMES),
+        units=(*PARAMETER_UNITS.values(), *["1"] * len(CREEP_NAMES)),
+        blocks=tuple(replace(block, irregular=series) for block, series in zip(blocks, slid, strict=True)),
+        candidates=tuple(seen_together(candidates, slid, sources, context)),
+        nominal=_nominal(model) if model else None,
+        spreads=dict.fromkeys(CREEP_NAMES, CREEP_STD),
+    )
+
+
+def _nominal(model: Parameters) -> Nominal:
+    """Values of the model, whose wheels do not creep."""
+    creep = len(CREEP_NAMES)
+    return Nominal(np.append(model.values, np.zeros(creep)), np.append(model.std, np.full(creep, CREEP_STD)))
+
+
+def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
+    """One block a coordinate; the target is what baseline and causes add up to."""
+    creep = _creep(source, context)
+    for row, name in enumerate(source.coordinates):
+        motion = coordinate_motion(source.inputs, source.spec, name, context.geometry)
+        position, rate, acceleration = (values[:: source.factor] for values in motion)
+        target = -table[:, row, 0]
+        load = context.filtered(np.abs(source.inputs[:, rows.SLICES["torques"]]).sum(axis=1), source)
+        yield Block(
+            record=source.record,
+            channel=source.channel,
+            step=source.step,
+            coordinate=name,
+            unit=_unit(source, name),
+            sample_time=source.sample_time * source.factor,
+            bandwidth=context.processing.cutoff,
+            target=target,
+            baseline=np.hstack([table[:, row, 1:MODEL_COLUMNS], creep[:, row]]),
+            moving=source.moving[row][:: source.factor],
+            period=source.period[:: source.factor],
+            regions=regions_of(position, rate, acceleration, load),
+            features=features_of(position, rate, acceleration, load),
+            tolerance=_tolerance(source, row, target, context),
+        )
+
+
+def _tolerance(source: Source, row: int, target: Array, context: Context) -> float:
+    """What a row may lack for reasons that no cause has, rms in its unit."""
+    used = source.moving[row][:: source.factor]
+    if source.own is not None:
+        size = rms(context.filtered(source.own.of(source.inputs)[:, row], source)[used])
+        return math.hypot(source.own.untold * size, source.own.lever * source.own.other)
+    if source.channel is Channel.DYNAMIC:
+        return SHAKEN * rms(target[used]) if source.travels and source.rattles.any() else 0.0
+    return tolerated_creep(source, source.coordinates[row], context.geometry)
+
+
+def _creep(source: Source, context: Context) -> Array:
+    """Columns of creep (N, rows, wheels); zeros in rows that nothing rolls in."""
+    if source.channel is not Channel.KINEMATIC or source.own is not None:
+        return np.zeros((len(source.inputs[:: source.factor]), len(source.coordinates), len(CREEP_NAMES)))
+    return context.filtered(creep_columns(context.inputs(source), source, context.setting(source)), source)
+
+
+def _unit(source: Source, coordinate: str) -> str:
+    if source.channel is Channel.KINEMATIC:
+        return "m/s" if source.own is None else "m"
+    return "N" if coordinate in ("x", "y") else "Nm"

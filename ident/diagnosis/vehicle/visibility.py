@@ -1,0 +1,163 @@
+"""What an experiment can see, split and place: rank of the causes' columns beside the baseline, from the equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.linear import orthonormal
+from ident.diagnosis.names import EffectName
+from ident.diagnosis.problem import Channel, Problem, Variant
+from ident.diagnosis.rows import Rows, make_rows
+from ident.diagnosis.vehicle.build import build_problem
+from ident.diagnosis.vehicle.ideal import DIAGNOSTIC, FOUR, Drive, ideal_record
+from ident.effects import Effect
+from ident.vehicle.description import VehicleDescription
+
+Array = NDArray[np.float64]
+
+VISIBLE: Final = 0.02
+"""Part of a column that the baseline must leave."""
+
+ALIKE: Final = 0.98
+"""Cosine of the angle between what two causes leave, from which they count as one."""
+
+RANK: Final = 1e-6
+"""Smallest singular value, relative to the largest, of a baseline column that counts."""
+
+NEGLIGIBLE: Final = 1e-3
+"""Norm of a column, over the largest one of the same cause, that means nothing."""
+
+NOISE: Final = 0.01
+"""Noise of a generalized torque, in units of its rms; that of the rolling rows is what they tolerate."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What an experiment shows of one cause.
+
+    Attributes:
+        visible: whether the baseline leaves anything of it.
+        alike: keys of other causes that look the same.
+    """
+
+    visible: bool
+    alike: tuple[str, ...]
+
+    def alike_effects(self, own: str) -> tuple[str, ...]:
+        """Names of other effects among them."""
+        return tuple(dict.fromkeys(name for key in self.alike if (name := key.partition("@")[0]) != own))
+
+
+def sights(problem: Problem) -> Mapping[str, Sight]:
+    """What the rows of a problem show of every candidate, by key."""
+    rows = make_rows(problem)
+    scale = row_noise(rows)
+    baseline = orthonormal(rows.baseline / scale[:, None], RANK)
+    found = [_left(rows.columns[:, column.own] / scale[:, None], baseline) for column in rows.layout]
+    owners = [problem.candidates[column.candidate].key for column in rows.layout]
+    return {
+        candidate.key: Sight(
+            any(basis.shape[1] > 0 for basis, owner in zip(found, owners, strict=True) if owner == candidate.key),
+            _twins(candidate.key, found, owners),
+        )
+        for candidate in problem.candidates
+    }
+
+
+def row_noise(rows: Rows) -> Array:
+    """Noise (n,) of the rows, that of a vehicle that obeys the model: see NOISE."""
+    scale = np.ones(len(rows))
+    for (block, _), place in zip(rows.blocks, rows.block_slices, strict=True):
+        rms = float(np.sqrt(np.mean(rows.target[place] ** 2))) if place.stop > place.start else 1.0
+        scale[place] = block.tolerance if block.channel is Channel.KINEMATIC else NOISE * rms
+    return scale
+
+
+def _left(columns: Array, baseline: Array) -> Array:
+    """Orthonormal basis of what the baseline leaves of some columns."""
+    norms = np.linalg.norm(columns, axis=0)
+    kept = norms > NEGLIGIBLE * norms.max(initial=0.0)
+    used = columns[:, kept] / norms[kept]
+    left = used - baseline @ (baseline.T @ used)
+    vectors, singular, _ = np.linalg.svd(left, full_matrices=False)
+    return np.asarray(vectors[:, singular > VISIBLE])
+
+
+def _twins(key: str, found: Sequence[Array], owners: Sequence[str]) -> tuple[str, ...]:
+    own = [basis for basis, owner in zip(found, owners, strict=True) if owner == key]
+    alike = {
+        owner
+        for basis, owner in zip(found, owners, strict=True)
+        if owner != key and any(_are_alike(mine, basis) for mine in own)
+    }
+    return tuple(sorted(alike))
+
+
+def _are_alike(first: Array, second: Array) -> bool:
+    """Whether the largest cosine of the principal angles between two spaces is near one; not where one is empty."""
+    if not (first.shape[1] and second.shape[1]):
+        return False
+    cosines = first.T @ second
+    # The Frobenius norm is no smaller, and takes no singular values.
+    return bool(np.linalg.norm(cosines) > ALIKE and np.linalg.norm(cosines, 2) > ALIKE)
+
+
+@dataclass
+class Visibility:
+    """What every experiment shows of one vehicle, computed when it is first asked for: half a second each.
+
+    Attributes:
+        vehicle: geometry is taken as true, parameters as its file guesses them.
+    """
+
+    vehicle: VehicleDescription
+    _found: dict[str, Mapping[str, Sight]] = field(default_factory=dict)
+
+    def __getitem__(self, experiment: str) -> Mapping[str, Sight]:
+        """What the four steps show together with one diagnostic experiment; without any for the name `four steps`."""
+        if experiment not in self._found:
+            extra = DIAGNOSTIC.get(experiment)
+            four = self._four
+            joined = four if extra is None else _joined(four, _problem(extra.drives, extra.given, self.vehicle))
+            self._found[experiment] = sights(joined)
+        return self._found[experiment]
+
+    @cached_property
+    def _four(self) -> Problem:
+        return _problem(FOUR, (), self.vehicle)
+
+
+def sights_of(experiment: str, vehicle: VehicleDescription) -> Mapping[str, Sight]:
+    """What one experiment shows of a vehicle, see `Visibility`."""
+    return Visibility(vehicle)[experiment]
+
+
+def _problem(drives: Sequence[Drive], given: Sequence[Effect], vehicle: VehicleDescription) -> Problem:
+    # At the vehicle file's parameters: an experiment of few steps does not show all of them.
+    unseen = (EffectName.PARAMETER_CHANGE, EffectName.SLIP)  # sliding is found in records, not foretold
+    effects = [name for name in EffectName if name not in unseen]
+    problem = build_problem([ideal_record(drives, vehicle)], vehicle, vehicle.prior, given=given, effects=effects)
+    return replace(problem, nominal=None)
+
+
+def _joined(first: Problem, second: Problem) -> Problem:
+    """The blocks of both, one candidate for both."""
+    candidates = tuple(
+        replace(one, variants=tuple(_behind(a, b) for a, b in zip(one.variants, other.variants, strict=True)))
+        for one, other in zip(first.candidates, second.candidates, strict=True)
+    )
+    return replace(first, blocks=(*first.blocks, *second.blocks), candidates=candidates)
+
+
+def _behind(first: Variant, second: Variant) -> Variant:
+    return replace(first, columns=(*first.columns, *second.columns))
+
+
+EXPERIMENTS: Final = ("four steps", *DIAGNOSTIC)
+"""Columns of the table: the four steps alone, then together with each diagnostic experiment."""

@@ -1,0 +1,225 @@
+"""Balance of forces: how far the torques of a record contradict its motion and what is known of the vehicle.
+
+In every step the generalized torque is linear in the parameters and in the reported torques:
+
+    Theta p = sum_ij c_i M_ij u_j
+
+with c_i the torque per unit of drive i and M what a fault makes of the torques: swapped, negated, scaled. A torque that
+is late by t adds t times its derivative. So the moments of Theta, of all c_i u_j and of c_i u'_i, taken once a step,
+answer every such question without going through the samples again.
+
+Torques show in a second place: whoever drives a vehicle of four drives lets those that move one coordinate share its
+load, so a drive that bears much more or less than its part, or the other sign, stands out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.estimate.equations import ROWS, RowsOfStep
+from ident.estimate.filters import Processing, differentiate, moving_rows
+from ident.faults.rolling import independent_samples, rates_of
+from ident.plant import dynamics, kinematics
+from ident.records.record import Segment, base_step
+from ident.vehicle.geometry import WHEELS, Geometry
+from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters
+
+Array = NDArray[np.float64]
+
+UNMODELLED: Final = 0.1
+"""Torque that the model lacks, over the torque, that a sound vehicle may show: the largest effects of the library."""
+
+SHARING: Final = 0.3
+"""Deviation of a drive's torque from its part, over the torque, that a sound vehicle may show."""
+
+FREEDOM: Final = 3.0
+"""Degrees of freedom of Student's distribution for a prior value: now and then a guess is far off its own std."""
+
+UNSTATED: Final = 0.1
+"""Standard uncertainty of a prior value that comes without one, relative to it."""
+
+NULL: Final = 100.0
+"""By so many standard deviations of the prior the fit may go from it freely; it decides what no step excites."""
+
+COUNT: Final = len(PARAMETER_NAMES)
+ORDERS: Final = np.array([2 if unit.startswith("kg") else unit.count("s/rad") for unit in PARAMETER_UNITS.values()])
+"""Derivative of the angles that a parameter multiplies."""
+DRIVES: Final = len(WHEELS)
+WHEEL_ROWS: Final = slice(5, 9)
+PUNCTUAL: Final = np.zeros(DRIVES)
+REWEIGHTED: Final = 3
+"""Fits with weights from the one before; more change nothing."""
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Moments of one coordinate of one step, over the rows that move.
+
+    Attributes:
+        step, coordinate: which.
+        moments: (31, 31) of [Theta, c_i u_j, c_i u'_i], i slow.
+        torques: (4, 4) moments of the torques over all rows.
+        part: (4, 4) projection of torques on the parts of the load, zero where they need not share.
+        weight: number of independent samples.
+    """
+
+    step: str
+    coordinate: str
+    moments: Array
+    torques: Array
+    part: Array
+    weight: float
+
+    def torque_power(self, told: Array) -> float:
+        """Mean square of the generalized torque that weights (20,) of the torques and their rates make."""
+        return float(told @ self.moments[COUNT:, COUNT:] @ told)
+
+    def misfit(self, told: Array, values: Array) -> float:
+        """Mean square of what parameters (11,) leave of the torque, over the torque's [-]."""
+        full = np.concatenate([values, -told])
+        power = self.torque_power(told)
+        return max(float(full @ self.moments @ full), 0.0) / power if power > 0 else 1.0
+
+    def unshared(self, mixing: Array) -> float:
+        """Mean square of the torques beyond their parts, over theirs [-]."""
+        if not np.any(self.part):
+            return 0.0
+        torques = mixing @ self.torques @ mixing.T
+        power = float(np.trace(torques))
+        return float(np.trace((np.eye(DRIVES) - self.part) @ torques)) / power if power > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How well the torques fit.
+
+    Attributes:
+        values: (11,) parameters.
+        loss: negative log likelihood, prior included.
+        misfit: largest of the steps, root mean square over that of the torque [-].
+    """
+
+    values: Array
+    loss: float
+    misfit: float
+
+
+def balances_of(segments: Sequence[Segment], geometry: Geometry, processing: Processing) -> list[Balance]:
+    """Moments of all steps that the estimator knows, of segments that are smooth already."""
+    known = [(segment, base_step(segment.step)) for segment in segments]
+    return [
+        balance
+        for segment, step in known
+        if step in ROWS
+        for balance in _balances(segment, ROWS[step], geometry, processing)
+    ]
+
+
+def _balances(segment: Segment, spec: RowsOfStep, geometry: Geometry, processing: Processing) -> list[Balance]:
+    rates = rates_of(segment)
+    twist = kinematics.odometry(rates.alpha, rates.steering, rates.wheels, geometry)
+    velocity = np.hstack([twist, rates.steering, rates.wheels])
+    acceleration = differentiate(velocity, segment.sample_time)
+    torque_rates = differentiate(segment.motor_torques, segment.sample_time)
+    if spec.mode is None:
+        theta = dynamics.regressor(velocity, acceleration)[:, WHEEL_ROWS]
+        per_drive = np.broadcast_to(geometry.gear_ratio * np.eye(DRIVES), (len(segment), DRIVES, DRIVES))
+        names = spec.coordinates
+    else:
+        theta = dynamics.projected_regressor(spec.mode, rates.alpha, velocity, acceleration, geometry)
+        per_drive = dynamics.projected_input(spec.mode, rates.alpha, geometry)
+        names = kinematics.GENERALIZED_VELOCITIES[spec.mode]
+    found = []
+    for name in spec.coordinates:
+        row = names.index(name)
+        joints = [WHEEL_ROWS.start + row] if spec.mode is None else list(spec.joints)
+        moving = moving_rows(velocity[:, joints], processing, segment.sample_time)
+        if not moving.any():
+            continue
+        products = per_drive[:, row, :, None] * segment.motor_torques[:, None, :]
+        lagging = per_drive[:, row] * torque_rates
+        design = np.hstack([theta[:, row], products.reshape(len(segment), -1), lagging])[moving]
+        found.append(
+            Balance(
+                segment.step,
+                name,
+                design.T @ design / len(design),
+                segment.motor_torques.T @ segment.motor_torques / len(segment),
+                _part(per_drive[:, row]) if len(spec.coordinates) == 1 else np.zeros((DRIVES, DRIVES)),
+                independent_samples(velocity[:, joints], segment.sample_time) * float(np.mean(moving)),
+            )
+        )
+    return found
+
+
+def _part(per_drive: Array) -> Array:
+    """Projection on the smallest torques that move one coordinate, of a posture that is held (N, 4)."""
+    direction = np.mean(per_drive, axis=0)
+    return np.outer(direction, direction) / float(direction @ direction)
+
+
+def fit_balances(
+    balances: Sequence[Balance],
+    prior: Parameters,
+    mixings: Sequence[Array],
+    *,
+    late: Array = PUNCTUAL,
+    unmodelled: float = UNMODELLED,
+    stretch: float = 1.0,
+) -> Fit:
+    """Parameters that fit all steps at once, each in proportion to its own misfit, and how likely they are.
+
+    Args:
+        balances: of all steps.
+        prior: what is known before.
+        mixings: (4, 4) a balance, true torques over reported ones.
+        late: (4,) lateness of the torques [s], small.
+        unmodelled: torque that the model may lack, over the torque.
+        stretch: recorded time over true time; rates and accelerations grow with it and with its square.
+    """
+    told = [np.concatenate([mixing.ravel(), late]) for mixing in mixings]
+    columns = stretch**ORDERS
+    misfits = np.full(len(balances), unmodelled**2)
+    values = prior.values
+    for _ in range(1 if unmodelled == UNMODELLED else REWEIGHTED):
+        values = _solved(balances, prior, told, misfits, columns)
+        left = [balance.misfit(each, columns * values) for balance, each in zip(balances, told, strict=True)]
+        misfits = unmodelled**2 + np.array(left)
+    triples = zip(balances, mixings, misfits, strict=True)
+    loss = sum(
+        balance.weight / 2 * (math.log(misfit / unmodelled**2) + math.log1p(balance.unshared(mixing) / SHARING**2))
+        for balance, mixing, misfit in triples
+    )
+    away = ((values - prior.values) / prior_std(prior)) ** 2
+    loss += float(np.sum((FREEDOM + 1) / 2 * np.log1p(away / FREEDOM)))
+    return Fit(values, loss, math.sqrt(max(float(np.max(misfits, initial=0.0)) - unmodelled**2, 0.0)))
+
+
+def _solved(
+    balances: Sequence[Balance], prior: Parameters, told: Sequence[Array], misfits: Array, columns: Array
+) -> Array:
+    """Least squares, every balance weighted by its misfit, with a prior where none tells."""
+    precision = 1 / (NULL * prior_std(prior)) ** 2
+    normal, right = np.diag(precision), prior.values * precision
+    for balance, each, misfit in zip(balances, told, misfits, strict=True):
+        power = balance.torque_power(each)
+        if power <= 0:
+            continue
+        scale = balance.weight / (misfit * power)
+        normal = normal + scale * balance.moments[:COUNT, :COUNT] * np.outer(columns, columns)
+        right = right + scale * columns * (balance.moments[:COUNT, COUNT:] @ each)
+    root = 1 / np.sqrt(np.diag(normal))
+    # Where nothing but the prior tells a combination it may drown in rounding: least norm then.
+    return np.asarray(root * np.linalg.lstsq(normal * np.outer(root, root), root * right, rcond=None)[0])
+
+
+def prior_std(prior: Parameters) -> Array:
+    """Standard uncertainties (11,) of the prior, of every value one."""
+    least = UNSTATED * np.maximum(np.abs(prior.values), np.finfo(float).tiny)
+    return np.where(prior.std > 0, prior.std, least)

@@ -1,0 +1,53 @@
+"""From the inputs to the torques that the drives report."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+import casadi as ca
+
+from ident.plant.symbolic import Expression
+from ident.plant.symbols import Symbols
+
+
+class Inputs(enum.StrEnum):
+    """What drives the wheels of a model."""
+
+    TORQUE = "torque"
+    SPEED = "speed"
+
+
+DRIVE_GAIN: Final = 0.5
+"""Proportional gain of the drives' speed loops before anyone tunes them, motor torque per wheel rate [Nm s/rad]."""
+
+DRIVE_INTEGRAL_GAIN: Final = 2.0
+"""Integral gain of the drives' speed loops before anyone tunes them [Nm/rad]."""
+
+DRIVE_UNWIND_TIME: Final = 0.05
+"""In which the integral of a speed loop follows a torque at its limit [s]."""
+
+_SHARPNESS: Final = 4
+"""Of the limit: at half of it 1.5 % of the torque is missing."""
+
+
+def _torque_inputs(rates: Expression, x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
+    return u.wheels("torque_{}"), ca.SX.zeros(0)
+
+
+def _speed_loops(rates: Expression, x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
+    """Proportional and integral action with a smooth limit; at the limit the integral follows the torque."""
+    error = u.wheels("speed_{}") - rates
+    wanted = p["drive_gain"] * error + x.wheels("integral_{}")
+    limit = p["drive_torque_limit"]
+    torque = wanted / (1 + (wanted / limit) ** _SHARPNESS) ** (1 / _SHARPNESS)
+    return torque, p["drive_integral_gain"] * error - (wanted - torque) / p["drive_unwind_time"]
+
+
+_Drive = Callable[[Expression, Symbols, Symbols, Symbols], tuple[Expression, Expression]]
+
+DRIVES: Final[Mapping[Inputs, _Drive]] = MappingProxyType({Inputs.TORQUE: _torque_inputs, Inputs.SPEED: _speed_loops})
+"""By the inputs: from rates (4,) of the motors at the wheels, states, inputs and parameters to torques (4,) [Nm] and
+rates of the integral states [Nm/s]."""

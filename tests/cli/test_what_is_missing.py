@@ -1,0 +1,63 @@
+"""What is not installed is said before the work, by the command that needs it and by `doctor`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+def test_the_command_says_it_for_people_and_programs(
+    quasi: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fine = quasi("doctor", "python", "dbc", "--json")
+    assert (fine.code, json.loads(fine.out)["ok"]) == (0, True)
+    monkeypatch.setitem(sys.modules, "cantools", None)
+    lacking = quasi("doctor", "python", "dbc", "--json")
+    checks = {check["name"]: check for check in json.loads(lacking.out)["checks"]}
+    assert lacking.code == 1
+    assert (checks["python"]["found"], checks["dbc"]["found"]) == (True, False)
+    assert "quasiomni[dbc]" in checks["dbc"]["remedy"]
+    shown = quasi("doctor", "dbc")
+    assert shown.code == 1
+    assert "cantools" in shown.out
+    assert "quasiomni[dbc]" in shown.out
+
+
+CASES = {
+    "demo": ("pybullet", "emulator", ["demo", "--out", "OUT"]),
+    "campaign": ("durand", "emulator", ["campaign", "--out", "OUT"]),
+    "campaign in MF4": ("asammdf", "records", ["campaign", "--out", "OUT", "--format", ".mf4"]),
+    "campaign on an FMU": ("fmpy", "cosim", ["campaign", "--out", "OUT", "--plant", "fmu:x.fmu"]),
+    "emulate": ("pybullet", "emulator", ["emulate", "--bus", "unix:OUT"]),
+    "emulate an FMU": ("fmpy", "cosim", ["emulate", "--bus", "unix:OUT", "--plant", "fmu:x.fmu"]),
+    "cosim": ("fmpy", "cosim", ["cosim", "x.fmu", "--record", "x.csv"]),
+    "identify from MF4": ("asammdf", "records", ["identify", "x.csv", "x.mf4"]),
+    "diagnose from Parquet": ("pyarrow", "records", ["diagnose", "x.csv", "--confirm", "x.parquet"]),
+    "dbc": ("cantools", "dbc", ["dbc", "--out", "OUT"]),
+    "exam seal": ("cryptography", "exam", ["exam", "seal", "--out", "OUT", "--key", "OUT.key"]),
+    "exam diagnose": ("pyarrow", "exam", ["exam", "diagnose", "OUT"]),
+    "exam on a cluster": ("distributed", "cluster", ["exam", "diagnose", "OUT", "--scheduler", "tcp://localhost:1"]),
+}
+
+
+@pytest.mark.parametrize(("module", "extra", "words"), CASES.values(), ids=CASES)
+def test_a_missing_extra_is_said_before_the_work(
+    quasi: Callable[..., Any],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    module: str,
+    extra: str,
+    words: list[str],
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    answer = quasi(*(word.replace("OUT", str(tmp_path / "out")) for word in words))
+    assert answer.code == 2
+    assert f"needs {module}" in answer.error
+    assert f"quasiomni[{extra}]" in answer.error
+    assert answer.out == ""
+    assert list(tmp_path.iterdir()) == []

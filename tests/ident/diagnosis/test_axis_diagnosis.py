@@ -1,0 +1,221 @@
+"""Servo axes: machines that know nothing of the candidates, and a real one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ident.diagnosis.axis.candidates import in_gap
+from ident.diagnosis.axis.diagnose import diagnose_axis
+from ident.diagnosis.axis.motion import derivative, with_repeats
+from ident.diagnosis.derivatives import delayed
+from ident.diagnosis.diagnosis import Verdict
+from ident.diagnosis.findings import Findings
+from ident.errors import EstimationError, RecordError
+from ident.records.axis_record import AxisRecord, read_axis_record
+
+Make = Callable[..., Any]
+
+
+def _diagnosed(machine: Any) -> Findings:
+    return diagnose_axis([machine.drive(11)], [machine.drive(12)], seed=1)
+
+
+def _value(findings: Findings, name: str, parameter: int = 0) -> tuple[float, float]:
+    part = next(cause.part for cause in findings.causes if cause.candidate.effect == name)
+    return float(part.values[parameter]), float(part.std[parameter])
+
+
+def test_a_machine_that_is_the_model_lacks_nothing(machine: Make) -> None:
+    stages: list[str] = []
+    findings = diagnose_axis([machine().drive(11)], [machine().drive(12)], seed=1, stage=stages.append)
+    # Who waits is told what is done, in the order in which it is.
+    assert [stage.split()[0] for stage in stages[:3]] == ["filter", "searching", "fitting"]
+    assert stages[-1] == "numbers of the answer"
+    assert findings.verdict is Verdict.NONE
+    found = dict(zip(findings.problem.names, findings.after.baseline.tolist(), strict=True))
+    assert found.pop("lag") == pytest.approx(0.0, abs=0.05)
+    assert found == pytest.approx({"M": 20.0, "Fv": 60.0, "Fc": 8.0, "offset": -1.0}, rel=0.01)
+
+
+@pytest.mark.parametrize("read", [0.0, 0.75])
+def test_an_effort_that_is_held_over_its_sample_is_no_gap(machine: Make, read: float) -> None:
+    """Drives hold the effort while the position is read at the start of the interval, or late in it."""
+    assert _diagnosed(machine(read=read)).verdict is Verdict.NONE
+
+
+def test_beside_a_held_effort_a_cause_is_found_with_its_size(machine: Make) -> None:
+    findings = _diagnosed(machine(read=0.0, asymmetry=8.0))
+    assert [str(cause.candidate.effect) for cause in findings.causes] == ["asymmetric_viscous"]
+    value, std = _value(findings, "asymmetric_viscous")
+    assert value == pytest.approx(8.0, abs=max(3 * std, 0.1))
+
+
+def test_a_delay_is_named_with_all_of_its_length_beside_a_held_effort(machine: Make) -> None:
+    findings = _diagnosed(machine(read=0.0, delay=0.001))
+    assert [str(cause.candidate.effect) for cause in findings.causes] == ["time_delay"]
+    assert _value(findings, "time_delay")[0] == pytest.approx(0.0015, rel=0.02)
+
+
+def test_a_spring_that_the_library_does_not_have_is_no_ripple(machine: Make) -> None:
+    """Half a period of a sine of the position looks like it."""
+    assert _diagnosed(machine(spring=100.0)).verdict is Verdict.UNKNOWN
+
+
+def test_friction_that_depends_on_direction_is_named_with_its_size(machine: Make) -> None:
+    findings = _diagnosed(machine(asymmetry=8.0))
+    assert [str(cause.candidate.effect) for cause in findings.causes] == ["asymmetric_viscous"]
+    value, std = _value(findings, "asymmetric_viscous")
+    assert value == pytest.approx(8.0, abs=max(3 * std, 0.1))
+    assert findings.gap.closed > 0.9
+
+
+def test_a_delay_of_two_samples_is_named_with_its_length(machine: Make) -> None:
+    findings = _diagnosed(machine(delay=0.002))
+    assert [str(cause.candidate.effect) for cause in findings.causes] == ["time_delay"]
+    assert _value(findings, "time_delay")[0] == pytest.approx(0.002, rel=0.02)
+
+
+def test_bristles_that_break_away_are_named_stribeck(machine: Make) -> None:
+    """LuGre friction: at steady speeds 4 N more near rest, gone at 0.02 m/s."""
+    findings = _diagnosed(machine(bristle=1e5, breakaway=4.0))
+    assert findings.verdict is Verdict.EFFECT
+    assert findings.causes[0].candidate.effect == "stribeck"
+    assert _value(findings, "stribeck")[0] == pytest.approx(4.0, abs=1.5)
+    assert _value(findings, "stribeck", 1)[0] == pytest.approx(0.02, rel=0.3)
+
+
+def test_a_second_mass_on_a_spring_is_named_elasticity(machine: Make) -> None:
+    findings = _diagnosed(machine(compliance=5e-6))
+    assert findings.causes[0].candidate.effect == "elasticity"
+
+
+def test_a_resonance_that_no_candidate_describes_is_not_taken_for_noise(machine: Make) -> None:
+    """The same spring, so soft that it rings within the bandwidth of the rows."""
+    assert _diagnosed(machine(compliance=2e-5)).verdict is not Verdict.NONE
+
+
+def test_friction_that_follows_another_axis_is_named(machine: Make) -> None:
+    findings = _diagnosed(machine(follower=(15.0, 3.0)))
+    assert findings.causes[0].candidate.key == "coupled_friction@axis_1<2"
+    assert _value(findings, "coupled_friction")[0] == pytest.approx(15.0, rel=0.02)
+    assert _value(findings, "coupled_friction", 1)[0] == pytest.approx(3.0, rel=0.02)
+
+
+def test_repeats_are_found_where_the_record_does_not_number_them(machine: Make) -> None:
+    record = machine().drive(11)
+    unnumbered = replace(record, period=np.full(len(record), -1))
+    found = with_repeats(unnumbered)
+    assert np.mean(found == record.period) > 0.99
+
+
+def test_one_record_without_repeats_is_confirmed_by_its_later_part(machine: Make) -> None:
+    record = machine(asymmetry=8.0, repeats=1, duration=16.0).drive(3)
+    findings = diagnose_axis([record], [], seed=1)
+    assert findings.causes[0].candidate.effect == "asymmetric_viscous"
+
+
+def test_other_rates_and_units_change_nothing(machine: Make) -> None:
+    findings = _diagnosed(machine(asymmetry=8.0, rate=250.0, substeps=16))
+    assert findings.causes[0].candidate.effect == "asymmetric_viscous"
+
+
+def test_a_slow_noisy_record_names_nothing_that_the_baseline_absorbs(machine: Make) -> None:
+    record = machine(asymmetry=8.0, rate=100.0, substeps=40, repeats=1, duration=30.0, noise=2.0, encoder=1e-5).drive(
+        11
+    )
+    findings = diagnose_axis([record], [], seed=1)
+    assert [str(cause.candidate.effect) for cause in findings.causes] == ["asymmetric_viscous"]
+    assert {"payload", "torque_gain", "torque_bias"} <= set(findings.invisible)
+
+
+def _changed(record: AxisRecord, **series: Any) -> AxisRecord:
+    return replace(record, axes=tuple(replace(axis, **series) for axis in record.axes))
+
+
+def test_an_axis_at_rest_is_refused(machine: Make) -> None:
+    record = machine().drive(1)
+    still = _changed(record, position=np.zeros(len(record)))
+    with pytest.raises(EstimationError, match="does not move"):
+        diagnose_axis([still], [], seed=1)
+
+
+def test_an_axis_at_rest_under_a_noisy_encoder_is_refused_as_one_at_rest(machine: Make) -> None:
+    record = machine().drive(1)
+    still = _changed(record, position=1e-6 * np.random.default_rng(5).normal(size=len(record)))
+    with pytest.raises(EstimationError, match="does not move"):
+        diagnose_axis([still], [], seed=1)
+
+
+def test_an_axis_without_any_effort_is_refused(machine: Make) -> None:
+    record = machine().drive(1)
+    with pytest.raises(EstimationError, match=r"effort of .* never changes"):
+        diagnose_axis([_changed(record, effort=np.zeros(len(record)))], [], seed=1)
+
+
+def test_records_of_different_axes_are_refused(machine: Make) -> None:
+    with pytest.raises(RecordError, match="does not have the axes"):
+        diagnose_axis([machine().drive(1)], [machine(follower=(1.0, 1.0)).drive(2)], seed=1)
+
+
+def test_a_delay_by_the_spectrum_is_a_shift_in_time() -> None:
+    time = np.arange(2000) * 1e-3
+    series = np.sin(2 * np.pi * 3 * time) * np.hanning(2000)
+    shifted = np.sin(2 * np.pi * 3 * (time - 0.0004)) * np.interp(time - 0.0004, time, np.hanning(2000))
+    np.testing.assert_allclose(delayed(series, 0.0004, 1e-3)[50:-50], shifted[50:-50], atol=1e-5)
+
+
+def test_derivatives_lose_nothing_in_the_band_of_the_rows() -> None:
+    """At ω T = 0.5 the gain is right to 2 parts in 10⁴, where plain central differences lose 4 %."""
+    time = np.arange(400) * 0.01
+    found = derivative(np.sin(50 * time), 0.01)
+    np.testing.assert_allclose(found[5:-5], 50 * np.cos(50 * time)[5:-5], atol=50 * 2e-4)
+
+
+def test_a_play_is_crossed_after_every_reversal_and_only_then() -> None:
+    position = np.concatenate([np.linspace(0, 1, 101), np.linspace(1, 0, 101)[1:]])
+    inside = in_gap(position, 0.2)
+    assert not inside[25:101].any()
+    assert inside[102:118].all()
+    assert not inside[122:].any()
+
+
+EMPS = os.environ.get("QUASIOMNI_EMPS", "")
+needs_emps = pytest.mark.skipif(
+    not EMPS, reason="QUASIOMNI_EMPS does not name DATA_EMPS.mat, which is not ours to ship"
+)
+
+
+@pytest.fixture(scope="module")
+def emps() -> Findings:
+    return diagnose_axis([read_axis_record(Path(EMPS))], [], seed=1)
+
+
+@needs_emps
+def test_on_the_real_axis_direction_dependent_viscous_friction_is_first_and_a_delay_next(emps: Findings) -> None:
+    assert [str(cause.candidate.effect) for cause in emps.causes[:2]] == ["asymmetric_viscous", "time_delay"]
+    assert 0.0002 < _value(emps, "time_delay")[0] < 0.001
+    assert emps.causes[0].closed > 0.4
+    assert emps.verdict is Verdict.EFFECT
+    named = emps.diagnosis().effects
+    assert [effect.name for effect in named[:2]] == ["asymmetric_viscous", "time_delay"]
+    assert all(effect.probability >= 0.5 for effect in named[:2])
+
+
+@needs_emps
+def test_what_the_real_axis_repeats_beyond_its_causes_is_said_and_makes_them_less_sure(emps: Findings) -> None:
+    assert emps.lasting
+    assert all(cause.probability < 0.9 for cause in emps.causes)
+
+
+@needs_emps
+def test_on_the_real_axis_the_search_stops_when_the_held_out_part_stops_improving(emps: Findings) -> None:
+    assert len(emps.causes) <= 3
+    assert all(cause.closed >= 0.01 for cause in emps.causes)
+    assert emps.gap.after < 0.6 * emps.gap.before
