@@ -13,10 +13,11 @@ from emulator.effects import Wanted, inject
 from emulator.effects.assembly import Mechanics
 from emulator.effects.bodies import load_payload
 from emulator.encoder import Encoder
-from emulator.engine.choice import ENGINES, EngineName
+from emulator.engine.choice import ENGINES
 from emulator.engine.protocol import MakeEngine
 from emulator.noise import Disturbances
 from emulator.prototype import Prototype
+from ident.extras import default_engine
 
 SETTLING_TIME: Final = 0.5
 """Time that the vehicle gets to come to rest on the floor [s]; it does not count as simulated time."""
@@ -58,7 +59,7 @@ class EmulatedVehicle:
         gui: show the vehicle in a window.
         noise_scale: factor on every random source; 0 switches noise off.
         engine_step: [s].
-        make_engine: what makes the physics engine.
+        make_engine: what makes the physics engine; None: PyBullet where it is installed, otherwise MuJoCo.
         effects: that it has beyond its prototype file.
 
     Attributes:
@@ -81,12 +82,13 @@ class EmulatedVehicle:
         gui: bool = False,
         noise_scale: float = 1.0,
         engine_step: float = 1e-3,
-        make_engine: MakeEngine = ENGINES[EngineName.PYBULLET],
+        make_engine: MakeEngine | None = None,
         effects: Sequence[Wanted] = (),
     ) -> None:
         injection = inject(prototype, effects, engine_step)
         self._built = injection.built
         prototype = injection.built.prototype
+        make_engine = make_engine or ENGINES[default_engine()]
         self.engine = make_engine(injection.built, step_size=engine_step, gui=gui)
         self._mechanics = Mechanics(injection, self.engine)
         self._noise = Disturbances(prototype, seed=seed, scale=noise_scale, step=engine_step)

@@ -27,6 +27,7 @@ from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.effects import Effect
 from ident.effects.extended import ExtendedModel
 from ident.effects.text import parse_effect
+from ident.extras import named_engine
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription, load_vehicle
 
@@ -40,6 +41,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("effects", nargs="+", type=parse_effect)
     parser.add_argument("--vehicle", default="prototype")
+    parser.add_argument("--engine", type=named_engine, help="physics engine; default: PyBullet where it is installed")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--diagnose", action="store_true", help="find the effects instead of knowing them")
     arguments = parser.parse_args()
@@ -53,7 +55,15 @@ def main() -> None:
     network = network_file_of(arguments.vehicle)
     for name, model in zip(("plain", "with effect"), models, strict=True):
         runs = [
-            track_lane_change(plan, model, prototype=arguments.vehicle, seed=seed, network=network, effects=effects)
+            track_lane_change(
+                plan,
+                model,
+                prototype=arguments.vehicle,
+                seed=seed,
+                network=network,
+                effects=effects,
+                engine=arguments.engine,
+            )
             for seed in range(1, arguments.seeds + 1)
         ]
         print(f"{name:<12} {_mean(runs)}")

@@ -1,4 +1,4 @@
-"""What beyond the core packages some commands need, asked for before the work starts."""
+"""What beyond the core packages some commands need, asked for before the work starts: extras, and physics engines."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ class Extra(enum.StrEnum):
     """Extras of the package, as pip knows them."""
 
     EMULATOR = "emulator"
+    MUJOCO = "mujoco"
     RECORDS = "records"
     DBC = "dbc"
     ZIGLANG = "ziglang"
@@ -26,6 +27,7 @@ class Extra(enum.StrEnum):
 MODULES: Final[Mapping[Extra, Sequence[str]]] = MappingProxyType(
     {
         Extra.EMULATOR: ("pybullet", "durand"),
+        Extra.MUJOCO: ("mujoco", "durand"),
         Extra.RECORDS: ("pyarrow", "asammdf"),
         Extra.DBC: ("cantools",),
         Extra.ZIGLANG: ("ziglang",),
@@ -38,7 +40,8 @@ MODULES: Final[Mapping[Extra, Sequence[str]]] = MappingProxyType(
 
 PURPOSES: Final[Mapping[Extra, str]] = MappingProxyType(
     {
-        Extra.EMULATOR: "demo, emulate, safety, conformance, and campaign without --bus",
+        Extra.EMULATOR: "demo, emulate, safety, conformance, and campaign without --bus, on PyBullet",
+        Extra.MUJOCO: "the same on MuJoCo",
         Extra.RECORDS: "Parquet and MF4 records, MF4 logs",
         Extra.DBC: "dbc",
         Extra.ZIGLANG: "fmu for other platforms than this computer",
@@ -48,6 +51,63 @@ PURPOSES: Final[Mapping[Extra, str]] = MappingProxyType(
     }
 )
 """What an extra is for, in commands and options."""
+
+
+class EngineName(enum.StrEnum):
+    """Physics engines by the names that command line and files have for them."""
+
+    PYBULLET = "pybullet"
+    MUJOCO = "mujoco"
+
+
+ENGINE_EXTRAS: Final[Mapping[EngineName, Extra]] = MappingProxyType(
+    {EngineName.PYBULLET: Extra.EMULATOR, EngineName.MUJOCO: Extra.MUJOCO}
+)
+"""What brings an engine, and what the emulated vehicle needs beside it; the first that is installed is the default."""
+
+TITLES: Final[Mapping[EngineName, str]] = MappingProxyType(
+    {EngineName.PYBULLET: "PyBullet", EngineName.MUJOCO: "MuJoCo"}
+)
+"""The engines as people write them."""
+
+
+def default_engine() -> EngineName:
+    """The first engine that is installed; the first of all where none is."""
+    installed = (name for name in EngineName if find_spec(name) is not None)
+    return next(installed, EngineName.PYBULLET)
+
+
+def named_engine(name: str) -> EngineName:
+    """The engine of a name.
+
+    Raises:
+        UserError: there is none.
+    """
+    if name not in set(EngineName):
+        raise UserError(f"There is no engine {name!r}.", f"Take one of: {', '.join(EngineName)}.")
+    return EngineName(name)
+
+
+def require_engine(asked: EngineName | None, what: str) -> EngineName:
+    """The engine that was asked for, or the default, where it is installed.
+
+    Args:
+        asked: None for the default.
+        what: needs it, the start of a sentence.
+
+    Raises:
+        UserError: it is not installed, or what the emulated vehicle needs beside it.
+    """
+    engine = asked or default_engine()
+    missing = missing_modules(ENGINE_EXTRAS[engine])
+    if missing:
+        either = " or ".join(
+            f"'quasiomni[{extra}]'" for extra in ([ENGINE_EXTRAS[asked]] if asked else ENGINE_EXTRAS.values())
+        )
+        raise UserError(
+            f"{what} needs {' and '.join(missing)}, not installed here.", f"Install the extra: pip install {either}."
+        )
+    return engine
 
 
 def missing_modules(extra: Extra) -> list[str]:

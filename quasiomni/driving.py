@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -24,7 +25,7 @@ from hil.frames.recorder import LogFormat
 from ident.campaign.steps import DRIVING_ORDER, LOADED, ORDER, PERIODS
 from ident.effects import Effect
 from ident.errors import UserError
-from ident.extras import Extra, require
+from ident.extras import EngineName, Extra, require
 from ident.records.record import Step, base_step
 from ident.report.tables import loop_table, room_table
 from ident.vehicle.description import find_data_file
@@ -32,6 +33,7 @@ from quasiomni.application import app, console, errors, show_next
 from quasiomni.identification import end_with, known_inertia
 from quasiomni.options import (
     EffectOption,
+    EngineOption,
     ForceOption,
     GuiOption,
     InertiaOption,
@@ -40,6 +42,7 @@ from quasiomni.options import (
     PlantOption,
     SeedOption,
     VehicleOption,
+    choose_engine,
     load_emulation,
     parse_effects,
     parse_plant,
@@ -55,14 +58,17 @@ LOCKSTEP = "emulator, in lockstep"
 def demo(
     out: Annotated[Path, typer.Option(help="Run folder to write.")] = Path("runs/demo"),
     vehicle: VehicleOption = "prototype",
+    engine: EngineOption = None,
     seed: SeedOption = 1,
     effect: EffectOption = None,
     gui: GuiOption = False,
 ) -> None:
     """The whole story on the emulator: boot, four steps, parameters beside the truth, lane change, report."""
-    load_emulation()
+    chosen = choose_engine(engine)
     steps = _steps((), False, None)
-    order = Order(out, vehicle, None, steps, PERIODS, seed, None, LogFormat.BLF, LOCKSTEP, vehicle, demo=True)
+    order = Order(
+        out, vehicle, None, steps, PERIODS, seed, None, LogFormat.BLF, LOCKSTEP, vehicle, demo=True, engine=chosen
+    )
     effects = parse_effects(effect)
     _drive_on_emulator(_planned(order), order, effects, gui)
     with stages() as stage:
@@ -98,6 +104,7 @@ def campaign(
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="With --bus: the other side is an emulator that SYNC moves.")
     ] = False,
+    engine: EngineOption = None,
     effect: EffectOption = None,
     plant: PlantOption = None,
     force: ForceOption = False,
@@ -115,17 +122,26 @@ def campaign(
         steps = _diagnostic_steps(skip or (), payload)
     inertia = known_inertia(b_w, b_w_std)
     effects, fmu = parse_effects(effect), parse_plant(plant, force=force)
-    if bus is not None and (effects or fmu):
-        raise UserError(
-            "--effect and --plant are of the emulator, and --bus names another vehicle.", "Leave one of them out."
-        )
+    _refuse_two_vehicles(bus, fmu, effects, engine)
     if log_format is LogFormat.MF4:
         require(Extra.RECORDS, "--format .mf4", ("asammdf",))
-    if bus is None:
-        load_emulation()
     prototype, where = (vehicle, LOCKSTEP) if bus is None and plant is None else ("", bus or plant or "")
-    order = Order(out, vehicle, network, steps, periods, seed, inertia, log_format, where, prototype, payload, resume)
-    run = _resumed(order, context) if resume else _planned(order)
+    order = Order(
+        out,
+        vehicle,
+        network,
+        steps,
+        periods,
+        seed,
+        inertia,
+        log_format,
+        where,
+        prototype,
+        payload,
+        resume,
+        engine=engine,
+    )
+    run = _resumed(order, context) if resume else _planned(_on_engine(order))
     if fmu is not None:
         same = not resume or carries_vehicle(run.folder, find_data_file("ident.vehicle", vehicle))
         _drive_on_fmu(run, order, vehicle if same else str(run.folder.vehicle), fmu)
@@ -134,6 +150,23 @@ def campaign(
     else:
         _drive_on_bus(run, order, bus, ask=not yes, lockstep=lockstep)
     show_next(f"quasiomni identify {out}")
+
+
+def _on_engine(order: Order) -> Order:
+    """The order with the engine of its emulated vehicle, if that is what it is driven on."""
+    return replace(order, engine=choose_engine(order.engine)) if order.prototype else order
+
+
+def _refuse_two_vehicles(
+    bus: str | None, fmu: Path | None, effects: Sequence[Effect], engine: EngineName | None
+) -> None:
+    if bus is not None and (effects or fmu or engine):
+        raise UserError(
+            "--effect, --engine and --plant are of the emulator, and --bus names another vehicle.",
+            "Leave one of them out.",
+        )
+    if fmu is not None and engine is not None:
+        raise UserError("--plant takes the place of the physics engine.", "Leave --engine or --plant out.")
 
 
 def _planned(order: Order) -> Run:
@@ -156,9 +189,13 @@ def _drive_on_emulator(run: Run, order: Order, effects: Sequence[Effect], gui: b
             f"{order.out} was driven on {run.bus}, not on the emulator.", f"Go on with it there: --bus {run.bus}."
         )
     emulation = load_emulation()
+    engine = choose_engine(run.engine) if order.resume else run.engine
     network = run.network.path
     _say_assumed(emulation.assumed(run.emulated, network))
-    with emulation.bench(run.emulated, run.seed, gui, network, effects) as bench, _stop_is_no_error(order.out):
+    with (
+        emulation.bench(run.emulated, run.seed, gui, network, effects, engine=engine) as bench,
+        _stop_is_no_error(order.out),
+    ):
         _drive(run, order, bench.bus, bench.clock, bench.operator)
 
 

@@ -36,6 +36,7 @@ from ident.estimate.identify import identify as identify_record
 from ident.estimate.least_squares import ORDINARY, Estimator
 from ident.estimate.least_squares import LeastSquares as LeastSquares
 from ident.estimate.least_squares import WeightedLeastSquares as WeightedLeastSquares
+from ident.extras import named_engine, require_engine
 from ident.faults import find_faults
 from ident.plant.modes import Mode as Mode
 from ident.plant.simulation import Motion as Motion
@@ -185,19 +186,23 @@ def export_fmu(model: ExtendedModel, vehicle: VehicleDescription, path: str | Pa
 
 
 @contextmanager
-def open_bench(vehicle: str = "prototype", *, seed: int = 0, effects: Sequence[Effect | str] = ()) -> Iterator[Bench]:
+def open_bench(
+    vehicle: str = "prototype", *, seed: int = 0, effects: Sequence[Effect | str] = (), engine: str | None = None
+) -> Iterator[Bench]:
     """An emulated vehicle behind a CAN bus of this process, in lockstep: bus, clock, and hands that lift and lower it.
 
     Args:
         vehicle: shipped prototype by name, or the path of a vehicle file.
         seed: of its noise.
         effects: that it has beyond its file, `name@place=size`.
+        engine: `pybullet` or `mujoco`; None: the first that is installed.
 
     Raises:
-        UserError: a file or an effect cannot be used.
+        UserError: a file, an effect or the engine cannot be used.
     """
     from hil.bench import emulation
 
+    chosen = require_engine(None if engine is None else named_engine(engine), "A bench")
     wanted = [parse_effect(one) if isinstance(one, str) else one for one in effects]
-    with emulation.bench(vehicle, seed, False, network_file_of(vehicle), wanted) as bench:
+    with emulation.bench(vehicle, seed, False, network_file_of(vehicle), wanted, engine=chosen) as bench:
         yield bench

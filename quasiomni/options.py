@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from ident.extras import Extra, require
+from ident.extras import TITLES, EngineName, Extra, require, require_engine
 from ident.vehicle.parameters import Parameters
-from quasiomni.application import errors
+from quasiomni.application import console, errors
 
 if TYPE_CHECKING:
     from ident.effects import Effect  # loads CasADi, which few commands need
@@ -53,6 +53,10 @@ PlantOption = Annotated[
     str | None, typer.Option("--plant", help="`fmu:FILE`: an FMU with torque inputs in place of the physics engine.")
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Take a model that was assessed as unusable all the same.")]
+EngineOption = Annotated[
+    EngineName | None,
+    typer.Option("--engine", help="Physics engine of the emulated vehicle. Default: PyBullet where it is installed."),
+]
 GuiOption = Annotated[bool, typer.Option("--gui", help="Show the emulated vehicle in a window.")]
 
 
@@ -73,7 +77,7 @@ def parse_plant(text: str | None, *, force: bool) -> Path | None:
     """
     if text is None:
         return None
-    require(Extra.EMULATOR, "--plant")
+    require_engine(None, "--plant")
     require(Extra.COSIM, "--plant")
     from hil.cosimulation.assessment import (
         refuse_unusable_fmu,  # needs mathematics that commands around the bus do without
@@ -87,10 +91,21 @@ def parse_plant(text: str | None, *, force: bool) -> Path | None:
 
 def load_emulation() -> ModuleType:
     """The emulated side, loaded only where it is asked for."""
-    require(Extra.EMULATOR, "The emulator")
+    require_engine(None, "The emulator")
     from hil.bench import emulation
 
     return emulation
+
+
+def choose_engine(asked: EngineName | None) -> EngineName:
+    """The engine that was asked for, or the default; says which.
+
+    Raises:
+        UserError: it is not installed.
+    """
+    engine = require_engine(asked, "The emulator")
+    console.print(f"The vehicle is emulated in {TITLES[engine]}.", highlight=False)
+    return engine
 
 
 def require_readers(paths: Iterable[Path]) -> None:

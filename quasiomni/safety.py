@@ -14,7 +14,7 @@ from hil.campaign.folder import network_file_of
 from hil.safety import MasterDeathReport, StopSettings
 from ident.writing import refuse_inputs, write_whole
 from quasiomni.application import app, console
-from quasiomni.options import NetworkOption, SeedOption, load_emulation
+from quasiomni.options import EngineOption, NetworkOption, SeedOption, choose_engine
 
 
 @app.command()
@@ -26,16 +26,17 @@ def safety(
     deceleration: Annotated[float, typer.Option(min=0.05, help="6085h, as that of the vehicle [m/s²].")] = 2.0,
     prototype: Annotated[str, typer.Option(help="`prototype`, `compact`, or the path of your own.")] = "prototype",
     network: NetworkOption = None,
+    engine: EngineOption = None,
     seed: SeedOption = 1,
     out: Annotated[Path | None, typer.Option("--json", help="File for the report.")] = None,
 ) -> None:
     """Let the master die at speed: is the vehicle at rest, after what time and distance? Exit code 1 if not as told."""
-    load_emulation()
+    chosen = choose_engine(engine)
     from hil.safety.emulated import let_master_die
 
     refuse_inputs([out], [Path(prototype), network])
     settings = StopSettings(speed, abort, quick_stop, fault_reaction, deceleration)
-    report = let_master_die(prototype, network or network_file_of(prototype), settings, seed)
+    report = let_master_die(prototype, network or network_file_of(prototype), settings, seed, chosen)
     _show(report)
     if out is not None:
         write_whole(json.dumps(report.to_json(), indent=2, ensure_ascii=False) + "\n", out)

@@ -22,11 +22,13 @@ from quasiomni.application import app, console
 from quasiomni.options import (
     DEFAULT_BUS,
     EffectOption,
+    EngineOption,
     ForceOption,
     GuiOption,
     NetworkOption,
     PlantOption,
     SeedOption,
+    choose_engine,
     load_emulation,
     parse_effects,
     parse_plant,
@@ -68,19 +70,21 @@ def emulate(
     ] = None,
     duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
     effect: EffectOption = None,
+    engine: EngineOption = None,
     plant: PlantOption = None,
     force: ForceOption = False,
     gui: GuiOption = False,
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
-    emulation = load_emulation()
     fmu = parse_plant(plant, force=force)
+    chosen = choose_engine(engine) if fmu is None else None
+    emulation = load_emulation()
     network_file = network or network_file_of(prototype)
     faults = emulation.read_faults(fault or [])
     end = None if duration is None else time.monotonic() + duration
     tell_native(fmu)
     with (
-        emulation.vehicle(prototype, seed, gui, network_file, parse_effects(effect), fmu) as vehicle,
+        emulation.vehicle(prototype, seed, gui, network_file, parse_effects(effect), fmu, chosen) as vehicle,
         emulation.server_bus(bus, load_network(network_file)) as opened,
     ):
         if stand is Stand.JACK:

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import enum
+from collections.abc import Mapping
+from typing import Final
 
 from emulator.as_built import AsBuilt
 from emulator.engine.protocol import Engine, MakeEngine
-
-
-class EngineName(enum.StrEnum):
-    """Names of the engines on the command line and in files."""
-
-    PYBULLET = "pybullet"
+from ident.extras import EngineName
 
 
 def _pybullet(built: AsBuilt, *, step_size: float, gui: bool) -> Engine:
@@ -21,5 +17,11 @@ def _pybullet(built: AsBuilt, *, step_size: float, gui: bool) -> Engine:
     return PyBulletEngine(built, step_size=step_size, gui=gui, settings=settings)
 
 
-ENGINES: dict[EngineName, MakeEngine] = {EngineName.PYBULLET: _pybullet}
+def _mujoco(built: AsBuilt, *, step_size: float, gui: bool) -> Engine:
+    from emulator.engine.mujoco.engine import MuJoCoEngine
+
+    return MuJoCoEngine(built, step_size=step_size, gui=gui)
+
+
+ENGINES: Final[Mapping[EngineName, MakeEngine]] = {EngineName.PYBULLET: _pybullet, EngineName.MUJOCO: _mujoco}
 """What makes each."""

@@ -75,6 +75,9 @@ class Engine(Protocol):
     def twist(self) -> tuple[float, float, float]:
         """(x', y', gamma') of the chassis in its own frame [m/s, m/s, rad/s], of half a step ago."""
 
+    def wheel_loads(self) -> list[float]:
+        """Normal force of the floor on each wheel, fl, rl, fr, rr (4,) [N]."""
+
     def close(self) -> None:
         """Release the physics world."""
 

@@ -19,6 +19,7 @@ from ident.campaign.plan import Plan
 from ident.campaign.reference import STEERING_LOOPS, Reference
 from ident.effects import Effect
 from ident.effects.extended import ExtendedModel
+from ident.extras import EngineName
 from ident.records.record import Step
 
 Array = NDArray[np.float64]
@@ -38,7 +39,14 @@ class Tracking:
 
 
 def track_lane_change(
-    plan: Plan, model: ExtendedModel, *, prototype: str, seed: int, network: Path, effects: Sequence[Effect]
+    plan: Plan,
+    model: ExtendedModel,
+    *,
+    prototype: str,
+    seed: int,
+    network: Path,
+    effects: Sequence[Effect],
+    engine: EngineName | None = None,
 ) -> Tracking:
     """Drive the lane change of a plan over CAN, in lockstep.
 
@@ -49,12 +57,13 @@ def track_lane_change(
         seed: of its noise.
         network: of the vehicle.
         effects: that the vehicle has.
+        engine: of its physics; None: the first that is installed.
     """
     reference = plan.reference(Step.LANE_CHANGE, model.parameters)
     if model.effects:
         reference = with_effects(reference, model, plan.vehicle.geometry)
     with (
-        emulation.bench(prototype, seed, False, network, effects) as bench,
+        emulation.bench(prototype, seed, False, network, effects, engine=engine) as bench,
         steady_memory(),
         Master(bench.bus, bench.clock, load_emulated(prototype, network).network) as master,
     ):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import can
 
+from emulator.engine.choice import ENGINES
 from emulator.firmware.storage import FolderMemory
 from emulator.vehicle import EmulatedVehicle
 from hil.bench.lockstep import LockstepBench
@@ -22,6 +23,7 @@ from hil.faults.fault import FaultError
 from hil.network import Network
 from ident.effects import Effect
 from ident.errors import UserError
+from ident.extras import EngineName, default_engine
 from ident.reading import read_bounded
 
 Plant = EmulatedVehicle | FmuVehicle
@@ -71,16 +73,26 @@ def assumed(prototype: str, network: Path) -> tuple[str, ...]:
 
 @contextmanager
 def vehicle(
-    prototype: str, seed: int, gui: bool, network: Path, effects: Sequence[Effect] = (), fmu: Path | None = None
+    prototype: str,
+    seed: int,
+    gui: bool,
+    network: Path,
+    effects: Sequence[Effect] = (),
+    fmu: Path | None = None,
+    engine: EngineName | None = None,
 ) -> Iterator[Plant]:
     """The emulated prototype with effects, or an FMU with the prototype's drives and encoders; closed at the end.
+
+    Args:
+        engine: None for the default one.
 
     Raises:
         UserError: prototype and network file disagree, an effect or a window is asked of an FMU, or it cannot be run.
     """
     built = load_emulated(prototype, network).prototype
     if fmu is None:
-        with EmulatedVehicle(built, seed=seed, gui=gui, effects=effects) as emulated:
+        make = ENGINES[engine or default_engine()]
+        with EmulatedVehicle(built, seed=seed, gui=gui, make_engine=make, effects=effects) as emulated:
             yield emulated
         return
     if effects or gui:
@@ -93,10 +105,19 @@ def vehicle(
 
 @contextmanager
 def bench(
-    prototype: str, seed: int, gui: bool, network: Path, effects: Sequence[Effect] = (), fmu: Path | None = None
+    prototype: str,
+    seed: int,
+    gui: bool,
+    network: Path,
+    effects: Sequence[Effect] = (),
+    fmu: Path | None = None,
+    engine: EngineName | None = None,
 ) -> Iterator[Bench]:
     """What `vehicle` gives, behind an in-process bus in lockstep."""
-    with vehicle(prototype, seed, gui, network, effects, fmu) as emulated, LockstepBench(emulated, network) as lockstep:
+    with (
+        vehicle(prototype, seed, gui, network, effects, fmu, engine) as emulated,
+        LockstepBench(emulated, network) as lockstep,
+    ):
         yield Bench(lockstep.bus, lockstep.clock, BenchOperator(emulated))
 
 

@@ -41,6 +41,7 @@ from ident.campaign.plan import Plan, assemble_plan
 from ident.campaign.steps import DRIVING_ORDER
 from ident.errors import CampaignError, DataFileError
 from ident.estimate.identify import KnownInertia
+from ident.extras import EngineName
 from ident.reading import read_json
 from ident.vehicle.description import VehicleDescription
 from ident.writing import write_whole
@@ -118,6 +119,7 @@ class Run:
         known_inertia: B_w where it was given.
         payload: mass of the load of the loaded steps [kg].
         demo: it is a demo's, which the next one may replace.
+        engine: physics engine of the emulated prototype, None on a real vehicle.
         opened: it was read from its folder, rather than planned.
     """
 
@@ -130,6 +132,7 @@ class Run:
     known_inertia: KnownInertia | None
     payload: float = 0.0
     demo: bool = False
+    engine: EngineName | None = None
     opened: bool = False
 
     @property
@@ -274,6 +277,7 @@ def _manifest(run: Run) -> dict[str, Any]:
         "cycle": plan.cycle,
         **({"payload": run.payload} if run.payload else {}),
         **({"demo": True} if run.demo else {}),
+        **({"engine": run.engine} if run.engine else {}),
         "steps": list(plan.steps),
         "excitations": {step: excitation_entry(excitation) for step, excitation in plan.excitations.items()},
     }
@@ -320,8 +324,14 @@ def _restore(folder: RunFolder, manifest: Mapping[str, Any], vehicle: VehicleDes
         known_inertia=None if inertia is None else KnownInertia(*inertia),
         payload=float(manifest.get("payload", 0.0)),
         demo=manifest.get("demo") is True,
+        engine=_engine(manifest),
         opened=True,
     )
+
+
+def _engine(manifest: Mapping[str, Any]) -> EngineName | None:
+    """Of an emulated vehicle; runs of before there was a choice say none."""
+    return EngineName(manifest.get("engine", EngineName.PYBULLET)) if manifest["prototype"] else None
 
 
 def excitation_of(entry: Mapping[str, Any]) -> Excitation:

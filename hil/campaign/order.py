@@ -23,6 +23,7 @@ from ident.campaign.plan import make_plan
 from ident.campaign.steps import DIAGNOSTIC
 from ident.errors import CampaignError
 from ident.estimate.identify import KnownInertia
+from ident.extras import EngineName
 from ident.vehicle.description import find_data_file
 
 
@@ -42,6 +43,7 @@ class Order:
         payload: mass of the load of the loaded steps [kg].
         resume: go on with the run that is there.
         demo: what an earlier demo has left in the folder goes.
+        engine: physics engine of the emulated prototype, None on a real vehicle.
     """
 
     out: Path
@@ -57,6 +59,7 @@ class Order:
     payload: float = 0.0
     resume: bool = False
     demo: bool = False
+    engine: EngineName | None = None
 
 
 Planned = Callable[[int, int], None]
@@ -97,6 +100,7 @@ def plan_run(order: Order, planned: Planned = _unheard) -> Run:
         order.known_inertia,
         order.payload,
         order.demo,
+        order.engine,
     )
 
 
@@ -122,6 +126,7 @@ def refuse_changed(run: Run, order: Order, given: Collection[str]) -> None:
         "b_w_std": lambda: order.known_inertia != run.known_inertia,
         "periods": lambda: order.periods != run.plan.periods,
         "seed": lambda: order.seed != run.seed,
+        "engine": lambda: order.engine != run.engine,
     }
     different = [name for name, differs in changed.items() if name in given and differs()]
     if different:

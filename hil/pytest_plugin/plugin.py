@@ -28,7 +28,14 @@ _WORLD: Final[pytest.StashKey[World]] = pytest.StashKey()
 _ARTIFACTS: Final[pytest.StashKey[Artifacts]] = pytest.StashKey()
 _ALLOWED: Final[pytest.StashKey[set[Symptom]]] = pytest.StashKey()
 _FAILED: Final[pytest.StashKey[bool]] = pytest.StashKey()
-_CHOICES: Final = {"prototype": "prototype", "network": None, "seed": 1, "delays": False, "noise": 1.0}
+_CHOICES: Final = {
+    "prototype": "prototype",
+    "network": None,
+    "seed": 1,
+    "delays": False,
+    "noise": 1.0,
+    "engine": None,
+}
 """What the marker can say, and what holds where it does not."""
 
 
@@ -36,6 +43,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Where recordings go, and which tests leave them."""
     group = parser.getgroup("hil", "hardware in the loop")
     group.addoption("--hil-artifacts", default="hil-artifacts", help="Folder for recordings and timelines.")
+    group.addoption("--hil-engine", help="Physics engine: pybullet or mujoco. Default: the first that is installed.")
     group.addoption(
         "--hil-keep", choices=("failed", "all"), default="failed", help="Which tests leave a recording and a timeline."
     )
@@ -68,11 +76,18 @@ def pytest_runtest_makereport(
 @pytest.fixture
 def vehicle(request: pytest.FixtureRequest) -> Iterator[EmulatedVehicle]:
     """An emulated vehicle on the floor, at rest; the marker `hil` says which."""
+    from emulator.engine.choice import ENGINES
     from emulator.vehicle import EmulatedVehicle
+    from ident.extras import named_engine, require_engine
 
     asked = _asked(request)
+    named = asked["engine"] or request.config.getoption("--hil-engine")
+    engine = require_engine(None if named is None else named_engine(named), "The fixture `vehicle`")
     with EmulatedVehicle(
-        _emulated(asked).prototype, seed=int(asked["seed"]), noise_scale=float(asked["noise"])
+        _emulated(asked).prototype,
+        seed=int(asked["seed"]),
+        noise_scale=float(asked["noise"]),
+        make_engine=ENGINES[engine],
     ) as emulated:
         yield emulated
 

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from emulator.engine.pybullet.window import require_display
+from emulator.engine.display import require_display
 from emulator.noise import Disturbances
 from emulator.prototype import Prototype, load_prototype
 from emulator.vehicle import EmulatedVehicle

@@ -12,8 +12,9 @@ from typing import Any, Final
 import pybullet
 
 from emulator.as_built import AsBuilt
+from emulator.engine.layout import JOINTS, joint_coulomb, planar_twist
 from emulator.engine.protocol import STAND_CLEARANCE
-from emulator.engine.pybullet.urdf import generate_urdf, rolling_joint, steering_joint
+from emulator.engine.pybullet.urdf import generate_urdf
 from emulator.engine.pybullet.window import open_window
 from ident.vehicle.geometry import WHEELS
 from ident.vehicle.quantities import GRAVITY
@@ -23,6 +24,9 @@ _ROLLING: Final = 4
 _FLOOR: Final = 0
 _LATERAL_FRICTION: Final = 1
 """Where `getDynamicsInfo` has it."""
+_LINK_OF_CONTACT: Final = 3
+_NORMAL_FORCE: Final = 9
+"""Where `getContactPoints` has them."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +80,7 @@ class PyBulletEngine:
         self.step_size = step_size
         self._settings = settings
         self.build(built)
-        truth = self._prototype.truth
-        self.coulomb = [truth[symbol] / 2 for symbol in ("d_cl", "d_cl", "d_cr", "d_cr")]
-        self.coulomb += [truth["d_cw"]] * 4
+        self.coulomb = joint_coulomb(built.prototype.truth)
         self.client = open_window() if gui else pybullet.connect(pybullet.DIRECT)
         self.place(on_stand=False, angles=[0.0] * 8)
 
@@ -102,8 +104,7 @@ class PyBulletEngine:
         lift = STAND_CLEARANCE if on_stand else -self._deflection()
         self.body = self._load(self._prototype.body.centre_height + lift, on_stand)
         by_name = self._joint_indices()
-        names = [steering_joint(wheel) for wheel in WHEELS] + [rolling_joint(wheel) for wheel in WHEELS]
-        self.joints = [by_name[name] for name in names]
+        self.joints = [by_name[name] for name in JOINTS]
         self._set_surfaces()
         for side, front in enumerate((0, 2)):
             if self._built.couplings[side] is None:
@@ -190,11 +191,15 @@ class PyBulletEngine:
 
     def twist(self) -> tuple[float, float, float]:
         """(x', y', gamma') of the chassis in its own frame [m/s, m/s, rad/s], of half a step ago."""
-        (vx, vy, _), (_, _, yaw_rate) = self.base_velocity()
-        _, (_, _, qz, qw) = self.base_pose()
-        heading = 2 * math.atan2(qz, qw)
-        cosine, sine = math.cos(heading), math.sin(heading)
-        return cosine * vx + sine * vy, cosine * vy - sine * vx, yaw_rate
+        linear, angular = self.base_velocity()
+        return planar_twist(linear, angular[2], self.base_pose()[1])
+
+    def wheel_loads(self) -> list[float]:
+        """Normal force of the floor on each wheel (4,) [N]."""
+        loads = [0.0] * len(WHEELS)
+        for contact in pybullet.getContactPoints(self.body, physicsClientId=self.client):
+            loads[self.joints.index(contact[_LINK_OF_CONTACT]) - _ROLLING] += contact[_NORMAL_FORCE]
+        return loads
 
     def close(self) -> None:
         """Disconnect from the physics world."""

@@ -1,10 +1,7 @@
-"""The vehicle as URDF, generated from the prototype.
+"""The vehicle as URDF, generated from the prototype; joints and frames as `emulator.engine.layout` has them.
 
-Frames: x forward, y left, z up. Link `chassis` with its origin over the centre of the four steering axes; joint
-`steering_<wheel>` about z at each corner; joint `rolling_<wheel>` about the wheel's axle (y of the knuckle),
-positive when the wheel rolls forward. The wheel touches the floor as a sphere: one contact point,
-exactly below the wheel's centre at distance r whatever the load, which is the point contact that the
-constraints (1) assume. What one sees is a cylinder.
+The wheel touches the floor as a sphere: one contact point, exactly below the wheel's centre at distance r whatever the
+load, which is the point contact that the constraints (1) assume. What one sees is a cylinder with a spoke.
 """
 
 from __future__ import annotations
@@ -14,36 +11,27 @@ from collections.abc import Iterator
 from typing import Final
 
 from emulator.as_built import AsBuilt, WheelBuild
+from emulator.engine.layout import (
+    BODY_COLOUR,
+    KNUCKLE_COLOUR,
+    MARK_COLOUR,
+    TYRE_COLOUR,
+    TYRE_WIDTH_RATIO,
+    axle,
+    body_lift,
+    corner,
+    rolling_joint,
+    steering_joint,
+    tyre_centre,
+)
 from emulator.prototype import Prototype
 from emulator.rigid_bodies import RigidBody
 from ident.vehicle.geometry import WHEELS
-
-SIDE_SIGN: Final = {"fl": 1.0, "rl": 1.0, "fr": -1.0, "rr": -1.0}
-"""+1 left, -1 right."""
-END_SIGN: Final = {"fl": 1.0, "rl": -1.0, "fr": 1.0, "rr": -1.0}
-"""+1 front, -1 rear."""
 
 LINK_ORDER: Final = ("fl", "rl", "rr", "fr")
 """Order of the wheels in the file, once around the vehicle. The engine relaxes contacts in this order: side by
 side, what the iteration leaves over pushes the vehicle a tenth of a millimetre during one steering step;
 around the vehicle it cancels to micrometres."""
-
-TYRE_WIDTH_RATIO: Final = 0.5
-"""Width of the tyre that one sees over the wheel radius."""
-
-_BODY_COLOUR: Final = "0.85 0.45 0.10 1"
-_KNUCKLE_COLOUR: Final = "0.55 0.57 0.60 1"
-_TYRE_COLOUR: Final = "0.12 0.12 0.13 1"
-
-
-def steering_joint(wheel: str) -> str:
-    """Name of the steering joint of a wheel."""
-    return f"steering_{wheel}"
-
-
-def rolling_joint(wheel: str) -> str:
-    """Name of the rolling joint of a wheel."""
-    return f"rolling_{wheel}"
 
 
 def generate_urdf(built: AsBuilt) -> str:
@@ -70,10 +58,10 @@ def _inertial(body: RigidBody) -> str:
     )
 
 
-def _visual(shape: str, colour: str, name: str, xyz: str = "0 0 0", rpy: str = "0 0 0") -> str:
+def _visual(shape: str, colour: tuple[float, ...], name: str, xyz: str = "0 0 0", rpy: str = "0 0 0") -> str:
     return (
         f'<visual><origin xyz="{xyz}" rpy="{rpy}"/><geometry>{shape}</geometry>'
-        f'<material name="{name}"><color rgba="{colour}"/></material></visual>'
+        f'<material name="{name}"><color rgba="{_vector(*colour)}"/></material></visual>'
     )
 
 
@@ -82,41 +70,35 @@ def _chassis(prototype: Prototype) -> Iterator[str]:
     box = f'<box size="{_vector(body.length, body.width, body.height)}"/>'
     yield '<link name="chassis">'
     yield _inertial(prototype.rigid_bodies.chassis)
-    # Seen above the wheels; the mass stays where it is.
-    lift = 2 * prototype.geometry.wheel_radius + body.height / 2 - body.centre_height
-    yield _visual(box, _BODY_COLOUR, "body", xyz=_vector(0, 0, lift))
+    yield _visual(box, BODY_COLOUR, "body", xyz=_vector(0, 0, body_lift(prototype)))
     yield "</link>"
 
 
 def _knuckle(prototype: Prototype, wheel: str, body: RigidBody) -> Iterator[str]:
     geometry = prototype.geometry
-    corner = _vector(
-        END_SIGN[wheel] * geometry.wheelbase / 2,
-        SIDE_SIGN[wheel] * geometry.track_width / 2,
-        geometry.wheel_radius - prototype.body.centre_height,
-    )
     limit = f"{geometry.steering_limit:.17g}"
     radius, length = _vector(geometry.wheel_radius / 4), _vector(2 * geometry.wheel_radius)
-    post = _visual(f'<cylinder radius="{radius}" length="{length}"/>', _KNUCKLE_COLOUR, "knuckle")
+    post = _visual(f'<cylinder radius="{radius}" length="{length}"/>', KNUCKLE_COLOUR, "knuckle")
     yield f'<link name="knuckle_{wheel}">{_inertial(body)}{post}</link>'
     yield f'<joint name="{steering_joint(wheel)}" type="revolute">'
     yield f'<parent link="chassis"/><child link="knuckle_{wheel}"/>'
-    yield f'<origin xyz="{corner}"/><axis xyz="0 0 1"/>'
+    yield f'<origin xyz="{_vector(*corner(prototype, wheel))}"/><axis xyz="0 0 1"/>'
     yield f'<limit lower="-{limit}" upper="{limit}" effort="0" velocity="0"/></joint>'
 
 
 def _wheel(prototype: Prototype, wheel: str, build: WheelBuild) -> Iterator[str]:
     geometry = prototype.geometry
     radius = f"{build.radius:.17g}"
-    width = _vector(TYRE_WIDTH_RATIO * geometry.wheel_radius)
-    tyre = f'<cylinder radius="{radius}" length="{width}"/>'
-    # The axle of a larger wheel sits higher, so that all four wheels stand on the floor alike.
-    offset = _vector(0, SIDE_SIGN[wheel] * geometry.wheel_offset, build.radius - geometry.wheel_radius)
-    # Turned by beta about the axle, the centre stands eccentricity cos(beta + phase) below it.
-    centre = _vector(-build.eccentricity * math.sin(build.phase), 0, -build.eccentricity * math.cos(build.phase))
+    centre = tyre_centre(build)
+    half_width = TYRE_WIDTH_RATIO * geometry.wheel_radius / 2
+    tyre = f'<cylinder radius="{radius}" length="{_vector(2 * half_width)}"/>'
+    spoke = f'<box size="{_vector(build.radius / 5, 2.04 * half_width, 0.96 * build.radius)}"/>'
+    in_spoke = _vector(centre[0], 0, centre[2] + build.radius / 2)
     yield f'<link name="wheel_{wheel}">{_inertial(build.body)}'
-    yield _visual(tyre, _TYRE_COLOUR, "tyre", xyz=centre, rpy=_vector(math.pi / 2, 0, 0))
-    yield f'<collision><origin xyz="{centre}"/><geometry><sphere radius="{radius}"/></geometry></collision></link>'
+    yield _visual(tyre, TYRE_COLOUR, "tyre", xyz=_vector(*centre), rpy=_vector(math.pi / 2, 0, 0))
+    yield _visual(spoke, MARK_COLOUR, "mark", xyz=in_spoke)
+    yield f'<collision><origin xyz="{_vector(*centre)}"/><geometry><sphere radius="{radius}"/></geometry></collision>'
+    yield "</link>"
     yield f'<joint name="{rolling_joint(wheel)}" type="continuous">'
     yield f'<parent link="knuckle_{wheel}"/><child link="wheel_{wheel}"/>'
-    yield f'<origin xyz="{offset}"/><axis xyz="0 1 0"/></joint>'
+    yield f'<origin xyz="{_vector(*axle(prototype, wheel, build))}"/><axis xyz="0 1 0"/></joint>'

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
-import sys
-from collections.abc import Mapping
 
 import pybullet
 
-from ident.errors import UserError
+from emulator.engine.display import require_display
 
 
 def open_window() -> int:
@@ -22,15 +20,3 @@ def open_window() -> int:
     pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=client)
     pybullet.resetDebugVisualizerCamera(3.0, 40.0, -35.0, [0.0, 0.0, 0.0], physicsClientId=client)
     return client
-
-
-def require_display(environment: Mapping[str, str]) -> None:
-    """Refuse a window where the environment names no display; the engine would end the whole process.
-
-    Raises:
-        UserError: Linux without DISPLAY.
-    """
-    if sys.platform == "linux" and not environment.get("DISPLAY"):
-        raise UserError(
-            "There is no display to show the vehicle on.", "Run without --gui, or set DISPLAY to an X server."
-        )

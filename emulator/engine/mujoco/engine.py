@@ -1,0 +1,221 @@
+"""The vehicle in MuJoCo."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from emulator.as_built import AsBuilt
+from emulator.engine.layout import JOINTS, joint_coulomb, planar_twist
+from emulator.engine.mujoco.mjcf import DEFAULT_SOLVER, SolverSettings, generate_mjcf, overlap
+from emulator.engine.protocol import STAND_CLEARANCE
+from ident.vehicle.geometry import WHEELS
+
+_FRONT_OF_SIDE = (0, 2)
+_ROLLING = 4
+_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+class MuJoCoEngine:
+    """An `emulator.engine.protocol.Engine`.
+
+    MuJoCo integrates by semi-implicit Euler: a step's velocities are those of the middle of the step, its positions
+    those of the end. Dry friction of a joint is a constraint of limited torque that stops it, `frictionloss`.
+
+    Args:
+        built: the vehicle.
+        step_size: [s].
+        gui: show it in a window.
+        settings: of solver and contacts.
+
+    Attributes:
+        model, data: MuJoCo's own, for tests, pictures and benchmarks.
+
+    Raises:
+        UserError: a window is asked for where there is no display.
+    """
+
+    model: Any
+    data: Any
+
+    def __init__(
+        self, built: AsBuilt, *, step_size: float, gui: bool, settings: SolverSettings = DEFAULT_SOLVER
+    ) -> None:
+        self.step_size = step_size
+        self._settings = settings
+        self._viewer: Any = None
+        self._gui = gui
+        self.build(built)
+        self.coulomb = joint_coulomb(built.prototype.truth)
+        self.place(on_stand=False, angles=[0.0] * 8)
+
+    def build(self, built: AsBuilt) -> None:
+        """Build the vehicle so the next time that it is placed."""
+        self._built = built
+        self._prototype = built.prototype
+
+    def place(self, *, on_stand: bool, angles: Sequence[float]) -> None:
+        """Put the vehicle at rest at the origin, on the floor or on the jack-stand.
+
+        Args:
+            on_stand: chassis held, wheels in the air.
+            angles: (8,) joint angles [rad].
+        """
+        text = generate_mjcf(self._built, step_size=self.step_size, on_stand=on_stand, settings=self._settings)
+        self.model = mujoco.MjModel.from_xml_string(text)
+        self.data = mujoco.MjData(self.model)
+        self._dry = self.model.pair_friction.copy()
+        self._give_tyres_their_stiffness()
+        joints = [self.model.joint(name) for name in JOINTS]
+        self._at = np.array([joint.qposadr[0] for joint in joints])
+        self._dof = np.array([joint.dofadr[0] for joint in joints])
+        self._chassis = int(self.model.body("chassis").id)
+        height = self._prototype.body.centre_height + (STAND_CLEARANCE if on_stand else -overlap(self._prototype) / 2)
+        self._base: tuple[float, float, float] | None = (0.0, 0.0, height) if on_stand else None
+        if on_stand:
+            self.model.body_pos[self._chassis, 2] = height
+        else:
+            self.data.qpos[2] = height
+        self.data.qpos[self._at] = angles
+        self.set_friction(self.coulomb)
+        mujoco.mj_forward(self.model, self.data)
+        self._pushed = False
+        self._read()
+        self._previous = self._rates
+        self._show()
+
+    def step(self, torques: Sequence[float]) -> None:
+        """One engine step under the joint torques (8,) [Nm]."""
+        data = self.data
+        data.qfrc_applied[self._dof] = torques
+        mujoco.mj_step(self.model, data)
+        if self._pushed:
+            data.xfrc_applied[self._chassis] = 0.0
+            self._pushed = False
+        self._previous = self._rates
+        self._read()
+        if self._viewer is not None:
+            self._viewer.sync()
+
+    def set_friction(self, torques: Sequence[float]) -> None:
+        """Largest torque of the dry friction in each joint from now on (8,) [Nm]."""
+        self.model.dof_frictionloss[self._dof] = torques
+
+    def set_ground(self, wheel: int, friction: float | None) -> None:
+        """Give a wheel (fl, rl, fr, rr: 0 to 3) ground of another friction coefficient [-]; None is that of before."""
+        pair = self.model.pair(WHEELS[wheel]).id
+        self.model.pair_friction[pair, :2] = self._dry[pair, :2] if friction is None else friction
+
+    def push(self, force: tuple[float, float, float]) -> None:
+        """A force on the chassis in its own frame, at its centre of mass, for the next step [N]."""
+        if self._base is None:
+            turned = np.zeros(3)
+            mujoco.mju_rotVecQuat(turned, np.array(force), self.data.qpos[3:7])
+            self.data.xfrc_applied[self._chassis, :3] += turned
+            self._pushed = True
+
+    def angles(self) -> list[float]:
+        """(8,) joint angles [rad]."""
+        return list(self._angles)
+
+    def mean_rates(self) -> list[float]:
+        """(8,) joint rates over the last step, that is half a step ago [rad/s]."""
+        return list(self._rates)
+
+    def rates(self) -> list[float]:
+        """(8,) joint rates now [rad/s], extrapolated to second order from the last two steps."""
+        return [1.5 * now - 0.5 * before for now, before in zip(self._rates, self._previous, strict=True)]
+
+    def steering_angle(self, side: int) -> float:
+        """Steering angle of the front wheel of a side (0 left, 1 right) [rad]."""
+        return self._angles[_FRONT_OF_SIDE[side]]
+
+    def wheel_angle(self, wheel: int) -> float:
+        """Rolling angle of a wheel [rad], unbounded."""
+        return self._angles[_ROLLING + wheel]
+
+    def wheel_rate(self, wheel: int) -> float:
+        """Rolling rate of a wheel now [rad/s]."""
+        joint = _ROLLING + wheel
+        return 1.5 * self._rates[joint] - 0.5 * self._previous[joint]
+
+    def base_pose(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Position [m] of the centre and orientation quaternion (x, y, z, w) of the chassis in the world."""
+        if self._base is not None:
+            return self._base, (0.0, 0.0, 0.0, 1.0)
+        x, y, z, qw, qx, qy, qz = self.data.qpos[:7].tolist()
+        return (x, y, z), (qx, qy, qz, qw)
+
+    def base_velocity(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Linear [m/s] and angular [rad/s] velocity of the chassis in the world, over the last step."""
+        if self._base is not None:
+            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        turned = np.zeros(3)
+        mujoco.mju_rotVecQuat(turned, self.data.qvel[3:6], self.data.qpos[3:7])
+        return tuple(self.data.qvel[:3].tolist()), tuple(turned.tolist())
+
+    def twist(self) -> tuple[float, float, float]:
+        """(x', y', gamma') of the chassis in its own frame [m/s, m/s, rad/s], of half a step ago."""
+        linear, angular = self.base_velocity()
+        return planar_twist(linear, angular[2], self.base_pose()[1])
+
+    def wheel_loads(self) -> list[float]:
+        """Normal force of the floor on each wheel (4,) [N]."""
+        loads, force = [0.0] * 4, np.zeros(6)
+        tyres = [self.model.geom(f"tyre_{wheel}").id for wheel in WHEELS]
+        for index in range(self.data.ncon):
+            mujoco.mj_contactForce(self.model, self.data, index, force)
+            loads[tyres.index(int(self.data.contact[index].geom2))] += float(force[0])
+        return loads
+
+    def save(self) -> NDArray[np.float64]:
+        """Everything that the next steps depend on; `restore` goes on from it bit by bit."""
+        state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, self.data, state, _STATE)
+        friction = (self.model.dof_frictionloss[self._dof], self.model.pair_friction.ravel())
+        return np.concatenate([state, self._previous, *friction])
+
+    def restore(self, saved: NDArray[np.float64]) -> None:
+        """Go on from what `save` gave, of a vehicle that was built and placed alike."""
+        size = mujoco.mj_stateSize(self.model, _STATE)
+        mujoco.mj_setState(self.model, self.data, saved[:size], _STATE)
+        self._read()
+        self._previous = saved[size : size + 8].tolist()
+        self.set_friction(saved[size + 8 : size + 16].tolist())
+        self.model.pair_friction[:] = saved[size + 16 :].reshape(self.model.pair_friction.shape)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._viewer is not None:
+            self._viewer.close()
+            self._viewer = None
+
+    def _read(self) -> None:
+        self._angles: list[float] = self.data.qpos[self._at].tolist()
+        self._rates: list[float] = self.data.qvel[self._dof].tolist()
+
+    def _give_tyres_their_stiffness(self) -> None:
+        """Make the contact normal a spring and a damper of the tyre's stiffness.
+
+        MuJoCo's constraint gives f = (-b v - k d r - a) / R with R = (1 - d) / d times the inverse mass A that it
+        estimates of the two bodies, and in the direct format of `solref` k = k' / d^2, b = b' / d. So
+        k' = (1 - d) A K makes it a spring K; what -a / R adds is an inertia along the normal alone.
+        """
+        tyre, give = self._prototype.tyre, 1 - self._settings.contact_impedance
+        damping = 2 * tyre.damping_ratio * math.sqrt(tyre.stiffness * self._prototype.truth["m_ch"] / 4)
+        for wheel in WHEELS:
+            inverse_mass = self.model.body_invweight0[self.model.body(f"wheel_{wheel}").id, 0]
+            reference = [-give * inverse_mass * tyre.stiffness, -give * inverse_mass * damping]
+            self.model.pair_solref[self.model.pair(wheel).id] = reference
+
+    def _show(self) -> None:
+        if self._gui:
+            from emulator.engine.mujoco.window import open_window
+
+            self.close()
+            self._viewer = open_window(self.model, self.data)
