@@ -41,48 +41,49 @@ from hil.network import load_network
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import ORDER, PERIODS
 from ident.estimate.identify import identify
+from ident.extras import EngineName, default_engine, named_engine
 from ident.records.record import Step
 from ident.vehicle.description import find_data_file, load_vehicle
 
 
-def drive(name: str, seed: int, folder: Path) -> None:
+def drive(name: str, seed: int, folder: Path, engine: EngineName) -> None:
     """One campaign on the emulator, into a run folder."""
     vehicle, network_file = load_vehicle(name), network_file_of(name)
     network = load_network(network_file)
     steps = [step for step in ORDER if step is not Step.LATERAL]
     generator = np.random.default_rng(seed)
     plan = make_plan(vehicle, generator, steps=steps, periods=PERIODS, cycle=network.cycle_period)
-    run = Run(RunFolder(folder), plan, network, seed, "emulator, in lockstep", name, None)
+    run = Run(RunFolder(folder), plan, network, seed, "emulator, in lockstep", name, None, engine=engine)
     create_run(run, find_data_file("ident.vehicle", name))
-    with emulation.bench(name, seed, False, network_file) as bench:
+    with emulation.bench(name, seed, False, network_file, engine=engine) as bench:
         recorder = Recorder(run.folder.frames)
         CampaignRunner(run, bench.bus, bench.clock, recorder, bench.operator, lambda *_: None).drive()
         recorder.close()
 
 
-def driven(runs: Path, name: str, seed: int) -> Path:
+def driven(runs: Path, name: str, seed: int, engine: EngineName) -> Path:
     """The run folder of a seed, driven now if there is none."""
     folder = runs / f"{name}_{seed}"
     if not folder.is_dir():
         unfinished = runs / f".{name}_{seed}"
         shutil.rmtree(unfinished, ignore_errors=True)
-        drive(name, seed, unfinished)
+        drive(name, seed, unfinished, engine)
         unfinished.rename(folder)
     return folder
 
 
-def outcome(runs: Path, name: str, seed: int) -> Outcome:
+def outcome(runs: Path, name: str, engine: EngineName, seed: int) -> Outcome:
     """One campaign, identified from its recorded frames."""
-    folder = driven(runs, name, seed)
+    folder = driven(runs, name, seed, engine)
     return outcome_of(seed, identify(read_run(folder), load_vehicle(name).geometry))
 
 
-def outcomes(runs: Path, name: str, seeds: Sequence[int], jobs: int) -> list[Outcome]:
+def outcomes(runs: Path, name: str, seeds: Sequence[int], jobs: int, engine: EngineName) -> list[Outcome]:
     """All seeds of a vehicle; without jobs, those that are there."""
     if jobs == 0:
-        return [outcome(runs, name, seed) for seed in seeds if (runs / f"{name}_{seed}").is_dir()]
+        return [outcome(runs, name, engine, seed) for seed in seeds if (runs / f"{name}_{seed}").is_dir()]
     with ProcessPoolExecutor(jobs) as pool:
-        return list(pool.map(partial(outcome, runs, name), seeds))
+        return list(pool.map(partial(outcome, runs, name, engine), seeds))
 
 
 def print_vehicle(name: str, found: Sequence[Outcome], rows: Sequence[Accuracy]) -> None:
@@ -119,12 +120,15 @@ def main() -> None:
     parser.add_argument("--seeds", nargs=2, type=int, default=(5000, 5029), metavar=("FIRST", "LAST"))
     parser.add_argument("--jobs", type=int, default=2, help="campaigns at once; 0 drives none")
     parser.add_argument("--runs", type=Path, default=Path("runs/accuracy"), help="where run folders are kept")
+    parser.add_argument(
+        "--engine", type=named_engine, default=default_engine(), help="physics of seeds that are missing"
+    )
     arguments = parser.parse_args()
     arguments.runs.mkdir(parents=True, exist_ok=True)
     seeds = range(arguments.seeds[0], arguments.seeds[1] + 1)
     tables = []
     for name in arguments.vehicles:
-        found = outcomes(arguments.runs, name, seeds, arguments.jobs)
+        found = outcomes(arguments.runs, name, seeds, arguments.jobs, arguments.engine)
         tables.append(accuracy(found, truth_of(name)))
         print_vehicle(name, found, tables[-1])
     print_coverage(coverages(tables))

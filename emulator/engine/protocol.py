@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from emulator.as_built import AsBuilt
+from emulator.rigid_bodies import RigidBody
 
 STAND_CLEARANCE = 0.05
 """Height of the wheels above the floor on the jack-stand [m]."""
@@ -75,8 +76,14 @@ class Engine(Protocol):
     def twist(self) -> tuple[float, float, float]:
         """(x', y', gamma') of the chassis in its own frame [m/s, m/s, rad/s], of half a step ago."""
 
-    def wheel_loads(self) -> list[float]:
-        """Normal force of the floor on each wheel, fl, rl, fr, rr (4,) [N]."""
+    def floor_forces(self) -> list[tuple[float, float]]:
+        """Normal and friction force of the floor on each wheel, fl, rl, fr, rr (4,) [N, N]."""
+
+    def bodies(self) -> Mapping[str, RigidBody]:
+        """Chassis, knuckles and wheels as the engine holds them: mass, centre of mass in the world now, inertias."""
+
+    def steering_stops(self) -> list[tuple[float, float]]:
+        """Smallest and largest steering angle of each unit, fl, rl, fr, rr (4,) [rad]."""
 
     def close(self) -> None:
         """Release the physics world."""

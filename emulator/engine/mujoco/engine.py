@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -14,6 +14,7 @@ from emulator.as_built import AsBuilt
 from emulator.engine.layout import JOINTS, joint_coulomb, planar_twist
 from emulator.engine.mujoco.mjcf import DEFAULT_SOLVER, SolverSettings, generate_mjcf, overlap
 from emulator.engine.protocol import STAND_CLEARANCE
+from emulator.rigid_bodies import RigidBody
 from ident.vehicle.geometry import WHEELS
 
 _FRONT_OF_SIDE = (0, 2)
@@ -71,9 +72,11 @@ class MuJoCoEngine:
         self.data = mujoco.MjData(self.model)
         self._dry = self.model.pair_friction.copy()
         self._give_tyres_their_stiffness()
-        joints = [self.model.joint(name) for name in JOINTS]
-        self._at = np.array([joint.qposadr[0] for joint in joints])
-        self._dof = np.array([joint.dofadr[0] for joint in joints])
+        # A unit's steering joint comes before its rolling joint, and both behind what floats: views, made once.
+        self._joint_torques = self.data.qfrc_applied[-8:]
+        self._joint_angles = self.data.qpos[-8:]
+        self._joint_rates = self.data.qvel[-8:]
+        self._joint_friction = self.model.dof_frictionloss[-8:]
         self._chassis = int(self.model.body("chassis").id)
         height = self._prototype.body.centre_height + (STAND_CLEARANCE if on_stand else -overlap(self._prototype) / 2)
         self._base: tuple[float, float, float] | None = (0.0, 0.0, height) if on_stand else None
@@ -81,7 +84,7 @@ class MuJoCoEngine:
             self.model.body_pos[self._chassis, 2] = height
         else:
             self.data.qpos[2] = height
-        self.data.qpos[self._at] = angles
+        self._joint_angles[:] = _by_unit(angles)
         self.set_friction(self.coulomb)
         mujoco.mj_forward(self.model, self.data)
         self._pushed = False
@@ -91,11 +94,10 @@ class MuJoCoEngine:
 
     def step(self, torques: Sequence[float]) -> None:
         """One engine step under the joint torques (8,) [Nm]."""
-        data = self.data
-        data.qfrc_applied[self._dof] = torques
-        mujoco.mj_step(self.model, data)
+        self._joint_torques[:] = _by_unit(torques)
+        mujoco.mj_step(self.model, self.data)
         if self._pushed:
-            data.xfrc_applied[self._chassis] = 0.0
+            self.data.xfrc_applied[self._chassis] = 0.0
             self._pushed = False
         self._previous = self._rates
         self._read()
@@ -104,7 +106,7 @@ class MuJoCoEngine:
 
     def set_friction(self, torques: Sequence[float]) -> None:
         """Largest torque of the dry friction in each joint from now on (8,) [Nm]."""
-        self.model.dof_frictionloss[self._dof] = torques
+        self._joint_friction[:] = _by_unit(torques)
 
     def set_ground(self, wheel: int, friction: float | None) -> None:
         """Give a wheel (fl, rl, fr, rr: 0 to 3) ground of another friction coefficient [-]; None is that of before."""
@@ -164,21 +166,38 @@ class MuJoCoEngine:
         linear, angular = self.base_velocity()
         return planar_twist(linear, angular[2], self.base_pose()[1])
 
-    def wheel_loads(self) -> list[float]:
-        """Normal force of the floor on each wheel (4,) [N]."""
-        loads, force = [0.0] * 4, np.zeros(6)
+    def floor_forces(self) -> list[tuple[float, float]]:
+        """Normal and friction force of the floor on each wheel (4,) [N, N]."""
+        forces, force = [(0.0, 0.0)] * len(WHEELS), np.zeros(6)
         tyres = [self.model.geom(f"tyre_{wheel}").id for wheel in WHEELS]
         for index in range(self.data.ncon):
             mujoco.mj_contactForce(self.model, self.data, index, force)
-            loads[tyres.index(int(self.data.contact[index].geom2))] += float(force[0])
-        return loads
+            normal, one, other = force[:3].tolist()
+            forces[tyres.index(int(self.data.contact[index].geom2))] = (normal, math.hypot(one, other))
+        return forces
+
+    def bodies(self) -> Mapping[str, RigidBody]:
+        """Chassis, knuckles and wheels: mass, centre of mass in the world, inertias."""
+        model, data = self.model, self.data
+        mujoco.mj_comPos(model, data)
+        return {
+            model.body(index).name: RigidBody(
+                float(model.body_mass[index]),
+                tuple(data.xipos[index].tolist()),
+                tuple(model.body_inertia[index].tolist()),
+            )
+            for index in range(1, model.nbody)
+        }
+
+    def steering_stops(self) -> list[tuple[float, float]]:
+        """Smallest and largest steering angle of each unit (4,) [rad]."""
+        return [tuple(self.model.joint(name).range.tolist()) for name in JOINTS[:_ROLLING]]
 
     def save(self) -> NDArray[np.float64]:
         """Everything that the next steps depend on; `restore` goes on from it bit by bit."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        friction = (self.model.dof_frictionloss[self._dof], self.model.pair_friction.ravel())
-        return np.concatenate([state, self._previous, *friction])
+        return np.concatenate([state, self._previous, self._joint_friction, self.model.pair_friction.ravel()])
 
     def restore(self, saved: NDArray[np.float64]) -> None:
         """Go on from what `save` gave, of a vehicle that was built and placed alike."""
@@ -186,7 +205,7 @@ class MuJoCoEngine:
         mujoco.mj_setState(self.model, self.data, saved[:size], _STATE)
         self._read()
         self._previous = saved[size : size + 8].tolist()
-        self.set_friction(saved[size + 8 : size + 16].tolist())
+        self._joint_friction[:] = saved[size + 8 : size + 16]
         self.model.pair_friction[:] = saved[size + 16 :].reshape(self.model.pair_friction.shape)
 
     def close(self) -> None:
@@ -196,8 +215,9 @@ class MuJoCoEngine:
             self._viewer = None
 
     def _read(self) -> None:
-        self._angles: list[float] = self.data.qpos[self._at].tolist()
-        self._rates: list[float] = self.data.qvel[self._dof].tolist()
+        angles, rates = self._joint_angles.tolist(), self._joint_rates.tolist()
+        self._angles: list[float] = angles[0::2] + angles[1::2]
+        self._rates: list[float] = rates[0::2] + rates[1::2]
 
     def _give_tyres_their_stiffness(self) -> None:
         """Make the contact normal a spring and a damper of the tyre's stiffness.
@@ -219,3 +239,9 @@ class MuJoCoEngine:
 
             self.close()
             self._viewer = open_window(self.model, self.data)
+
+
+def _by_unit(values: Sequence[float]) -> Sequence[float]:
+    """Values of the eight joints as MuJoCo has them: steering and rolling of a wheel, then of the next."""
+    sfl, srl, sfr, srr, rfl, rrl, rfr, rrr = values
+    return sfl, rfl, srl, rrl, sfr, rfr, srr, rrr

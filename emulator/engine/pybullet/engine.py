@@ -16,16 +16,24 @@ from emulator.engine.layout import JOINTS, joint_coulomb, planar_twist
 from emulator.engine.protocol import STAND_CLEARANCE
 from emulator.engine.pybullet.urdf import generate_urdf
 from emulator.engine.pybullet.window import open_window
+from emulator.rigid_bodies import RigidBody
 from ident.vehicle.geometry import WHEELS
 from ident.vehicle.quantities import GRAVITY
 
 _FRONT_OF_SIDE: Final = (0, 2)
 _ROLLING: Final = 4
 _FLOOR: Final = 0
+_MASS: Final = 0
 _LATERAL_FRICTION: Final = 1
-"""Where `getDynamicsInfo` has it."""
+_INERTIA: Final = 2
+"""Where `getDynamicsInfo` has them."""
+_LOWER_LIMIT: Final = 8
+_LINK_NAME: Final = 12
+"""Where `getJointInfo` has them."""
 _LINK_OF_CONTACT: Final = 3
 _NORMAL_FORCE: Final = 9
+_ONE_FRICTION: Final = 10
+_OTHER_FRICTION: Final = 12
 """Where `getContactPoints` has them."""
 
 
@@ -194,12 +202,31 @@ class PyBulletEngine:
         linear, angular = self.base_velocity()
         return planar_twist(linear, angular[2], self.base_pose()[1])
 
-    def wheel_loads(self) -> list[float]:
-        """Normal force of the floor on each wheel (4,) [N]."""
-        loads = [0.0] * len(WHEELS)
+    def floor_forces(self) -> list[tuple[float, float]]:
+        """Normal and friction force of the floor on each wheel (4,) [N, N]."""
+        forces = [(0.0, 0.0)] * len(WHEELS)
         for contact in pybullet.getContactPoints(self.body, physicsClientId=self.client):
-            loads[self.joints.index(contact[_LINK_OF_CONTACT]) - _ROLLING] += contact[_NORMAL_FORCE]
-        return loads
+            wheel = self.joints.index(contact[_LINK_OF_CONTACT]) - _ROLLING
+            forces[wheel] = (contact[_NORMAL_FORCE], math.hypot(contact[_ONE_FRICTION], contact[_OTHER_FRICTION]))
+        return forces
+
+    def bodies(self) -> Mapping[str, RigidBody]:
+        """Chassis, knuckles and wheels: mass, centre of mass in the world, inertias."""
+        position, _ = pybullet.getBasePositionAndOrientation(self.body, self.client)
+        centres = {-1: ("chassis", position)}
+        for link in range(pybullet.getNumJoints(self.body, self.client)):
+            name = pybullet.getJointInfo(self.body, link, self.client)[_LINK_NAME].decode()
+            centres[link] = (name, pybullet.getLinkState(self.body, link, physicsClientId=self.client)[0])
+        infos = {link: pybullet.getDynamicsInfo(self.body, link, self.client) for link in centres}
+        return {
+            name: RigidBody(infos[link][_MASS], centre, infos[link][_INERTIA])
+            for link, (name, centre) in centres.items()
+        }
+
+    def steering_stops(self) -> list[tuple[float, float]]:
+        """Smallest and largest steering angle of each unit (4,) [rad]."""
+        infos = (pybullet.getJointInfo(self.body, joint, self.client) for joint in self.joints[:_ROLLING])
+        return [(info[_LOWER_LIMIT], info[_LOWER_LIMIT + 1]) for info in infos]
 
     def close(self) -> None:
         """Disconnect from the physics world."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from emulator.engine.protocol import MakeEngine
 from emulator.prototype import Prototype, load_prototype
 from emulator.vehicle import EmulatedVehicle
 from ident.effects.text import parse_effect
@@ -60,13 +61,14 @@ Make = Callable[..., Moving]
 
 
 @pytest.fixture
-def make() -> Iterator[Make]:
+def make(make_engine: MakeEngine) -> Iterator[Make]:
     """Builds vehicles with effects, on the floor or lifted, drives on."""
     made: list[EmulatedVehicle] = []
 
     def build(*texts: str, name: str = "prototype", lifted: bool = False) -> Moving:
         prototype = load_prototype(name)
-        vehicle = EmulatedVehicle(prototype, seed=1, noise_scale=0.0, effects=[parse_effect(text) for text in texts])
+        effects = [parse_effect(text) for text in texts]
+        vehicle = EmulatedVehicle(prototype, seed=1, noise_scale=0.0, make_engine=make_engine, effects=effects)
         made.append(vehicle)
         if lifted:
             vehicle.lift()

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import pybullet
 import pytest
 
 from ident.vehicle.parameters import PARAMETER_NAMES
@@ -58,18 +57,12 @@ def test_a_changed_parameter_is_the_true_one(make: Make) -> None:
 
 def inertias(vehicle: object) -> tuple[float, np.ndarray, float]:
     """Mass [kg], centre of mass (2,) [m] and yaw inertia about the centre [kg m^2], summed over the engine's bodies."""
-    engine = vehicle.engine
-    position, _ = pybullet.getBasePositionAndOrientation(engine.body, engine.client)
-    places = [(-1, np.array(position))]
-    for link in range(pybullet.getNumJoints(engine.body, engine.client)):
-        state = pybullet.getLinkState(engine.body, link, physicsClientId=engine.client)
-        places.append((link, np.array(state[0])))
     mass, first, second = 0.0, np.zeros(2), 0.0
-    for link, place in places:
-        info = pybullet.getDynamicsInfo(engine.body, link, engine.client)
-        mass += info[0]
-        first += info[0] * place[:2]
-        second += info[2][2] + info[0] * place[:2] @ place[:2]
+    for body in vehicle.engine.bodies().values():
+        place = np.array(body.centre[:2])
+        mass += body.mass
+        first += body.mass * place
+        second += body.inertia[2] + body.mass * place @ place
     return mass, first / mass, second
 
 
@@ -105,9 +98,8 @@ def test_a_load_stands_over_the_centre_wherever_the_centre_of_mass_is(make: Make
 
 def test_a_centre_of_mass_ahead_loads_the_front_wheels(make: Make) -> None:
     moving = make("com_offset@chassis=0.08m")
-    engine = moving.vehicle.engine
-    contacts = pybullet.getContactPoints(engine.body, physicsClientId=engine.client)
-    front = sum(contact[9] for contact in contacts if contact[5][0] > 0)
+    fl, _, fr, _ = moving.vehicle.engine.floor_forces()
+    front = fl[0] + fr[0]
     weight, wheelbase = moving.prototype.truth["m_ch"] * GRAVITY, moving.prototype.geometry.wheelbase
     assert front == pytest.approx(weight * (0.5 + 0.08 / wheelbase), rel=1e-3)
 
@@ -133,7 +125,10 @@ def test_a_larger_wheel_rolls_further_a_turn(make: Make) -> None:
 
 
 def test_an_eccentric_wheel_rolls_on_a_radius_that_changes_with_its_angle(make: Make) -> None:
-    """x' = (r + e cos(beta + phase)) beta', integrated in closed form."""
+    """x' = (r + e cos(beta + phase)) beta', integrated in closed form.
+
+    An engine may let the point of contact move by half of what the tyre gives way: 1e-4 of the radius.
+    """
     e, phase = 1.5e-4, 0.7
     moving = make(f"wheel_eccentricity@wheel_rl={e}m,phase={phase}rad")
     r = moving.prototype.geometry.wheel_radius
@@ -142,7 +137,7 @@ def test_an_eccentric_wheel_rolls_on_a_radius_that_changes_with_its_angle(make: 
         truth = moving.vehicle.ground_truth()
         beta = truth.wheel_angles[1]
         rolled = r * beta + e * (math.sin(beta + phase) - math.sin(phase))
-        assert truth.pose[0] == pytest.approx(rolled, abs=2e-5)
+        assert truth.pose[0] == pytest.approx(rolled, abs=2e-5 + 1e-4 * rolled)
     assert beta > 2 * math.pi
 
 
@@ -150,8 +145,7 @@ def test_an_eccentric_wheel_works_against_its_load(make: Make) -> None:
     """Its axle stands at h = r + e cos(beta + phase): under a load N the torque on it is N e sin(beta + phase)."""
     e, phase = 1.5e-4, math.pi / 2
     eccentric, plain = make(f"wheel_eccentricity@wheel_fl={e}m,phase={phase}rad"), make()
-    contacts = pybullet.getContactPoints(eccentric.vehicle.engine.body, physicsClientId=eccentric.vehicle.engine.client)
-    load = next(contact[9] for contact in contacts if contact[5][0] > 0 and contact[5][1] > 0)
+    load, _ = eccentric.vehicle.engine.floor_forces()[0]
     for moving in (eccentric, plain):
         moving.torque([12.0] * 4, 0.05)
     p, r = plain.prototype.truth, plain.prototype.geometry.wheel_radius
@@ -163,11 +157,7 @@ def test_an_eccentric_wheel_works_against_its_load(make: Make) -> None:
 def test_a_slippery_wheel_pulls_with_its_adhesion_and_spins(make: Make, text: str) -> None:
     moving = make(text)
     moving.torque([25.0] * 4, 0.2)
-    engine = moving.vehicle.engine
-    contacts = pybullet.getContactPoints(engine.body, physicsClientId=engine.client)
-    load, one, other = next(
-        (contact[9], contact[10], contact[12]) for contact in contacts if contact[5][0] > 0 and contact[5][1] > 0
-    )
-    assert math.hypot(one, other) == pytest.approx(0.04 * load, rel=1e-3)
+    load, friction = moving.vehicle.engine.floor_forces()[0]
+    assert friction == pytest.approx(0.04 * load, rel=1e-3)
     truth = moving.vehicle.ground_truth()
     assert truth.wheel_rates[0] > 2 * truth.twist[0] / moving.prototype.geometry.wheel_radius

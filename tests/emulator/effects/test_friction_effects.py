@@ -26,7 +26,7 @@ def test_stribeck_raises_the_torque_at_which_a_wheel_breaks_away(make: Make) -> 
     held = moving.prototype.truth["d_cw"] + 1.4
     moving.torque([held, 0.0, held, 0.0], 0.5)
     angles = moving.vehicle.ground_truth().wheel_angles
-    assert abs(angles[0]) < 1e-6
+    assert abs(angles[0]) < 1e-5
     assert angles[2] > 0.5
 
 

@@ -11,6 +11,7 @@ import pytest
 from emulator.effects import INJECTORS, Unlibraried, inject
 from emulator.effects.laws import Moment
 from emulator.effects.library.presliding import Presliding
+from emulator.engine.protocol import MakeEngine
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
 
@@ -71,9 +72,10 @@ def test_the_emulator_drives_with_each(name: str, drive_straight: Callable[..., 
 
 
 @pytest.fixture
-def drive_straight() -> Callable[..., float]:
+def drive_straight(make_engine: MakeEngine) -> Callable[..., float]:
     def drive(*effects: Unlibraried) -> float:
-        with EmulatedVehicle(load_prototype(), seed=1, noise_scale=0.0, effects=effects) as vehicle:
+        prototype = load_prototype()
+        with EmulatedVehicle(prototype, seed=1, noise_scale=0.0, make_engine=make_engine, effects=effects) as vehicle:
             for drive, sign in zip(vehicle.drives, (1, 1, -1, -1), strict=True):
                 drive.enable()
                 drive.command(sign * 0.6)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-import pybullet
 import pytest
 
 from emulator.prototype import load_prototype
@@ -53,14 +52,9 @@ class Vehicle:
     def jam(self, wheel: int) -> None:
         """Something is caught in a wheel: it does not turn any more, whatever its drive does."""
         engine = self.emulated.engine
-        pybullet.setJointMotorControl2(
-            engine.body,
-            engine.joints[4 + wheel],
-            pybullet.VELOCITY_CONTROL,
-            targetVelocity=0.0,
-            force=1e4,
-            physicsClientId=engine.client,
-        )
+        friction = list(engine.coulomb)
+        friction[4 + wheel] = 1e4
+        engine.set_friction(friction)
 
 
 @pytest.fixture
