@@ -1,15 +1,18 @@
 # Two commands matter: `make demo` and `make test`. Each makes the same .venv and installs what it needs: the demo the
 # emulator alone, everything else all extras. Versions are those of constraints.txt.
 
-# PyBullet has ready wheels for CPython 3.11 on Linux; on another Python it is compiled, which takes many minutes.
+# PyBullet has ready wheels for CPython 3.11 on Linux; with another Python the vehicle is emulated in MuJoCo alone.
 PYTHON := $(firstword $(shell for name in python3.11 python3; do \
 	"$$(command -v $$name)" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null && echo $$name; done))
 ifeq ($(PYTHON),)
 PYTHON := python3
 endif
+comma := ,
 BIN := .venv/bin
 PIP := -m pip --disable-pip-version-check
-ALL := .[emulator,records,dbc,ziglang,cosim,exam,cluster,test]
+WITH_PYBULLET := $(shell $(PYTHON) -c 'import sys; print("yes" if sys.version_info[:2] == (3, 11) else "")')
+EMULATOR := $(if $(WITH_PYBULLET),emulator,mujoco)
+ALL := .[$(if $(WITH_PYBULLET),emulator$(comma)mujoco,mujoco),records,dbc,ziglang,cosim,exam,cluster,test]
 
 .PHONY: demo test test-all bench check constraints clean
 
@@ -49,12 +52,12 @@ clean:
 
 .venv/made:
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit("Python 3.11 or newer is needed, this is %d.%d." % v[:2] if v < (3, 11) else 0)'
-	@$(PYTHON) -c 'import sys; v = sys.version_info; v[:2] == (3, 11) or print("No Python 3.11 found: PyBullet has no wheel for %d.%d and will be compiled (10 to 30 minutes, needs a C++ compiler)." % v[:2])'
+	@$(PYTHON) -c 'import sys; v = sys.version_info; v[:2] == (3, 11) or print("No Python 3.11 found: the vehicle is emulated in MuJoCo, for which Python %d.%d has a wheel." % v[:2])'
 	$(PYTHON) -m venv .venv
 	@touch $@
 
 .venv/demo: .venv/made pyproject.toml constraints.txt
-	$(BIN)/python $(PIP) install --quiet --constraint constraints.txt --editable '.[emulator]'
+	$(BIN)/python $(PIP) install --quiet --constraint constraints.txt --editable '.[$(EMULATOR)]'
 	@touch $@
 
 .venv/installed: .venv/made pyproject.toml constraints.txt

@@ -77,7 +77,7 @@ def parse_plant(text: str | None, *, force: bool) -> Path | None:
     """
     if text is None:
         return None
-    require_engine(None, "--plant")
+    require(Extra.EMULATOR, "--plant", ("durand",))
     require(Extra.COSIM, "--plant")
     from hil.cosimulation.assessment import (
         refuse_unusable_fmu,  # needs mathematics that commands around the bus do without

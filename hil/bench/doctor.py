@@ -25,7 +25,7 @@ PYTHON: Final = (3, 11)
 """Oldest interpreter."""
 
 WHEELS: Final = (3, 11)
-"""The interpreter for which PyBullet has ready wheels on Linux."""
+"""The newest interpreter for which PyBullet has ready wheels on Linux."""
 
 _ENGINE_SECONDS: Final = 60.0
 
@@ -39,6 +39,7 @@ class CheckName(enum.StrEnum):
     PYTHON = "python"
     PACKAGES = "packages"
     EMULATOR = "emulator"
+    MUJOCO = "mujoco"
     RECORDS = "records"
     DBC = "dbc"
     ZIGLANG = "ziglang"
@@ -48,6 +49,15 @@ class CheckName(enum.StrEnum):
     COMPILER = "compiler"
     SOCKETCAN = "socketcan"
     CAN_UTILS = "can-utils"
+
+
+_TRIALS: Final[Mapping[CheckName, str]] = MappingProxyType(
+    {
+        CheckName.EMULATOR: "import pybullet; pybullet.disconnect(pybullet.connect(pybullet.DIRECT))",
+        CheckName.MUJOCO: "import mujoco; mujoco.MjData(mujoco.MjModel.from_xml_string('<mujoco/>'))",
+    }
+)
+"""The least that an engine has to do."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +90,7 @@ def examine(names: Sequence[CheckName]) -> list[Check]:
 
 def _python(name: CheckName) -> Check:
     found = sys.version_info[:2] >= PYTHON
-    hint = "" if sys.version_info[:2] == WHEELS else "; PyBullet has no wheel for it and is compiled, 10 to 30 minutes"
+    hint = "" if sys.version_info[:2] <= WHEELS else "; PyBullet has no wheel for it: take MuJoCo, the extra mujoco"
     detail = f"{platform.python_implementation()} {platform.python_version()}{hint}"
     return Check(name, found, detail, "everything", "Install Python 3.11 or newer.")
 
@@ -100,15 +110,14 @@ def _extra(name: CheckName) -> Check:
     return Check(name, not lacking, ", ".join(lacking or there), PURPOSES[extra], remedy)
 
 
-def _emulator(name: CheckName) -> Check:
+def _engine(name: CheckName) -> Check:
     """The engine is tried in a process of its own: a build that does not fit the computer ends it."""
     check = _extra(name)
     if not check.found:
         return check
-    code = "import pybullet; pybullet.disconnect(pybullet.connect(pybullet.DIRECT))"
     try:
         done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, timeout=_ENGINE_SECONDS, check=False
+            [sys.executable, "-c", _TRIALS[name]], capture_output=True, text=True, timeout=_ENGINE_SECONDS, check=False
         )
     except subprocess.TimeoutExpired:
         return Check(name, False, "the engine does not answer", check.purpose, check.remedy)
@@ -187,7 +196,7 @@ _CHECKS: Final[Mapping[CheckName, Callable[[CheckName], Check]]] = MappingProxyT
         **{CheckName(extra): _extra for extra in Extra},
         CheckName.PYTHON: _python,
         CheckName.PACKAGES: _packages,
-        CheckName.EMULATOR: _emulator,
+        **dict.fromkeys(_TRIALS, _engine),
         CheckName.COMPILER: _compiler,
         CheckName.SOCKETCAN: _socketcan,
         CheckName.CAN_UTILS: _can_utils,

@@ -126,7 +126,8 @@ def test_the_closed_loop_costs_little_beside_two_bare_engine_steps(
     with capsys.disabled():
         print(
             f"\nclosed loop on {name} {cycle * 1e6:.0f} us a cycle, two bare engine steps {steps * 1e6:.0f} us: "
-            f"ratio {cycle / steps:.2f}, {500 * cycle:.3f} s of CPU a simulated second (limit {limit(steps) * 1e6:.0f} us)"
+            f"ratio {cycle / steps:.2f}, {500 * cycle:.3f} s of CPU a simulated second, "
+            f"limit {limit(steps) * 1e6:.0f} us"
         )
     assert cycle <= limit(steps)
 

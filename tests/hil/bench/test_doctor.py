@@ -10,7 +10,7 @@ from packaging.requirements import Requirement
 
 from hil.bench import doctor
 from hil.bench.doctor import Check, CheckName, examine
-from ident.extras import MODULES, Extra
+from ident.extras import ENGINE_EXTRAS, MODULES, EngineName, Extra, default_engine
 
 
 def one(name: CheckName) -> Check:
@@ -19,7 +19,8 @@ def one(name: CheckName) -> Check:
 
 
 def test_what_these_tests_run_on_is_found() -> None:
-    for check in examine([CheckName.PYTHON, CheckName.PACKAGES, CheckName.EMULATOR]):
+    engine = CheckName(ENGINE_EXTRAS[default_engine()])
+    for check in examine([CheckName.PYTHON, CheckName.PACKAGES, engine]):
         assert check.found, check
     assert f"{sys.version_info.major}.{sys.version_info.minor}" in one(CheckName.PYTHON).detail
     assert "numpy" in one(CheckName.PACKAGES).detail
@@ -47,14 +48,20 @@ def test_requirements_of_extras_are_kept_apart() -> None:
     core = {requirement.name for requirement in doctor._requirements(None)}
     emulator = {requirement.name for requirement in doctor._requirements(Extra.EMULATOR)}
     assert {"numpy", "python-can"} <= core
+    mujoco = {requirement.name for requirement in doctor._requirements(Extra.MUJOCO)}
     assert emulator == {"pybullet", "durand"}
+    assert mujoco == {"mujoco", "durand"}
     assert all(isinstance(requirement, Requirement) for requirement in doctor._requirements(Extra.RECORDS))
 
 
-def test_an_engine_that_does_not_start_is_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "pybullet.py").write_text("raise ImportError('libGL.so.1: cannot open shared object file')")
+@pytest.mark.parametrize("engine", list(EngineName))
+def test_an_engine_that_does_not_start_is_missing(
+    engine: EngineName, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    pytest.importorskip(engine, reason=f"{engine} is not installed: pip install {engine}")
+    (tmp_path / f"{engine}.py").write_text("raise ImportError('libGL.so.1: cannot open shared object file')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    check = one(CheckName.EMULATOR)
+    check = one(CheckName(ENGINE_EXTRAS[engine]))
     assert not check.found
     assert "libGL.so.1" in check.detail
 
