@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copyreg
+
 
 class UserError(Exception):
     """Something the user can mend; shown without a traceback, exit code 2.
@@ -15,6 +17,10 @@ class UserError(Exception):
         super().__init__(f"{what} {remedy}")
         self.what = what
         self.remedy = remedy
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Whole from a worker's process: an exception is made anew from its message alone otherwise, and fails."""
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
 
 class DataFileError(UserError):
