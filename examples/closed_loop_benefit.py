@@ -20,6 +20,7 @@ from hil.bench.closed_loop import Tracking, track_lane_change
 from hil.bench.truth import truth_of
 from hil.campaign.folder import network_file_of
 from hil.exam.driving import drive
+from hil.exam.world import world_of
 from hil.network import load_network
 from ident.campaign.plan import Plan, make_plan
 from ident.diagnosis.vehicle.closing import channel_gaps, extended_model, plain_model
@@ -67,7 +68,7 @@ def _plan(vehicle: VehicleDescription, name: str, steps: Sequence[Step], seed: i
 def _found(vehicle: VehicleDescription, name: str, effects: tuple[Effect, ...]) -> tuple[ExtendedModel, ExtendedModel]:
     """Models refitted without and with what a diagnosis finds; prints it, and the gaps of the lane change."""
     campaigns = [
-        drive(_plan(vehicle, name, steps, seed), name, FIRST_SEED + seed, effects)
+        drive(_plan(vehicle, name, steps, seed), world_of(name, None), FIRST_SEED + seed, effects)
         for seed, steps in ((2, FOUR), (3, (*FOUR, Step.LANE_CHANGE)))
     ]
     fit, (confirm, unseen) = campaigns[0], _split(campaigns[1])

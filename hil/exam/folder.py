@@ -21,7 +21,7 @@ from ident.errors import UserError
 from ident.reading import read_json
 from ident.writing import write_whole
 
-SCHEMA: Final = "quasiomni.exam/3"
+SCHEMA: Final = "quasiomni.exam/4"
 RECORDS: Final = ("fit", "confirm")
 
 
@@ -77,7 +77,7 @@ class Exam:
     """What everyone may know of an exam.
 
     Attributes:
-        prototype: of the emulator, by name.
+        vehicle, engine: the world that the cases are driven in: name or path, and name.
         cycle: T_s [s].
         plans: the pairs of campaigns that the cases drive, as JSON texts.
         identifiers: of the cases, in shuffled order.
@@ -87,7 +87,8 @@ class Exam:
         answer_hash: SHA-256 of the file of the answer.
     """
 
-    prototype: str
+    vehicle: str
+    engine: str
     cycle: float
     plans: tuple[str, ...]
     identifiers: tuple[str, ...]
