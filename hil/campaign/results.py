@@ -18,9 +18,9 @@ from ident.campaign.plan import Plan
 from ident.errors import EstimationError, UserError
 from ident.estimate.identify import Identification, KnownInertia, identify
 from ident.faults import find_faults
+from ident.parameters_file import Identified, write_model
 from ident.records.record import Record
 from ident.report.html import ReportContent, write_report
-from ident.report.result_file import write_parameters
 from ident.stages import Stage, untold
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import Parameters
@@ -117,7 +117,8 @@ def write_result(content: ReportContent, out: Path) -> tuple[Path, Path]:
     parameters, report = (out / name for name in _RESULTS)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        write_parameters(content.identification, content.assessment, parameters, content.provenance)
+        identified = Identified(content.identification, content.assessment)
+        write_model(identified.model, parameters, content.provenance, identified)
     except OSError as error:
         raise UserError(f"{out} cannot be written to: {error.strerror}.", "Name another folder (--out).") from error
     write_report(content, report)

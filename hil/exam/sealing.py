@@ -25,8 +25,8 @@ from hil.exam.workers import run_all
 from hil.exam.world import World
 from hil.network import load_network
 from ident.effects import make_effect
-from ident.effects.extended import read_model
 from ident.errors import UserError
+from ident.parameters_file import read_model
 from ident.vehicle.description import find_data_file, load_vehicle
 from ident.writing import write_whole
 

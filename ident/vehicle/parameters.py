@@ -68,7 +68,7 @@ def parameters_from(quantities: Mapping[str, Quantity]) -> Parameters:
     )
 
 
-def read_parameters(path: Path, table: str = "parameters") -> Parameters:
+def read_parameters(path: Path, table: str) -> Parameters:
     """Parameters from the table of that name in a TOML file.
 
     Entries of [parameters], which an identification writes, hold more than value, unit, std and source; it is ignored.

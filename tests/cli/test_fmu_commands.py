@@ -19,8 +19,9 @@ from ident.campaign.plan import make_plan
 from ident.campaign.reference import excitation_reference
 from ident.campaign.steps import EXCITATIONS
 from ident.effects import make_effect
-from ident.effects.extended import ExtendedModel, write_model
+from ident.effects.extended import ExtendedModel
 from ident.effects.text import effects_text
+from ident.parameters_file import write_model
 from ident.records.files import write_record
 from ident.records.record import Record, Segment, Step, make_segment
 from ident.vehicle.description import find_data_file, load_vehicle

@@ -19,8 +19,9 @@ from hil.frames.recorder import Recorder
 from hil.master import Master
 from hil.network import DEFAULT_NETWORK, load_network
 from ident.campaign.plan import make_plan
-from ident.effects.extended import ExtendedModel, write_model
+from ident.effects.extended import ExtendedModel
 from ident.estimate.identify import KnownInertia
+from ident.parameters_file import write_model
 from ident.records.files import write_record
 from ident.records.record import Record, Segment, Step, make_segment
 from ident.vehicle.description import find_data_file, load_vehicle
