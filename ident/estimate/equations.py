@@ -12,8 +12,8 @@ from ident.estimate.filters import (
     Processing,
     differentiate,
     moving_rows,
-    second_derivative,
     sliding_samples,
+    smooth,
     zero_phase,
 )
 from ident.plant import dynamics, kinematics
@@ -97,13 +97,15 @@ class Equations:
 def motion_of(segment: Segment, geometry: Geometry, processing: Processing) -> Motion:
     """Smoothed angles, rates and accelerations of a segment; the twist by odometry (3)."""
     dt = segment.sample_time
-    alpha = zero_phase(segment.steering_angles, processing.signal_cutoff, dt, UNJUDGED)
-    beta = zero_phase(segment.wheel_angles, processing.signal_cutoff, dt, UNJUDGED)
-    alpha_rate, beta_rate = differentiate(alpha, dt), differentiate(beta, dt)
-    twist = kinematics.odometry(alpha, alpha_rate, beta_rate, geometry)
-    rates = np.hstack([twist, alpha_rate, beta_rate])
-    accelerations = np.hstack([differentiate(twist, dt), second_derivative(alpha, dt), second_derivative(beta, dt)])
-    return Motion(alpha, rates, accelerations)
+    alpha, beta = (
+        smooth(angles, processing, dt, unjudged=UNJUDGED) for angles in (segment.steering_angles, segment.wheel_angles)
+    )
+    twist = kinematics.odometry(alpha.angles, alpha.rates, beta.rates, geometry)
+    return Motion(
+        alpha.angles,
+        rates=np.hstack([twist, alpha.rates, beta.rates]),
+        accelerations=np.hstack([differentiate(twist, dt), alpha.accelerations, beta.accelerations]),
+    )
 
 
 def equations_of(
