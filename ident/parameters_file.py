@@ -22,7 +22,7 @@ from ident.assessment import Assessment
 from ident.assessment.file import assessment_text, refuse_unusable
 from ident.effects.extended import ExtendedModel
 from ident.effects.text import effects_text, read_effects
-from ident.estimate.identify import Estimate, Identification
+from ident.estimate.result import Estimate, Identification
 from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters, read_parameters
 from ident.vehicle.quantities import read_toml
 from ident.writing import write_whole

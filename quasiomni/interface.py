@@ -31,11 +31,11 @@ from ident.effects.combining import combined
 from ident.effects.extended import ExtendedModel, simulation_of
 from ident.effects.text import parse_effect
 from ident.errors import UserError as UserError
-from ident.estimate.identify import Identification, KnownInertia
 from ident.estimate.identify import identify as identify_record
 from ident.estimate.least_squares import ORDINARY, Estimator
 from ident.estimate.least_squares import LeastSquares as LeastSquares
 from ident.estimate.least_squares import WeightedLeastSquares as WeightedLeastSquares
+from ident.estimate.result import Identification, KnownInertia
 from ident.faults import find_faults
 from ident.plant.modes import Mode as Mode
 from ident.plant.simulation import Motion as Motion

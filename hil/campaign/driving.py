@@ -7,7 +7,8 @@ from contextlib import suppress
 import can
 
 from hil.bus.clock import Clock
-from hil.campaign.folder import Run, create_run
+from hil.campaign.creating import create_run
+from hil.campaign.folder import Run
 from hil.campaign.inspection import Rejected, reject_unusable
 from hil.campaign.order import Order
 from hil.campaign.runner import CampaignRunner, Operator, Progress

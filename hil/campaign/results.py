@@ -16,7 +16,8 @@ from ident.assessment import Assessment, assess
 from ident.assessment.faults import blamed_on
 from ident.campaign.plan import Plan
 from ident.errors import EstimationError, UserError
-from ident.estimate.identify import Identification, KnownInertia, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import Identification, KnownInertia
 from ident.faults import find_faults
 from ident.parameters_file import Identified, write_model
 from ident.records.record import Record

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from ident.assessment.verdict import Reason, ReasonCode, Verdict
-from ident.estimate.identify import Estimate, Identification
+from ident.estimate.result import Estimate, Identification
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import Parameters

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ident.campaign.reference import sample_times
 from ident.estimate.equations import Equations, column
-from ident.estimate.identify import Identification
+from ident.estimate.result import Identification
 from ident.records.repeats import repeats_of
 from ident.report.rows import Role, role_of
 

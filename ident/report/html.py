@@ -15,8 +15,8 @@ from plotly import offline
 
 from ident.assessment import Assessment
 from ident.campaign.plan import Plan
-from ident.estimate.identify import Identification
 from ident.estimate.noise import torque_unit
+from ident.estimate.result import Identification
 from ident.records.record import Record
 from ident.report import digits, figures
 from ident.report.assessment import headline

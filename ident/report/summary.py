@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ident.assessment.fit import COORDINATE_WORDS
-from ident.estimate.identify import Identification
+from ident.estimate.result import Identification
 from ident.records.record import Record
 from ident.report.digits import percent
 from ident.report.rows import LEAST_SQUARES, ParameterRow, Role, StepRow

@@ -12,7 +12,8 @@ import fmpy.validation
 import numpy as np
 import pytest
 
-from hil.campaign.folder import Run, RunFolder, create_run
+from hil.campaign.creating import create_run
+from hil.campaign.folder import Run, RunFolder
 from hil.network import load_network
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.plan import make_plan

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel
-from ident.diagnosis.vehicle.rows import SLICES
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.signals import shifted
 from ident.diagnosis.vehicle.sources import Source
 from ident.effects import make_effect

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.vehicle.rows import INPUTS, SLICES
+from ident.diagnosis.vehicle.inputs import INPUTS, SLICES
 from ident.errors import RecordError
 from ident.estimate.filters import FILTER_ORDER, SEVEN, Processing, smooth
 from ident.plant import kinematics
@@ -52,7 +52,7 @@ class Signals:
     torques: Array
 
     def as_inputs(self) -> Array:
-        """(N, INPUTS), the columns of `rows.SLICES`; couplings are not twisted."""
+        """(N, INPUTS), the columns of `inputs.SLICES`; couplings are not twisted."""
         inputs = np.zeros((len(self.heading), INPUTS))
         inputs[:, SLICES["heading"]] = self.heading[:, None]
         for name in ("alpha", "beta", "alpha_rate", "beta_rate", "alpha_acceleration", "beta_acceleration", "torques"):

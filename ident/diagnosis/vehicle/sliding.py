@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.rattling import BAND
-from ident.diagnosis.vehicle.rows import SLICES
 from ident.diagnosis.vehicle.transforms import LOAD_CUTOFF, Setting, contact_force
 from ident.estimate.filters import SEVEN, differentiate, zero_phase
 from ident.plant import kinematics

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName, places_of
 from ident.diagnosis.vehicle.flights import Shaken, twist_in_flight
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.rattling import above_band, moved_by
 from ident.diagnosis.vehicle.resting import range_of
-from ident.diagnosis.vehicle.rows import SLICES
 from ident.diagnosis.vehicle.signals import shifted
 from ident.estimate.filters import SEVEN, differentiate, second_derivative, zero_phase
 from ident.plant.places import DRIVES, ENCODERS, STEERING

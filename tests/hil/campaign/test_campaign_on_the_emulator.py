@@ -19,7 +19,8 @@ from hil.campaign.study import TOLERANCES
 from hil.frames.recorder import finished_steps
 from ident.assessment import Assessment
 from ident.campaign.steps import ORDER
-from ident.estimate.identify import Identification, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import Identification
 from ident.parameters_file import Identified, read_model, write_model
 from ident.records.files import write_record
 from ident.records.record import Record, Step

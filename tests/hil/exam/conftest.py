@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from hil.exam.answers import Alone, Answer, Said
+from hil.exam.answers import Answer
 from hil.exam.cases import Case, Composition, Kind, draw_cases
 from hil.exam.identity import Identity
+from hil.exam.said import Alone, Said
 from hil.exam.sizes import SizeTable, load_sizes
 from hil.exam.world import world_of
 

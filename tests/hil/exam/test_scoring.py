@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 
 from hil.exam import score_names as names
-from hil.exam.answers import Alone, Answer, Said, chance, permuted, read_answers, said_from
+from hil.exam.answers import Answer, chance, permuted, read_answers
 from hil.exam.cases import Case, Injected, Kind
 from hil.exam.folder import ExamFolder
 from hil.exam.identity import Identities, Identity
+from hil.exam.said import Alone, Said, said_from
 from hil.exam.score_figures import confusion_svg, reliability_svg
 from hil.exam.score_report import ScoreReport, score_json, score_markdown, summary_lines
 from hil.exam.scoring import removal_rates, score

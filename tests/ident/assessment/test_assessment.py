@@ -17,7 +17,8 @@ from ident.assessment.file import assessment_text, refuse_unusable
 from ident.assessment.fit import drift_share
 from ident.errors import UserError
 from ident.estimate.filters import Processing
-from ident.estimate.identify import Identification, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import Identification
 from ident.parameters_file import Identified, read_model, write_model
 from ident.records.record import Record, Segment, Step
 from ident.report.assessment import assessment_lines

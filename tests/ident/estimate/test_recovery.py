@@ -8,7 +8,8 @@ import pytest
 
 from ident.errors import EstimationError
 from ident.estimate.equations import column
-from ident.estimate.identify import Identification, KnownInertia, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import Identification, KnownInertia
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.vehicle.rows import INPUTS, SLICES
+from ident.diagnosis.vehicle.inputs import INPUTS, SLICES
 from ident.diagnosis.vehicle.transforms import Setting, transform_cause
 from ident.estimate.filters import SEVEN, differentiate, second_derivative
 from ident.vehicle.geometry import Geometry

@@ -16,8 +16,8 @@ from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.vehicle.build import build_problem
 from ident.diagnosis.vehicle.ideal import Drive, ideal_record
+from ident.diagnosis.vehicle.inputs import INPUTS, SLICES
 from ident.diagnosis.vehicle.rattling import above_band, hammer, rattle_rows, rattling, rattling_at_standstill, swing
-from ident.diagnosis.vehicle.rows import INPUTS, SLICES
 from ident.diagnosis.vehicle.sliding import rolled_with_others, rolling_rates
 from ident.diagnosis.vehicle.sources import processing_of, sources_of
 from ident.diagnosis.vehicle.transforms import Setting, transform_cause
