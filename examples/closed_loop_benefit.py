@@ -28,10 +28,9 @@ from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.effects import Effect
 from ident.effects.extended import ExtendedModel
 from ident.effects.text import parse_effect
-from ident.records.record import Record, Step
+from ident.records.record import FOUR_STEPS, Record, Step
 from ident.vehicle.description import VehicleDescription, load_vehicle
 
-FOUR = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION)
 FIRST_SEED = 1001
 """Of the campaigns' noise; the lane changes that are tracked have 1, 2, ..."""
 
@@ -69,7 +68,7 @@ def _found(vehicle: VehicleDescription, name: str, effects: tuple[Effect, ...]) 
     """Models refitted without and with what a diagnosis finds; prints it, and the gaps of the lane change."""
     campaigns = [
         drive(_plan(vehicle, name, steps, seed), world_of(name, None), FIRST_SEED + seed, effects)
-        for seed, steps in ((2, FOUR), (3, (*FOUR, Step.LANE_CHANGE)))
+        for seed, steps in ((2, FOUR_STEPS), (3, (*FOUR_STEPS, Step.LANE_CHANGE)))
     ]
     fit, (confirm, unseen) = campaigns[0], _split(campaigns[1])
     findings = diagnose_vehicle([fit], [confirm], vehicle).findings

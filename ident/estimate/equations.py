@@ -21,7 +21,7 @@ from ident.plant.modes import Mode
 from ident.records.checks import UNJUDGED
 from ident.records.record import Segment, Step
 from ident.vehicle.geometry import WHEELS, Geometry
-from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
+from ident.vehicle.parameters import COULOMB_EPSILON, parameter_column
 
 Array = NDArray[np.float64]
 
@@ -157,7 +157,7 @@ def _raw_rows(
     theta = dynamics.projected_regressor(spec.mode, motion.alpha, motion.rates, motion.accelerations, geometry, epsilon)
     torque = dynamics.generalized_torques(spec.mode, motion.alpha, segment.motor_torques, geometry)
     # A load over the centre moves as m_ch does; what it takes is known.
-    torque = torque - segment.payload * theta[:, :, column("m_ch")]
+    torque = torque - segment.payload * theta[:, :, parameter_column("m_ch")]
     return theta, torque, kinematics.GENERALIZED_VELOCITIES[spec.mode]
 
 
@@ -177,8 +177,3 @@ def usable_equations(segments: list[Segment], geometry: Geometry, processing: Pr
         if segment.step in known
         for equations in equations_of(segment, geometry, processing)
     ]
-
-
-def column(name: str) -> int:
-    """Column of a parameter in every regressor."""
-    return PARAMETER_NAMES.index(name)

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ident.errors import EstimationError
-from ident.estimate.equations import Equations, column, usable_equations
+from ident.estimate.equations import Equations, usable_equations
 from ident.estimate.filters import Processing
 from ident.estimate.least_squares import ORDINARY, Estimator, LinearSystem, Solution
 from ident.estimate.noise import noise_floor
 from ident.estimate.result import Estimate, Identification, KnownInertia
 from ident.estimate.uncertainty import ErrorCovariance, FittedRows, error_covariance, interval_factor
-from ident.records.record import Record, Step
+from ident.records.record import FOUR_STEPS, Record, Step
 from ident.vehicle.geometry import Geometry
-from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS
+from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, parameter_column
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ INERTIAL: Final = {
 }
 """Inertias, which are never near zero, and the steps that excite them."""
 
-FIT_STEPS: Final = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION, Step.LATERAL)
+FIT_STEPS: Final = (*FOUR_STEPS, Step.LATERAL)
 VALIDATION_STEPS: Final = (Step.LANE_CHANGE,)
 
 
@@ -145,11 +145,11 @@ def _fit(rows: Sequence[Equations], names: tuple[str, ...], known: dict[str, flo
             "The record holds none of the steps of an identification.",
             f"It needs {', '.join(FIT_STEPS)} by these names in the channel step.",
         )
-    columns = [column(name) for name in names]
+    columns = [parameter_column(name) for name in names]
     theta = np.concatenate([row.regressor[row.moving] for row in rows])
     torque = np.concatenate([row.torque[row.moving] for row in rows])
     for name, value in known.items():
-        torque = torque - theta[:, column(name)] * value
+        torque = torque - theta[:, parameter_column(name)] * value
     part = np.repeat(np.arange(len(rows)), [int(row.moving.sum()) for row in rows])
     system = LinearSystem(names, theta[:, columns], torque, part)
     solution = estimator(system)
@@ -182,7 +182,7 @@ def _fitted_rows(rows: Sequence[Equations], solution: Solution, columns: list[in
 
 def _sensitivity_to_inertia(fit: _Fit, rows: Sequence[Equations]) -> Array:
     """∂p₁/∂B_w = -ψᵀΘ₂, (n,)."""
-    theta = np.concatenate([row.regressor[row.moving, column("B_w")] for row in rows])
+    theta = np.concatenate([row.regressor[row.moving, parameter_column("B_w")] for row in rows])
     return np.asarray(-fit.solution.influence.T @ theta)
 
 

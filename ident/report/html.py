@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -139,18 +140,6 @@ def _torque_caption(comparison: Comparison) -> str:
     return f"{duration:.1f} s, {digits.percent(float(comparison.moving.mean()))} of the rows outside of stiction."
 
 
-def _identification_panels(content: ReportContent) -> list[_Panel]:
-    return _torque_panels(content, (Role.FIT,))
-
-
-def _validation_panels(content: ReportContent) -> list[_Panel]:
-    return _torque_panels(content, (Role.VALIDATION,))
-
-
-def _lifted_panels(content: ReportContent) -> list[_Panel]:
-    return _torque_panels(content, (Role.INERTIA, Role.SHOWN))
-
-
 def _folded_panels(content: ReportContent) -> list[_Panel]:
     identification = content.identification
     panels = []
@@ -198,11 +187,11 @@ def _interval_panels(content: ReportContent) -> list[_Panel]:
     return [_Panel("intervals", "", "", figures.interval_figure(rows))]
 
 
-_SECTIONS: Final = {
+_SECTIONS: Final[Mapping[str, Callable[[ReportContent], list[_Panel]]]] = {
     "intervals": _interval_panels,
-    "identification": _identification_panels,
-    "validation": _validation_panels,
-    "lifted": _lifted_panels,
+    "identification": partial(_torque_panels, roles=(Role.FIT,)),
+    "validation": partial(_torque_panels, roles=(Role.VALIDATION,)),
+    "lifted": partial(_torque_panels, roles=(Role.INERTIA, Role.SHOWN)),
     "folded": _folded_panels,
     "excitation": _excitation_panels,
     "path": _path_panels,
