@@ -67,7 +67,7 @@ def seal(
     ] = None,
     model: Annotated[
         Path | None,
-        typer.Option(help="Model that is judged (parameters.toml). Default: that kept for the vehicle and the engine."),
+        typer.Option(help="Model under test (parameters.toml). Default: that kept for the vehicle and the engine."),
     ] = None,
     jobs: JobsOption = 2,
     scheduler: SchedulerOption = None,

@@ -105,7 +105,7 @@ def diagnose(
         fit: records that causes are looked for in.
         confirm: other records of the same vehicle; none: a part of `fit` confirms.
         vehicle: its geometry is taken as true.
-        model: being judged; None: parameters are refitted, only structure can be missing.
+        model: under test; None: parameters are refitted, only structure can be missing.
 
     Raises:
         UserError: a record is of another vehicle, does not move, or holds none of the steps of a diagnosis.
@@ -119,7 +119,7 @@ def extend(
     """The model with what a diagnosis found, its parameters refitted; or with effects as `name@place=size`.
 
     Args:
-        model: that was judged.
+        model: under test.
         found: a diagnosis of it, or effects.
         vehicle: for what the records of a diagnosis do not show.
 

@@ -54,7 +54,7 @@ class DiagnosisOrder:
         records: run folders or files to look for causes in.
         confirm: the same, independent of them; none: a part of `records` confirms.
         vehicle: shipped vehicle file by name, or a path; None: that of the first run folder, or the prototype.
-        model: `parameters.toml` that is judged; None: the parameters are refitted.
+        model: `parameters.toml` under test; None: the parameters are refitted.
         axis: the records are of servo axes.
         seed: of the surrogates.
         json, report, extended: files to write, or None; `extended` is the model with the effects that are named.
@@ -162,7 +162,7 @@ def write_answer(order: DiagnosisOrder, answer: Answer) -> list[Path]:
 
 
 def _provenance(order: DiagnosisOrder) -> dict[str, str]:
-    """What the numbers of the model come from: names of the records, and of the model that was judged."""
+    """What the numbers of the model come from: names of the records, and of the model under test."""
     sources = {"run": "diagnosis", "records": _names(order.records)}
     if order.confirm:
         sources["confirm"] = _names(order.confirm)
@@ -176,7 +176,7 @@ def _names(paths: Sequence[Path]) -> str:
 
 
 def _refuse_unworkable(order: DiagnosisOrder) -> None:
-    """Refuse what could not be judged or written, before the work.
+    """Refuse what could not be diagnosed or written, before the work.
 
     Raises:
         UserError: a name is that of a folder or of a file that is read, there is no such model, or it was assessed as

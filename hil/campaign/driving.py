@@ -46,7 +46,7 @@ def drive_run(
         run, order: what to drive.
         bus, clock: of the vehicle.
         operator: lifts and lowers the vehicle.
-        progress: told how far each step is.
+        progress: called with the progress of each step.
         lockstep: SYNCs move the time of the other side, and wall time says nothing of its samples.
 
     Raises:

@@ -54,7 +54,7 @@ class Order:
 
 
 Planned = Callable[[int, int], None]
-"""Told how many excitations are optimised, of how many."""
+"""Called with the number of excitations optimised, and of all."""
 
 
 def _unheard(_done: int, _total: int) -> None:

@@ -28,7 +28,7 @@ from ident.vehicle.parameters import Parameters
 from ident.writing import refuse_inputs, refuse_unlike
 
 _RESULTS: Final = {"parameters.toml": b"naive_std = ", "report.html": b"<title>Identification of "}
-"""Files that an identification writes without being told their names, and what is in each of them."""
+"""Files that an identification writes under fixed names, and what is in each of them."""
 
 PAPER_PROTOTYPE = "prototype"
 """Name of the vehicle that Table 2 of the paper describes."""
@@ -65,8 +65,8 @@ def identify_run(
         known_inertia: B_w in place of that of the run.
         truth: shown beside the result.
         vehicle, network: files to take in place of those in the run folder; what differs is said.
-        stage: told what begins.
-        note: told what differs, before the work: it may be why there is no result.
+        stage: called with the name of each stage.
+        note: called with what differs, before the work: it may be why there is no result.
 
     Raises:
         UserError: the folder, a log, a file that is given, or the excitation in the logs will not do.

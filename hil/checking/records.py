@@ -25,7 +25,7 @@ LEVER_TOLERANCE: Final = 0.01
 """Relative, of the wheel rolling per steering motion at standstill: more than creep and play do to it."""
 
 LEAST_STEERING: Final = 0.1
-"""Range of a steering angle from which the lever is told [rad]."""
+"""Range of a steering angle from which the lever is estimated [rad]."""
 
 _SIDES: Final = {Step.STEERING_LEFT: (0, (0, 1)), Step.STEERING_RIGHT: (1, (2, 3))}
 """Steering steps: which encoder, and which wheels roll."""

@@ -67,7 +67,7 @@ def source_of_files(parameters: Path, vehicle: Path, provenance: dict[str, str],
 
 
 Compiled = Callable[[str, int, int], None]
-"""Told the compiler, and how many platforms are compiled, of how many."""
+"""Called with the compiler, and the number of platforms compiled, and of all."""
 
 
 def _unheard(_compiler: str, _done: int, _total: int) -> None:
@@ -91,7 +91,7 @@ def export_run(
         order: version, inputs and platforms.
         model: a `parameters.toml` in place of that of the run.
         force: take a model that was assessed as unusable.
-        compiled: told how far it is.
+        compiled: called with the progress.
 
     Raises:
         UserError: the run is not identified, there is no compiler for a platform, or the file cannot be written or is

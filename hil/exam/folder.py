@@ -3,7 +3,7 @@
 | entry | what |
 |---|---|
 | `exam.json` | identifiers in shuffled order, excitations, whether it is sealed, hash of the answer |
-| `vehicle.toml`, `model.toml` | what is known of the vehicle, and the model to be judged |
+| `vehicle.toml`, `model.toml` | what is known of the vehicle, and the model under test |
 | `cases/ID.fit.parquet`, `cases/ID.confirm.parquet` | the records, all of one size and date |
 | `truth/answer.json` | the answer, encrypted; `exam score` opens it with the key, which lies elsewhere |
 | `truth/ID.json` | why a case could not be driven, encrypted as well |
@@ -43,7 +43,7 @@ class ExamFolder:
 
     @property
     def model(self) -> Path:
-        """The model that is judged."""
+        """The model under test."""
         return self.path / "model.toml"
 
     @property

@@ -48,7 +48,7 @@ class SealingOrder:
     Attributes:
         out: folder.
         world: vehicle and engine.
-        model: file of the model that is judged.
+        model: file of the model under test.
         composition: how many cases of each kind.
         key: file of the secret that everything is drawn from, made where it is missing; None: not sealed.
         first_seed: without a key, the first of the noise, two a case, of the excitations, and of everything drawn.

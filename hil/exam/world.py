@@ -22,7 +22,7 @@ DEFAULT_ENGINE: Final = EngineName.PYBULLET
 
 @dataclass(frozen=True)
 class World:
-    """Vehicle and engine; sizes in noise units and the model that is judged are those of one world.
+    """Vehicle and engine; sizes in noise units and the model under test are those of one world.
 
     Attributes:
         vehicle: that the emulator plays: shipped name, or path of a vehicle file.
@@ -47,7 +47,7 @@ class World:
 
     @property
     def model_file(self) -> Path:
-        """Where the program keeps the model that is judged, as identified from a campaign without effects."""
+        """Where the program keeps the model under test, as identified from a campaign without effects."""
         return DATA / f"model.{self.vehicle}.{self.engine}.toml"
 
     def emulated(self) -> Emulated:
@@ -106,14 +106,14 @@ def stored_sizes(world: World, named: Path | None) -> Path:
 
 
 def stored_model(world: World, named: Path | None) -> Path:
-    """The model of a world that is judged: the one that is named, else the one that the program keeps.
+    """The model under test of a world: the one that is named, else the one that the program keeps.
 
     Raises:
         UserError: there is none.
     """
     if named is None and not world.model_file.is_file():
         raise UserError(
-            f"No model to be judged is kept for {world}.",
+            f"No model to be tested is kept for {world}.",
             "Identify one from a campaign without effects, of that vehicle in that engine; then name its "
             "parameters.toml: --model FILE.",
         )

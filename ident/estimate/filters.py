@@ -44,7 +44,7 @@ def zero_phase(values: Array, cutoff: float, sample_time: float, unjudged: int =
     """Butterworth low-pass forwards and backwards along axis 0, cutoff in rad/s.
 
     Beyond its ends a signal is continued by its reflection in a point. Were that the end sample of a record, an error
-    of that one sample would count twice in all that lies beyond; so it is the first that has been judged.
+    of that one sample would count twice in all that lies beyond; so it is the first that has been checked.
 
     Args:
         values: (N, ...).
@@ -132,7 +132,7 @@ def smooth(
         sample_time: [s].
         samples: that the derivatives are taken from, THREE or SEVEN.
         unjudged: samples at each end that `zero_phase` continues. The estimate distrusts those that no neighbour has
-            judged; the diagnosis takes all, and weighs none that is so near to an end.
+            checked; the diagnosis takes all, and uses no row that is so near to an end.
     """
     smoothed = zero_phase(angles, processing.signal_cutoff, sample_time, unjudged)
     rates = differentiate(smoothed, sample_time, samples)

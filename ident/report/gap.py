@@ -36,7 +36,7 @@ class GapReport:
         findings: everything that was found.
         diagnosis: the answer.
         records, confirm: names of the records.
-        model: name of the model that was given to be judged; None where the parameters were refitted.
+        model: name of the model under test; None where the parameters were refitted.
     """
 
     findings: Findings

@@ -106,7 +106,7 @@ def _unrepeated(steps: Sequence[StepRow]) -> list[str]:
     steps_without = [row.floor.step for row in steps if row.role is Role.FIT and not row.floor.noise >= 0]
     if not steps_without:
         return []
-    return [f"No repeated periods in {', '.join(steps_without)}: noise and model error cannot be told apart there."]
+    return [f"No repeated periods in {', '.join(steps_without)}: noise and model error cannot be separated there."]
 
 
 def _not_validated(steps: Sequence[StepRow]) -> list[str]:
