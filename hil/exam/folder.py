@@ -98,6 +98,11 @@ class Exam:
     answer_hash: str = ""
 
     @property
+    def world(self) -> str:
+        """Vehicle and engine in words."""
+        return f"{self.vehicle} in {self.engine}"
+
+    @property
     def sealed(self) -> bool:
         """Whether the answer takes a key."""
         return self.first_seed is None

@@ -218,9 +218,8 @@ def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
     ours = (order.world.vehicle, order.world.engine, wanted.driven, Counter(asked))
     if (exam.vehicle, exam.engine, len(exam.plans), held) != ours:
         kinds = ", ".join(f"{held[kind]} {kind}" for kind in _KINDS)
-        world = f"{exam.vehicle} in {exam.engine}"
         raise UserError(
-            f"{order.out} holds another exam: {kinds} of {world} on {len(exam.plans)} excitations.",
+            f"{order.out} holds another exam: {kinds} of {exam.world} on {len(exam.plans)} excitations.",
             "Go on with it as it was begun, or name another folder (--out).",
         )
 
