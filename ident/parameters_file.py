@@ -16,8 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from ident.assessment import Assessment
 from ident.assessment.file import assessment_text, refuse_unusable
 from ident.effects.extended import ExtendedModel
@@ -41,8 +39,7 @@ class Identified:
     @property
     def model(self) -> ExtendedModel:
         """Its parameters, without effects."""
-        estimates = self.identification.estimates
-        return ExtendedModel(Parameters(self.identification.values, np.array([each.std for each in estimates])))
+        return ExtendedModel(self.identification.parameters)
 
 
 def read_model(path: Path, *, force: bool = True) -> ExtendedModel:

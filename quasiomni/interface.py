@@ -44,7 +44,6 @@ from ident.records.files import read_record as read_file
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.description import load_vehicle as load_vehicle
-from ident.vehicle.parameters import Parameters
 from ident.writing import write_whole
 
 if TYPE_CHECKING:
@@ -89,8 +88,7 @@ def assess(result: Identification, record: Record, vehicle: VehicleDescription) 
 
 def model_of(result: Identification, effects: Sequence[Effect] = ()) -> ExtendedModel:
     """The model that an identification found, with effects beside it."""
-    std = [estimate.std for estimate in result.estimates]
-    return ExtendedModel(Parameters(result.values, np.array(std)), tuple(effects))
+    return ExtendedModel(result.parameters, tuple(effects))
 
 
 def diagnose(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ident.estimate.equations import Equations
 from ident.estimate.filters import Processing
 from ident.estimate.noise import NoiseFloor
-from ident.vehicle.parameters import PARAMETER_NAMES
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 Array = NDArray[np.float64]
 
@@ -90,6 +90,11 @@ class Identification:
     def values(self) -> Array:
         """p (11,)."""
         return np.array([estimate.value for estimate in self.estimates])
+
+    @property
+    def parameters(self) -> Parameters:
+        """Values and standard deviations of p (18)."""
+        return Parameters(self.values, np.array([estimate.std for estimate in self.estimates]))
 
     def __getitem__(self, name: str) -> Estimate:
         """One estimate by its symbol."""
