@@ -20,7 +20,8 @@ import numpy as np
 
 from hil.bench import emulation
 from hil.bench.truth import truth_of
-from hil.campaign.folder import Run, RunFolder, create_run, network_file_of
+from hil.campaign.creating import create_run
+from hil.campaign.folder import Run, RunFolder, network_file_of
 from hil.campaign.reading import read_run
 from hil.campaign.runner import CampaignRunner
 from hil.campaign.study import (

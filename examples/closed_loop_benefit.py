@@ -20,6 +20,7 @@ from hil.bench.closed_loop import Tracking, track_lane_change
 from hil.bench.truth import truth_of
 from hil.campaign.folder import network_file_of
 from hil.exam.driving import drive
+from hil.exam.world import world_of
 from hil.network import load_network
 from ident.campaign.plan import Plan, make_plan
 from ident.diagnosis.vehicle.closing import channel_gaps, extended_model, plain_model
@@ -27,11 +28,10 @@ from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.effects import Effect
 from ident.effects.extended import ExtendedModel
 from ident.effects.text import parse_effect
-from ident.extras import named_engine
-from ident.records.record import Record, Step
+from ident.extras import EngineName, named_engine
+from ident.records.record import FOUR_STEPS, Record, Step
 from ident.vehicle.description import VehicleDescription, load_vehicle
 
-FOUR = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION)
 FIRST_SEED = 1001
 """Of the campaigns' noise; the lane changes that are tracked have 1, 2, ..."""
 
@@ -47,7 +47,7 @@ def main() -> None:
     arguments = parser.parse_args()
     vehicle, effects = load_vehicle(arguments.vehicle), tuple(arguments.effects)
     if arguments.diagnose:
-        models = _found(vehicle, arguments.vehicle, effects)
+        models = _found(vehicle, arguments.vehicle, arguments.engine, effects)
     else:
         truth = truth_of(arguments.vehicle)
         models = ExtendedModel(truth), ExtendedModel(truth, effects)
@@ -74,11 +74,13 @@ def _plan(vehicle: VehicleDescription, name: str, steps: Sequence[Step], seed: i
     return make_plan(vehicle, np.random.default_rng(seed), steps=steps, periods=4, cycle=cycle)
 
 
-def _found(vehicle: VehicleDescription, name: str, effects: tuple[Effect, ...]) -> tuple[ExtendedModel, ExtendedModel]:
+def _found(
+    vehicle: VehicleDescription, name: str, engine: EngineName | None, effects: tuple[Effect, ...]
+) -> tuple[ExtendedModel, ExtendedModel]:
     """Models refitted without and with what a diagnosis finds; prints it, and the gaps of the lane change."""
     campaigns = [
-        drive(_plan(vehicle, name, steps, seed), name, FIRST_SEED + seed, effects)
-        for seed, steps in ((2, FOUR), (3, (*FOUR, Step.LANE_CHANGE)))
+        drive(_plan(vehicle, name, steps, seed), world_of(name, engine), FIRST_SEED + seed, effects)
+        for seed, steps in ((2, FOUR_STEPS), (3, (*FOUR_STEPS, Step.LANE_CHANGE)))
     ]
     fit, (confirm, unseen) = campaigns[0], _split(campaigns[1])
     findings = diagnose_vehicle([fit], [confirm], vehicle).findings

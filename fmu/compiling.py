@@ -110,7 +110,7 @@ def compile_libraries(
         cache: folder for sources; None for the user's cache folder.
 
     Raises:
-        UserError: the compiler cannot build for a platform, or reports an error; its last lines are told.
+        UserError: the compiler cannot build for a platform, or reports an error; the message quotes its last lines.
     """
     check_platforms(compiler, platforms)
     place = cache or user_cache_path("quasiomni") / "fmu"

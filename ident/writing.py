@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import secrets
 import stat
@@ -200,3 +201,8 @@ def _sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def json_number(value: float) -> float | None:
+    """A number as JSON can hold it, which has no NaN and no infinity."""
+    return float(value) if math.isfinite(value) else None

@@ -99,7 +99,7 @@ COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
     },
     "safety": {
         "safety": "Let the master die at speed: is the vehicle at rest, after what time and distance? Exit code 1 if "
-        "not as told.",
+        "not as set.",
     },
     "installation": {"doctor": "What is installed here, and what is missing for what. Exit code 1 if something is."},
     "exam": {"exam": "The withheld exam of the gap diagnosis."},

@@ -8,20 +8,18 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from hil.campaign.folder import network_file_of
 from hil.exam.answer_file import open_cases
 from hil.exam.cases import Composition
 from hil.exam.folder import ExamFolder
 from hil.exam.score_figures import confusion_svg, reliability_svg
 from hil.exam.score_report import score_exam, score_json, score_markdown, summary_lines
 from hil.exam.scoring import removable
-from hil.exam.sizes import SIZES_FILE, load_rows, load_sizes, replaced, table_text
-from hil.network import load_network
+from hil.exam.sizes import load_rows, load_sizes, replaced, table_text
 from ident.errors import UserError
 from ident.extras import Extra, require
 from ident.writing import write_whole
 from quasiomni.application import app, console, show_next
-from quasiomni.options import load_emulation
+from quasiomni.options import EngineOption, VehicleOption, load_emulation
 from quasiomni.showing import bar
 
 exam = typer.Typer(no_args_is_help=True, help="The withheld exam of the gap diagnosis.")
@@ -58,7 +56,15 @@ def seal(
     excitations: Annotated[
         int, typer.Option(min=1, help="Pairs of campaigns, to fit and to confirm, that the cases share.")
     ] = _DEFAULT.excitations,
-    sizes: Annotated[Path, typer.Option(help="Table of sizes.")] = SIZES_FILE,
+    vehicle: VehicleOption = "prototype",
+    engine: EngineOption = None,
+    sizes: Annotated[
+        Path | None, typer.Option(help="Table of sizes. Default: that kept for the vehicle and the engine.")
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="Model under test (parameters.toml). Default: that kept for the vehicle and the engine."),
+    ] = None,
     jobs: JobsOption = 2,
     scheduler: SchedulerOption = None,
 ) -> None:
@@ -67,11 +73,14 @@ def seal(
     require(Extra.EXAM, "exam seal", () if key is not None else ("pyarrow",))
     _require_cluster(scheduler)
     from hil.exam.sealing import SealingOrder, seal
+    from hil.exam.world import stored_model, stored_sizes, world_of
 
+    world = world_of(vehicle, engine)
+    table = load_sizes(stored_sizes(world, sizes))
     composition = Composition(effects, pairs, none, unknown, invisible, excitations)
-    order = SealingOrder(out, "prototype", composition, key, first_seed, jobs, scheduler)
+    order = SealingOrder(out, world, stored_model(world, model), composition, key, first_seed, jobs, scheduler)
     with bar("sealing") as shown:
-        sealed = seal(order, load_sizes(sizes), shown)
+        sealed = seal(order, table, shown)
     undriven = sum(ExamFolder(out).undriven(name).is_file() for name in sealed.identifiers)
     if undriven:
         console.print(f"{undriven} cases stopped the campaign and have no records.", style="yellow")
@@ -107,9 +116,11 @@ def diagnose(
 
 @exam.command()
 def calibrate(
-    out: Annotated[Path, typer.Option(help="Table of sizes to write.")] = SIZES_FILE,
+    out: Annotated[Path, typer.Option(help="Table of sizes to write.")],
+    vehicle: VehicleOption = "prototype",
+    engine: EngineOption = None,
     effect: Annotated[
-        list[str] | None, typer.Option(help="Measure this one anew, and keep the other rows of the table.")
+        list[str] | None, typer.Option(help="Measure this one alone; other rows of a table that is there are kept.")
     ] = None,
     jobs: JobsOption = 2,
 ) -> None:
@@ -117,14 +128,15 @@ def calibrate(
     load_emulation()
     from hil.exam.calibration import calibrate
     from hil.exam.probes import EVERY
+    from hil.exam.world import world_of
 
     strangers = sorted(set(effect or ()) - EVERY)
     if strangers:
         raise UserError(f"No effect is called {strangers[0]}.", f"Name some of {', '.join(sorted(EVERY))}.")
-    kept = load_rows(out) if effect else None
-    cycle = load_network(network_file_of("prototype")).cycle_period
+    world = world_of(vehicle, engine)
+    kept = load_rows(out) if effect and out.is_file() else None
     with bar("measuring") as shown:
-        rows = calibrate("prototype", cycle, jobs, shown, effect or EVERY)
+        rows = calibrate(world, jobs, shown, effect or EVERY)
     rows = rows if kept is None else replaced(kept, rows)
     write_whole(table_text(rows), out)
     console.print(f"Written: {out}")

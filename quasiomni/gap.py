@@ -27,7 +27,7 @@ def diagnose(
     ] = None,
     network: NetworkOption = None,
     model: Annotated[
-        Path | None, typer.Option(help="parameters.toml of the model that is judged. Default: refitted.")
+        Path | None, typer.Option(help="parameters.toml of the model under test. Default: refitted.")
     ] = None,
     axis: Annotated[
         bool, typer.Option("--axis", help="The records are of servo axes: time, position, effort.")

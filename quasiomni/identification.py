@@ -11,7 +11,7 @@ from hil.campaign.folder import RunFolder, open_run
 from hil.campaign.results import Result, identify_records, identify_run, report_run, write_result
 from ident.assessment import Verdict
 from ident.errors import UserError
-from ident.estimate.identify import KnownInertia
+from ident.estimate.result import KnownInertia
 from ident.report.assessment import assessment_lines
 from ident.report.tables import condition_line, excitation_table, paper_table, parameter_table, step_table
 from quasiomni.application import app, console

@@ -31,11 +31,11 @@ from ident.effects.combining import combined
 from ident.effects.extended import ExtendedModel, simulation_of
 from ident.effects.text import parse_effect
 from ident.errors import UserError as UserError
-from ident.estimate.identify import Identification, KnownInertia
 from ident.estimate.identify import identify as identify_record
 from ident.estimate.least_squares import ORDINARY, Estimator
 from ident.estimate.least_squares import LeastSquares as LeastSquares
 from ident.estimate.least_squares import WeightedLeastSquares as WeightedLeastSquares
+from ident.estimate.result import Identification, KnownInertia
 from ident.extras import named_engine, require_engine
 from ident.faults import find_faults
 from ident.plant.modes import Mode as Mode
@@ -45,7 +45,6 @@ from ident.records.files import read_record as read_file
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.description import load_vehicle as load_vehicle
-from ident.vehicle.parameters import Parameters
 from ident.writing import write_whole
 
 if TYPE_CHECKING:
@@ -90,8 +89,7 @@ def assess(result: Identification, record: Record, vehicle: VehicleDescription) 
 
 def model_of(result: Identification, effects: Sequence[Effect] = ()) -> ExtendedModel:
     """The model that an identification found, with effects beside it."""
-    std = [estimate.std for estimate in result.estimates]
-    return ExtendedModel(Parameters(result.values, np.array(std)), tuple(effects))
+    return ExtendedModel(result.parameters, tuple(effects))
 
 
 def diagnose(
@@ -106,7 +104,7 @@ def diagnose(
         fit: records that causes are looked for in.
         confirm: other records of the same vehicle; none: a part of `fit` confirms.
         vehicle: its geometry is taken as true.
-        model: being judged; None: parameters are refitted, only structure can be missing.
+        model: under test; None: parameters are refitted, only structure can be missing.
 
     Raises:
         UserError: a record is of another vehicle, does not move, or holds none of the steps of a diagnosis.
@@ -120,7 +118,7 @@ def extend(
     """The model with what a diagnosis found, its parameters refitted; or with effects as `name@place=size`.
 
     Args:
-        model: that was judged.
+        model: under test.
         found: a diagnosis of it, or effects.
         vehicle: for what the records of a diagnosis do not show.
 

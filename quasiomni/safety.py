@@ -30,7 +30,7 @@ def safety(
     seed: SeedOption = 1,
     out: Annotated[Path | None, typer.Option("--json", help="File for the report.")] = None,
 ) -> None:
-    """Let the master die at speed: is the vehicle at rest, after what time and distance? Exit code 1 if not as told."""
+    """Let the master die at speed: is the vehicle at rest, after what time and distance? Exit code 1 if not as set."""
     chosen = choose_engine(engine)
     from hil.safety.emulated import let_master_die
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from hil.bench import emulation
-from hil.campaign.folder import Run, RunFolder, create_run, network_file_of
+from hil.campaign.creating import create_run
+from hil.campaign.folder import Run, RunFolder, network_file_of
 from hil.campaign.runner import CampaignRunner
 from hil.describing import check_measures
 from hil.frames.recorder import LogFormat, Recorder
@@ -18,7 +19,7 @@ from hil.network import load_network
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import PERIODS
 from ident.errors import DataFileError
-from ident.estimate.identify import KnownInertia
+from ident.estimate.result import KnownInertia
 from ident.records.record import Step
 from ident.vehicle.description import find_data_file, load_vehicle
 from ident.vehicle.geometry import check_geometry

@@ -39,7 +39,7 @@ class NmtSlave:
         node_id: whom commands address, besides everybody (0).
         initialise: called in a reset, with True when the application is reset too; sends nothing.
         boot_up: sends the boot-up message.
-        changed: told every new state.
+        changed: called with every new state.
     """
 
     def __init__(

@@ -23,7 +23,7 @@ class SyncService:
     Args:
         dictionary: holds 1005h, 1006h and 1019h.
         timers: simulated time.
-        listen: told which CAN identifier is the SYNC, and when `plain` changes.
+        listen: called with the CAN identifier of the SYNC, and when `plain` changes.
         produce: transmits a SYNC (CAN identifier, data), and lets this node act on it.
 
     Attributes:

@@ -18,7 +18,7 @@ class Clock(Protocol):
 
 
 class SimulatedClock:
-    """Time that passes only when it is told to.
+    """Time that passes only while somebody waits.
 
     Args:
         on_advance: called with the new instant [s] before it becomes `now`; the owner of the simulation moves

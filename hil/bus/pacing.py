@@ -1,4 +1,4 @@
-"""Senders that are faster than a wire, told from masters that wait for answers, and held to the speed of the wire."""
+"""Senders that are faster than a wire, held to its speed; masters that wait for answers are not."""
 
 from __future__ import annotations
 

@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from hil.campaign.folder import describe, sources_of
 from hil.campaign.reading import first_run, read_of, whole_records
 from hil.network.described import told_differences
-from ident.assessment.file import refuse_unusable
 from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.diagnosis import Diagnosis, Verdict, faulty, write_diagnosis
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.vehicle.closing import extended_model
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.diagnosis.vehicle.unseen import unseen_gaps
-from ident.effects.extended import ExtendedModel, read_model, write_model
+from ident.effects.extended import ExtendedModel
 from ident.errors import RecordError, UserError
 from ident.faults import Fault, find_faults
+from ident.parameters_file import read_model, write_model
 from ident.records.axis_record import AxisKind, AxisRecord, read_axis_record
 from ident.records.record import Record
 from ident.report.faults import fault_lines, write_fault_report
@@ -30,7 +30,6 @@ from ident.report.gap import GapReport, write_gap_report
 from ident.report.gap_summary import summary_lines
 from ident.stages import Stage, untold
 from ident.vehicle.description import VehicleDescription, find_data_file
-from ident.vehicle.quantities import read_toml
 from ident.writing import refuse_folder, refuse_inputs
 
 Array = NDArray[np.float64]
@@ -55,7 +54,7 @@ class DiagnosisOrder:
         records: run folders or files to look for causes in.
         confirm: the same, independent of them; none: a part of `records` confirms.
         vehicle: shipped vehicle file by name, or a path; None: that of the first run folder, or the prototype.
-        model: `parameters.toml` that is judged; None: the parameters are refitted.
+        model: `parameters.toml` under test; None: the parameters are refitted.
         axis: the records are of servo axes.
         seed: of the surrogates.
         json, report, extended: files to write, or None; `extended` is the model with the effects that are named.
@@ -163,7 +162,7 @@ def write_answer(order: DiagnosisOrder, answer: Answer) -> list[Path]:
 
 
 def _provenance(order: DiagnosisOrder) -> dict[str, str]:
-    """What the numbers of the model come from: names of the records, and of the model that was judged."""
+    """What the numbers of the model come from: names of the records, and of the model under test."""
     sources = {"run": "diagnosis", "records": _names(order.records)}
     if order.confirm:
         sources["confirm"] = _names(order.confirm)
@@ -177,7 +176,7 @@ def _names(paths: Sequence[Path]) -> str:
 
 
 def _refuse_unworkable(order: DiagnosisOrder) -> None:
-    """Refuse what could not be judged or written, before the work.
+    """Refuse what could not be diagnosed or written, before the work.
 
     Raises:
         UserError: a name is that of a folder or of a file that is read, there is no such model, or it was assessed as
@@ -186,7 +185,7 @@ def _refuse_unworkable(order: DiagnosisOrder) -> None:
     if order.model is not None and not order.axis:
         # What is written would be a model without an assessment, so force does not reach so far.
         force = order.force and order.extended is None
-        refuse_unusable(read_toml(order.model), str(order.model), force=force)
+        read_model(order.model, force=force)
     for path in order.files:
         refuse_folder(path)
     read = [source for path in (*order.records, *order.confirm) for source in sources_of(path)]

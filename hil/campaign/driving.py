@@ -7,7 +7,8 @@ from contextlib import suppress
 import can
 
 from hil.bus.clock import Clock
-from hil.campaign.folder import Run, create_run
+from hil.campaign.creating import create_run
+from hil.campaign.folder import Run
 from hil.campaign.inspection import Rejected, reject_unusable
 from hil.campaign.order import Order
 from hil.campaign.runner import CampaignRunner, Operator, Progress
@@ -45,7 +46,7 @@ def drive_run(
         run, order: what to drive.
         bus, clock: of the vehicle.
         operator: lifts and lowers the vehicle.
-        progress: told how far each step is.
+        progress: called with the progress of each step.
         lockstep: SYNCs move the time of the other side, and wall time says nothing of its samples.
 
     Raises:

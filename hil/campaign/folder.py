@@ -13,7 +13,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,25 +25,19 @@ from hil.campaign.carried import (
     VEHICLE_FILE,
     carried_network,
     carried_vehicle,
-    check_readable,
     is_carried,
-    refuse_others,
-    write_carried,
 )
-from hil.campaign.lock import refuse_driven
-from hil.frames.recorder import recorded_files
 from hil.network import DEFAULT_NETWORK, Network
 from hil.network.described import Described, load_described
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.optimise import Excitation
 from ident.campaign.plan import Plan, assemble_plan
 from ident.campaign.steps import DRIVING_ORDER
-from ident.errors import CampaignError, DataFileError
-from ident.estimate.identify import KnownInertia
+from ident.errors import DataFileError
+from ident.estimate.result import KnownInertia
 from ident.extras import EngineName
 from ident.reading import read_json
 from ident.vehicle.description import VehicleDescription
-from ident.writing import write_whole
 
 SCHEMA: Final = "quasiomni.run/1"
 
@@ -152,73 +145,6 @@ def sources_of(path: Path) -> tuple[Path, ...]:
     return (*RunFolder(path).sources, *path.glob("[0-9][0-9][0-9]_*"))
 
 
-def refuse_used(folder: RunFolder, vehicle_file: Path, network_file: Path, *, by_demo: bool = False) -> None:
-    """Refuse a folder in which a new run would overwrite anything; a demo may replace what a demo has left.
-
-    Raises:
-        CampaignError: the folder already holds a run or other files of its names, or another process drives into it.
-    """
-    refuse_driven(folder.path)
-    if by_demo and is_demo(folder):
-        return
-    if _holds_run(folder):
-        raise _used(folder)
-    refuse_others(carried_vehicle(vehicle_file), folder.path)
-    refuse_others(carried_network(network_file), folder.network.parent)
-
-
-def _holds_run(folder: RunFolder) -> bool:
-    return folder.manifest.exists() or any(folder.frames.glob("*"))
-
-
-def _used(folder: RunFolder) -> CampaignError:
-    return CampaignError(
-        f"{folder.path} already holds a run.", "Go on with it (--resume), or name another folder (--out)."
-    )
-
-
-def is_demo(folder: RunFolder) -> bool:
-    """Whether a demo has made the folder; one whose manifest cannot be read is somebody's work."""
-    try:
-        manifest = read_json(folder.manifest)
-    except DataFileError:
-        return False
-    return isinstance(manifest, dict) and manifest.get("demo") is True
-
-
-def create_run(run: Run, vehicle_file: Path) -> None:
-    """Make the folder, carry vehicle and network files into it, read them back, and write the manifest last.
-
-    Whoever creates a run that others may create at the same time does so while `driving` the folder. A demo replaces
-    logs, files and manifest of an earlier demo.
-
-    Raises:
-        CampaignError: the folder already holds a run or other files of these names, or does not read as planned.
-        UserError: it cannot be written.
-    """
-    folder = run.folder
-    replaced = run.demo and is_demo(folder)
-    if replaced:
-        _delete_logs(folder)
-    elif _holds_run(folder):
-        raise _used(folder)
-    write_carried(carried_vehicle(vehicle_file), folder.path, replace=replaced)
-    write_carried(carried_network(run.network.path), folder.network.parent, replace=replaced)
-    check_readable(folder.vehicle, folder.network, run.plan.vehicle, run.network)
-    write_whole(json.dumps(_manifest(run), indent=1), folder.manifest)
-
-
-def _delete_logs(folder: RunFolder) -> None:
-    try:
-        for log in recorded_files(folder.frames):
-            log.unlink()
-    except OSError as error:
-        raise CampaignError(
-            f"The logs of the last demo in {folder.frames} cannot be deleted: {error.strerror}.",
-            "Name another folder (--out).",
-        ) from error
-
-
 def carries_vehicle(folder: RunFolder, path: Path) -> bool:
     """Whether a vehicle file is the one that the folder carries."""
     return is_carried(carried_vehicle(path), folder.path)
@@ -265,7 +191,8 @@ def describe(run: Run | None, vehicle: str | None, network: Path | None) -> Desc
     return load_described(vehicle or run.folder.vehicle, network or run.folder.network)
 
 
-def _manifest(run: Run) -> dict[str, Any]:
+def manifest_of(run: Run) -> dict[str, Any]:
+    """Contents of `run.json`; `open_run` reads them."""
     plan, inertia = run.plan, run.known_inertia
     return {
         "schema": SCHEMA,

@@ -9,20 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.campaign.folder import (
-    Run,
-    RunFolder,
-    carries_network,
-    carries_vehicle,
-    network_file_of,
-    refuse_used,
-)
+from hil.campaign.creating import refuse_used
+from hil.campaign.folder import Run, RunFolder, carries_network, carries_vehicle, network_file_of
 from hil.frames.recorder import LogFormat
 from hil.network.described import load_described
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import DIAGNOSTIC
 from ident.errors import CampaignError
-from ident.estimate.identify import KnownInertia
+from ident.estimate.result import KnownInertia
 from ident.extras import EngineName
 from ident.vehicle.description import find_data_file
 
@@ -63,7 +57,7 @@ class Order:
 
 
 Planned = Callable[[int, int], None]
-"""Told how many excitations are optimised, of how many."""
+"""Called with the number of excitations optimised, and of all."""
 
 
 def _unheard(_done: int, _total: int) -> None:

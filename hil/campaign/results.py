@@ -16,18 +16,19 @@ from ident.assessment import Assessment, assess
 from ident.assessment.faults import blamed_on
 from ident.campaign.plan import Plan
 from ident.errors import EstimationError, UserError
-from ident.estimate.identify import Identification, KnownInertia, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import Identification, KnownInertia
 from ident.faults import find_faults
+from ident.parameters_file import Identified, write_model
 from ident.records.record import Record
 from ident.report.html import ReportContent, write_report
-from ident.report.result_file import write_parameters
 from ident.stages import Stage, untold
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import Parameters
 from ident.writing import refuse_inputs, refuse_unlike
 
 _RESULTS: Final = {"parameters.toml": b"naive_std = ", "report.html": b"<title>Identification of "}
-"""Files that an identification writes without being told their names, and what is in each of them."""
+"""Files that an identification writes under fixed names, and what is in each of them."""
 
 PAPER_PROTOTYPE = "prototype"
 """Name of the vehicle that Table 2 of the paper describes."""
@@ -64,8 +65,8 @@ def identify_run(
         known_inertia: B_w in place of that of the run.
         truth: shown beside the result.
         vehicle, network: files to take in place of those in the run folder; what differs is said.
-        stage: told what begins.
-        note: told what differs, before the work: it may be why there is no result.
+        stage: called with the name of each stage.
+        note: called with what differs, before the work: it may be why there is no result.
 
     Raises:
         UserError: the folder, a log, a file that is given, or the excitation in the logs will not do.
@@ -117,7 +118,8 @@ def write_result(content: ReportContent, out: Path) -> tuple[Path, Path]:
     parameters, report = (out / name for name in _RESULTS)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        write_parameters(content.identification, content.assessment, parameters, content.provenance)
+        identified = Identified(content.identification, content.assessment)
+        write_model(identified.model, parameters, content.provenance, identified)
     except OSError as error:
         raise UserError(f"{out} cannot be written to: {error.strerror}.", "Name another folder (--out).") from error
     write_report(content, report)

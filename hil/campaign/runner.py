@@ -256,7 +256,7 @@ class CampaignRunner:
             return vehicle.prior
         if assess(result, record, vehicle, find_faults(record, vehicle)).verdict is Verdict.UNUSABLE:
             return vehicle.prior
-        return Parameters(result.values, np.array([estimate.std for estimate in result.estimates]))
+        return result.parameters
 
     def _identifiable(self) -> bool:
         finished = {step for step, _ in finished_steps(self._run.folder.frames)}

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from ident.estimate.identify import Identification
+from ident.estimate.result import Identification
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 Array = NDArray[np.float64]

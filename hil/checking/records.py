@@ -15,7 +15,7 @@ from hil.network.described import Described
 from ident.assessment.signals import signal_reasons
 from ident.campaign.steps import DRIVING_ORDER
 from ident.faults import FaultName, find_faults
-from ident.records.record import Record, Segment, Step, base_step
+from ident.records.record import FOUR_STEPS, Record, Segment, Step, base_step
 from ident.vehicle.geometry import WHEELS
 
 RATE_TOLERANCE: Final = 0.01
@@ -25,10 +25,7 @@ LEVER_TOLERANCE: Final = 0.01
 """Relative, of the wheel rolling per steering motion at standstill: more than creep and play do to it."""
 
 LEAST_STEERING: Final = 0.1
-"""Range of a steering angle from which the lever is told [rad]."""
-
-NEEDED: Final = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION)
-"""Steps without which nothing is identified."""
+"""Range of a steering angle from which the lever is estimated [rad]."""
 
 _SIDES: Final = {Step.STEERING_LEFT: (0, (0, 1)), Step.STEERING_RIGHT: (1, (2, 3))}
 """Steering steps: which encoder, and which wheels roll."""
@@ -68,7 +65,7 @@ def _steps(record: Record, _described: Described) -> Iterator[Finding]:
             f"Step {step!r} is none of a campaign.",
             f"It is passed over; the steps are {', '.join(DRIVING_ORDER)}.",
         )
-    missing = [step for step in NEEDED if step not in driven]
+    missing = [step for step in FOUR_STEPS if step not in driven]
     if missing:
         yield Finding(
             Severity.WARNING,

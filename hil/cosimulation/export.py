@@ -13,12 +13,9 @@ from fmu.packaging import Order, build_fmu
 from fmu.source import ModelSource
 from hil.campaign.folder import RunFolder, open_run, sources_of
 from hil.campaign.results import provenance_of
-from ident.assessment.file import refuse_unusable
-from ident.effects.text import read_effects
 from ident.errors import DataFileError
+from ident.parameters_file import read_model
 from ident.vehicle.description import load_vehicle
-from ident.vehicle.parameters import read_parameters
-from ident.vehicle.quantities import read_toml
 from ident.writing import refuse_inputs, write_whole
 
 
@@ -59,19 +56,18 @@ def source_of_files(parameters: Path, vehicle: Path, provenance: dict[str, str],
         DataFileError: a file is missing or malformed, or has an effect twice.
         UserError: the parameters were assessed as unusable, and `force` is not set.
     """
-    document = read_toml(parameters)
-    refuse_unusable(document, str(parameters), force=force)
+    model = read_model(parameters, force=force)
     return ModelSource(
         vehicle=load_vehicle(vehicle),
-        parameters=read_parameters(parameters),
-        effects=read_effects(document, str(parameters)),
+        parameters=model.parameters,
+        effects=model.effects,
         provenance=provenance,
         documents={"parameters.toml": parameters.read_bytes(), "vehicle.toml": vehicle.read_bytes()},
     )
 
 
 Compiled = Callable[[str, int, int], None]
-"""Told the compiler, and how many platforms are compiled, of how many."""
+"""Called with the compiler, and the number of platforms compiled, and of all."""
 
 
 def _unheard(_compiler: str, _done: int, _total: int) -> None:
@@ -95,7 +91,7 @@ def export_run(
         order: version, inputs and platforms.
         model: a `parameters.toml` in place of that of the run.
         force: take a model that was assessed as unusable.
-        compiled: told how far it is.
+        compiled: called with the progress.
 
     Raises:
         UserError: the run is not identified, there is no compiler for a platform, or the file cannot be written or is

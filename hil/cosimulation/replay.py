@@ -117,7 +117,7 @@ def _start(fmu: Path, segment: Segment, spec: RowsOfStep, geometry: Geometry) ->
     for side, measured, offset in zip(_SIDES, segment.steering_angles[0], added, strict=True):
         angles[f"alpha_{side}"] = float(measured - offset)
     processing = Processing()
-    # By a line through samples of which each has been judged by its neighbours.
+    # By a line through samples each of which has been checked against its neighbours.
     smooth = motion_of(segment, geometry, processing).rates
     rates = 2 * smooth[UNJUDGED] - smooth[2 * UNJUDGED]
     moving = np.any(np.abs(rates[3:]) > processing.moving)

@@ -15,6 +15,7 @@ import numpy as np
 from hil.exam.cases import Case, Injected, Kind
 from hil.exam.folder import ExamFolder
 from hil.exam.identity import Identities, Identity
+from hil.exam.said import Said, said_from
 from hil.exam.statistics import Z95
 from ident.diagnosis.vehicle.library import DRIFTS, SHAPES
 from ident.errors import UserError
@@ -22,8 +23,6 @@ from ident.errors import UserError
 CONFIDENT: Final = 0.5
 """Probability from which on a single name counts as a confident one."""
 
-FAILED: Final = "failed"
-"""Verdict of a diagnosis that ended in an error."""
 
 _TURNED: Final = frozenset(str(name) for name, shape in SHAPES.items() if shape.angle is not None)
 """Effects with a direction or a phase: half a turn of it is the other sign of the size."""
@@ -31,41 +30,6 @@ _TURNED: Final = frozenset(str(name) for name, shape in SHAPES.items() if shape.
 _SPECIAL: Final = MappingProxyType({Kind.INVISIBLE: " (invisible)", Kind.UNKNOWN: " (no candidate)"})
 
 _VERDICTS: Final = MappingProxyType({Kind.NONE: "none", Kind.INVISIBLE: "none", Kind.UNKNOWN: "unknown"})
-
-
-@dataclass(frozen=True)
-class Alone:
-    """What a name closes of the removable held-out gap in place of the answer: `ident.diagnosis.alone`.
-
-    Attributes:
-        name: of the effect.
-        refitted, held: with the parameters of the model refitted, and held at its values; NaN where that says nothing.
-    """
-
-    name: str
-    refitted: float
-    held: float
-
-
-@dataclass(frozen=True)
-class Said:
-    """What the diagnosing side said of one case.
-
-    Attributes:
-        verdict: `effect`, `none`, `unknown` or `failed`.
-        effects: as in `diagnosis.json`, most probable first; none unless the verdict is `effect`.
-        invisible: names that the records cannot show.
-        closed: share of the removable held-out gap that the whole answer closes.
-        seconds: processor time [s].
-        alone: what every name closes by itself.
-    """
-
-    verdict: str
-    effects: tuple[Mapping[str, Any], ...] = ()
-    invisible: tuple[str, ...] = ()
-    closed: float = math.nan
-    seconds: float = math.nan
-    alone: tuple[Alone, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -277,19 +241,6 @@ def read_answers(
     ]
 
 
-def said_from(content: Mapping[str, Any]) -> Said:
-    """What a file of the diagnosing side says."""
-    alone = content.get("alone", ())
-    return Said(
-        verdict=str(content["verdict"]),
-        effects=tuple(content["effects"]),
-        invisible=tuple(content["invisible"]),
-        closed=_number(content["gap"]["closed"]),
-        seconds=_number(content.get("seconds")),
-        alone=tuple(Alone(one["name"], _number(one["refitted"]), _number(one["held"])) for one in alone),
-    )
-
-
 def permuted(answers: Sequence[Answer], generator: np.random.Generator) -> list[Answer]:
     """The same answers beside the truths of other cases."""
     order = generator.permutation(len(answers)).tolist()
@@ -321,7 +272,3 @@ def _matched(wanted: Sequence[int], found: Sequence[set[int]]) -> bool:
     return any(
         first in each and _matched(others, [*found[:index], *found[index + 1 :]]) for index, each in enumerate(found)
     )
-
-
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)

@@ -18,6 +18,8 @@ from hil.exam.quiet import drive_quietly
 from hil.exam.sealing import effect_of
 from hil.exam.sizes import EffectSize
 from hil.exam.workers import run_all
+from hil.exam.world import World
+from hil.network import load_network
 from ident.campaign.plan import Plan
 from ident.diagnosis.vehicle.library import DRIFTS
 from ident.errors import UserError
@@ -60,28 +62,26 @@ class Bench:
     plain: Record
     truth: Parameters
     geometry: Geometry
-    prototype: str
+    world: World
 
 
 def calibrate(
-    prototype: str,
-    cycle: float,
+    world: World,
     jobs: int,
     progress: Callable[[int, int], None],
     names: Container[str] = EVERY,
 ) -> list[EffectSize]:
-    """The table of sizes of a prototype, or the rows of some effects.
+    """The table of sizes of a world, or the rows of some effects.
 
     Args:
-        prototype: of the emulator, by name.
-        cycle: T_s [s].
+        world: vehicle and engine.
         jobs: processes on this machine.
         progress: called with effects measured and in all.
         names: of the effects.
     """
-    probes = [probe for probe in all_probes(load_vehicle(prototype)) if probe.name in names]
+    probes = [probe for probe in all_probes(load_vehicle(world.vehicle)) if probe.name in names]
     stand_ins = {_key(probe): probe for probe in probes}
-    tasks = [(prototype, cycle, probe) for probe in stand_ins.values()]
+    tasks = [(world, probe) for probe in stand_ins.values()]
     measured: dict[tuple[str, str], tuple[str, Points]] = {}
     progress(0, len(tasks))
     for key, channel, points in run_all(measure, tasks, jobs=jobs, scheduler=None):
@@ -90,9 +90,9 @@ def calibrate(
     return [_row(probe, *measured[_key(probe)]) for probe in probes]
 
 
-def measure(prototype: str, cycle: float, probe: Probe) -> tuple[tuple[str, str], str, Points]:
+def measure(world: World, probe: Probe) -> tuple[tuple[str, str], str, Points]:
     """Key of a probe, the channel that shows it and its points there, no points where none does; runs in a worker."""
-    bench = _bench(prototype, cycle)
+    bench = _bench(world)
     shares = (*SHARES, IDLE) if INJECTORS[probe.name].threshold else SHARES
     found = {size: units for share in shares if (units := _units(probe, size := _of_share(probe, share), bench))}
     channel = _shown_in(probe, list(found.values()))
@@ -123,18 +123,18 @@ def _key(probe: Probe) -> tuple[str, str]:
 
 
 @lru_cache(maxsize=1)
-def _bench(prototype: str, cycle: float) -> Bench:
-    vehicle = load_vehicle(prototype)
-    plan, truth = plan_exam(vehicle, PLAN_SEED, cycle).fit, truth_of(prototype)
-    noise = noise_of(drive(plan, prototype, NOISE_SEED, ()), truth.values, vehicle.geometry)
+def _bench(world: World) -> Bench:
+    vehicle, cycle = load_vehicle(world.vehicle), load_network(world.network_file).cycle_period
+    plan, truth = plan_exam(vehicle, PLAN_SEED, cycle).fit, truth_of(world.vehicle)
+    noise = noise_of(drive(plan, world, NOISE_SEED, ()), truth.values, vehicle.geometry)
     once = replace(plan, periods=1)
-    return Bench(once, noise, drive_quietly(once, prototype, ()), truth, vehicle.geometry, prototype)
+    return Bench(once, noise, drive_quietly(once, world, ()), truth, vehicle.geometry, world)
 
 
 def _units(probe: Probe, size: float, bench: Bench) -> SizeInNoise | None:
     """Noise units of a size; None where the vehicle cannot be driven with it."""
     try:
-        record = drive_quietly(bench.plan, bench.prototype, [effect_of(probe.injected(size))])
+        record = drive_quietly(bench.plan, bench.world, [effect_of(probe.injected(size))])
     except UserError:
         return None
     return size_in_noise(bench.noise, bench.plain, record, bench.truth.values, bench.geometry)

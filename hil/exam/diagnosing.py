@@ -20,8 +20,8 @@ from hil.exam.workers import run_all
 from ident.diagnosis.alone import closed_alone
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.vehicle.diagnose import VehicleDiagnosis, diagnose_vehicle
-from ident.effects.extended import read_model
 from ident.errors import UserError
+from ident.parameters_file import read_model
 from ident.vehicle.description import load_vehicle
 from ident.writing import write_whole
 

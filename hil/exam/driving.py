@@ -10,13 +10,12 @@ import can
 import numpy as np
 
 from emulator.effects import Wanted
-from emulator.vehicle import EmulatedVehicle
 from hil.bench.emulation import BenchOperator
 from hil.bench.lockstep import LockstepBench
-from hil.bench.prototypes import load_emulated
-from hil.campaign.folder import Run, RunFolder, network_file_of
+from hil.campaign.folder import Run, RunFolder
 from hil.campaign.reading import segment_of
 from hil.campaign.runner import CampaignRunner
+from hil.exam.world import World
 from hil.frames import FrameTable, decode_frames
 from ident.campaign.plan import Plan
 from ident.records.record import Record, Step
@@ -54,26 +53,25 @@ class FramesInMemory:
         """Nothing is ever on its way to a disk."""
 
 
-def drive(plan: Plan, prototype: str, seed: int, effects: Sequence[Wanted]) -> Record:
+def drive(plan: Plan, world: World, seed: int, effects: Sequence[Wanted]) -> Record:
     """Record of a plan driven by a vehicle with effects.
 
     The alignments between the steps are no part of it: how many there were depends on the effect.
 
     Args:
         plan: the campaign.
-        prototype: of the emulator, by name.
+        world: vehicle and engine.
         seed: of all noise.
         effects: that the vehicle has.
 
     Raises:
         UserError: the vehicle cannot have the effects, or cannot drive with them.
     """
-    emulated = load_emulated(prototype, network_file_of(prototype))
-    network = emulated.network
-    run = Run(RunFolder(Path(_SOURCE)), plan, network, seed, "", prototype, None)
+    network = world.emulated().network
+    run = Run(RunFolder(Path(_SOURCE)), plan, network, seed, "", world.vehicle, None)
     frames = FramesInMemory()
     with (
-        EmulatedVehicle(emulated.prototype, seed=seed, effects=effects) as vehicle,
+        world.emulate(seed, effects) as vehicle,
         LockstepBench(vehicle, network.path) as bench,
     ):
         CampaignRunner(

@@ -3,7 +3,7 @@
 | entry | what |
 |---|---|
 | `exam.json` | identifiers in shuffled order, excitations, whether it is sealed, hash of the answer |
-| `vehicle.toml`, `model.toml` | what is known of the vehicle, and the model to be judged |
+| `vehicle.toml`, `model.toml` | what is known of the vehicle, and the model under test |
 | `cases/ID.fit.parquet`, `cases/ID.confirm.parquet` | the records, all of one size and date |
 | `truth/answer.json` | the answer, encrypted; `exam score` opens it with the key, which lies elsewhere |
 | `truth/ID.json` | why a case could not be driven, encrypted as well |
@@ -21,7 +21,7 @@ from ident.errors import UserError
 from ident.reading import read_json
 from ident.writing import write_whole
 
-SCHEMA: Final = "quasiomni.exam/3"
+SCHEMA: Final = "quasiomni.exam/4"
 RECORDS: Final = ("fit", "confirm")
 
 
@@ -43,7 +43,7 @@ class ExamFolder:
 
     @property
     def model(self) -> Path:
-        """The model that is judged."""
+        """The model under test."""
         return self.path / "model.toml"
 
     @property
@@ -77,7 +77,7 @@ class Exam:
     """What everyone may know of an exam.
 
     Attributes:
-        prototype: of the emulator, by name.
+        vehicle, engine: the world that the cases are driven in: name or path, and name.
         cycle: T_s [s].
         plans: the pairs of campaigns that the cases drive, as JSON texts.
         identifiers: of the cases, in shuffled order.
@@ -87,7 +87,8 @@ class Exam:
         answer_hash: SHA-256 of the file of the answer.
     """
 
-    prototype: str
+    vehicle: str
+    engine: str
     cycle: float
     plans: tuple[str, ...]
     identifiers: tuple[str, ...]
@@ -95,6 +96,11 @@ class Exam:
     salt: str
     key: str
     answer_hash: str = ""
+
+    @property
+    def world(self) -> str:
+        """Vehicle and engine in words."""
+        return f"{self.vehicle} in {self.engine}"
 
     @property
     def sealed(self) -> bool:

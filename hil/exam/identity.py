@@ -28,7 +28,7 @@ from ident.diagnosis.vehicle.experiments import Driven, hidden_effects
 from ident.diagnosis.vehicle.library import DRIFTS, POSITIVE
 from ident.diagnosis.vehicle.visibility import RANK, VISIBLE, Visibility, row_noise
 from ident.effects import EFFECTS
-from ident.effects.extended import read_model
+from ident.parameters_file import read_model
 from ident.records.record import Record, Segment, make_segment
 from ident.vehicle.description import VehicleDescription, load_vehicle
 from ident.vehicle.parameters import Parameters

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.campaign.steps import EXCITATIONS
+from ident.diagnosis.linear import rms
 from ident.diagnosis.vehicle.creep import granted_creep
 from ident.estimate.equations import Equations, motion_of, usable_equations
 from ident.estimate.filters import Processing, moving_rows, zero_phase
@@ -94,8 +95,8 @@ def size_in_noise(noise: Noise, plain: Record, changed: Record, values: Array, g
     left = np.concatenate(gaps) - _absorbed(np.concatenate(columns), np.concatenate(gaps))
     ends = np.cumsum([len(gap) for gap in gaps])[:-1]
     return SizeInNoise(
-        torque=max(_rms(part) for part in np.split(left, ends)),
-        drift=max(_rms(gap) for gap in gaps),
+        torque=max(rms(part) for part in np.split(left, ends)),
+        drift=max(rms(gap) for gap in gaps),
         kinematic=max(
             _slip_size(one, other, noise.slips[one.step], geometry)
             for one, other in zip(plain.segments, changed.segments, strict=True)
@@ -114,10 +115,6 @@ def _absorbed(columns: Array, gap: Array) -> Array:
     return np.asarray(scaled @ np.linalg.lstsq(scaled, gap, rcond=None)[0])
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
-
-
 def _slips(segment: Segment, geometry: Geometry) -> tuple[Array, NDArray[np.bool_]]:
     """What odometry leaves of the eight constraints (N, 8) [m/s], and where any wheel moves (N,)."""
     motion = motion_of(segment, geometry, _PROCESSING)
@@ -131,7 +128,7 @@ def _slip_size(plain: Segment, changed: Segment, noise: Array, geometry: Geometr
     first, moving = _slips(plain, geometry)
     second, also_moving = _slips(changed, geometry)
     difference = (second - first)[moving & also_moving]
-    return max(_rms(difference[:, row]) / float(noise[row]) for row in range(8) if noise[row] > 0)
+    return max(rms(difference[:, row]) / float(noise[row]) for row in range(8) if noise[row] > 0)
 
 
 def _slip_noise(segment: Segment, geometry: Geometry) -> Array:

@@ -13,11 +13,8 @@ import numpy as np
 from hil.campaign.folder import excitation_entry, excitation_of
 from ident.campaign.plan import Plan, assemble_plan, make_plan
 from ident.campaign.steps import EXCITATIONS, PERIODS, StepSpec
-from ident.records.record import Step
+from ident.records.record import FOUR_STEPS, Step
 from ident.vehicle.description import VehicleDescription
-
-STEPS: Final = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION)
-"""The four steps of the paper."""
 
 
 def _shortened(periods: Mapping[Step, float]) -> Mapping[str, StepSpec]:
@@ -67,7 +64,7 @@ def plans_from_text(text: str, vehicle: VehicleDescription, cycle: float) -> Exa
         assemble_plan(
             vehicle,
             {Step(step): excitation_of(entry) for step, entry in document[name].items()},
-            steps=STEPS,
+            steps=FOUR_STEPS,
             periods=PERIODS,
             cycle=cycle,
             specs=specs,
@@ -87,7 +84,7 @@ def plan_exam(vehicle: VehicleDescription, seed: int, cycle: float) -> ExamPlans
     """
     generators = [np.random.default_rng(stream) for stream in np.random.SeedSequence(seed).spawn(2)]
     fit, confirm = (
-        make_plan(vehicle, generator, steps=STEPS, periods=PERIODS, cycle=cycle, specs=specs)
+        make_plan(vehicle, generator, steps=FOUR_STEPS, periods=PERIODS, cycle=cycle, specs=specs)
         for generator, specs in zip(generators, (FITTING, CONFIRMING), strict=True)
     )
     return ExamPlans(fit, confirm)

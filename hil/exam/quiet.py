@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emulator.effects import Wanted
-from emulator.prototype import load_prototype
+from emulator.prototype import Prototype
 from emulator.vehicle import EmulatedVehicle
+from hil.exam.world import World
 from ident.campaign.controller import Controller
 from ident.campaign.plan import Plan
 from ident.campaign.reference import Reference, sample_times
@@ -18,21 +19,21 @@ from ident.records.record import Record, Segment
 Array = NDArray[np.float64]
 
 
-def drive_quietly(plan: Plan, prototype: str, effects: Sequence[Wanted]) -> Record:
+def drive_quietly(plan: Plan, world: World, effects: Sequence[Wanted]) -> Record:
     """Record of a plan on a vehicle without noise, sampled and controlled in every cycle as over the bus.
 
     Args:
         plan: the campaign.
-        prototype: of the emulator, by name.
+        world: vehicle and engine.
         effects: that the vehicle has.
 
     Raises:
         UserError: the vehicle cannot have the effects, or cannot drive with them.
     """
-    with EmulatedVehicle(load_prototype(prototype), seed=0, noise_scale=0.0, effects=effects) as vehicle:
+    with world.emulate(0, effects, noise_scale=0.0) as vehicle:
         for drive in vehicle.drives:
             drive.enable()
-        driver = _Driver(vehicle, plan, prototype)
+        driver = _Driver(vehicle, plan, world.emulated().prototype)
         segments = []
         for step in plan.steps:
             start = driver.steering()
@@ -45,10 +46,9 @@ def drive_quietly(plan: Plan, prototype: str, effects: Sequence[Wanted]) -> Reco
 class _Driver:
     """Hands on the drives and eyes on the encoders, in vehicle signs and SI."""
 
-    def __init__(self, vehicle: EmulatedVehicle, plan: Plan, prototype: str) -> None:
+    def __init__(self, vehicle: EmulatedVehicle, plan: Plan, built: Prototype) -> None:
         self._vehicle = vehicle
         self._plan = plan
-        built = load_prototype(prototype)
         self._signs = built.drive.directions
         self._angle = 2 * np.pi / built.drive.counts_per_revolution / built.geometry.gear_ratio
         encoder = built.encoder

@@ -28,6 +28,7 @@ class ScoreReport:
         permuted: of the same answers beside other truths.
         chance: share that is expected of them, over all permutations.
         without: rates of the run without the true candidate; empty where there was none.
+        world: vehicle and engine that the cases were driven with, in words.
         first_seed: that the cases follow from, of an exam that is not sealed; None: it is.
     """
 
@@ -35,14 +36,16 @@ class ScoreReport:
     permuted: Rate
     chance: float
     without: Mapping[str, Rate]
+    world: str
     first_seed: int | None
 
     @property
-    def seal(self) -> str:
-        """Whether whoever diagnosed could know the cases."""
+    def origin(self) -> str:
+        """What was driven, and whether whoever diagnosed could know the cases."""
         if self.first_seed is None:
-            return "Sealed: the cases were drawn from a secret."
-        return f"Not sealed: the cases follow from seed {self.first_seed}, whoever diagnosed could know them."
+            return f"Driven by {self.world}. Sealed: the cases were drawn from a secret."
+        known = f"the cases follow from seed {self.first_seed}, whoever diagnosed could know them"
+        return f"Driven by {self.world}. Not sealed: {known}."
 
     @property
     def rates(self) -> dict[str, Rate]:
@@ -65,7 +68,7 @@ def score_exam(folder: ExamFolder, generator: np.random.Generator, key: Path | N
     Raises:
         UserError: there is no exam, no diagnosis, the answer is another one, or the key is.
     """
-    cases = open_cases(folder, key)
+    exam, cases = read_exam(folder), open_cases(folder, key)
     known = exam_identities(folder)
     answers = read_answers(folder, cases, known)
     without = folder.diagnosed(removed=True)
@@ -74,7 +77,8 @@ def score_exam(folder: ExamFolder, generator: np.random.Generator, key: Path | N
         permuted=score(permuted(answers, generator)).rates[RIGHT],
         chance=chance(answers),
         without=removal_rates(read_answers(folder, cases, known, removed=True)) if without else {},
-        first_seed=read_exam(folder).first_seed,
+        world=exam.world,
+        first_seed=exam.first_seed,
     )
 
 
@@ -85,13 +89,13 @@ def summary_lines(report: ScoreReport) -> list[str]:
     width = max(len(name) for name in texts)
     lines = [f"{name:<{width}}  {text:<32}{_wish(report.asked(name))}".rstrip() for name, text in texts.items()]
     counted = f"{report.score.cases} cases scored, {sum(report.score.missing.values())} without an answer."
-    return [counted, report.seal, *lines]
+    return [counted, report.origin, *lines]
 
 
 def score_markdown(report: ScoreReport, title: str) -> str:
     """The whole score."""
     score = report.score
-    counted = f"{score.cases} cases. {report.seal} Rates with Wilson's 95 % interval and counts."
+    counted = f"{score.cases} cases. {report.origin} Rates with Wilson's 95 % interval and counts."
     parts = [f"# {title}", "", counted, ""]
     parts += ["| what | measured | asked |", "|---|---|---|"]
     parts += [f"| {name} | {rate} | {report.asked(name)} |" for name, rate in report.rates.items()]
@@ -109,6 +113,7 @@ def score_json(report: ScoreReport) -> str:
     """All numbers; a rate is hits, cases, value and the ends of its interval."""
     score = report.score
     content = {
+        "world": report.world,
         "sealed": report.first_seed is None,
         "first_seed": report.first_seed,
         "cases": score.cases,

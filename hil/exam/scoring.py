@@ -9,9 +9,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from hil.exam import score_names as names
-from hil.exam.answers import FAILED, Answer
+from hil.exam.answers import Answer
 from hil.exam.cases import SIZES, Case, Kind
 from hil.exam.folder import ExamFolder
+from hil.exam.said import FAILED
 from hil.exam.statistics import Bin, Rate, calibration_error, rate, reliability
 
 

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Final
 
 from emulator.effects import INJECTORS, Unlibraried, Wanted
-from hil.campaign.folder import network_file_of
 from hil.exam.answer_file import answer_hash, answer_text, key_of_exam, open_answer, undriven_text
 from hil.exam.cases import Case, Composition, Injected, Kind, draw_cases
 from hil.exam.driving import drive
@@ -23,18 +22,16 @@ from hil.exam.plans import ExamPlans, plan_exam, plans_from_text, plans_text
 from hil.exam.record_bytes import record_bytes
 from hil.exam.sizes import SizeTable
 from hil.exam.workers import run_all
+from hil.exam.world import World
 from hil.network import load_network
 from ident.effects import make_effect
 from ident.errors import UserError
+from ident.parameters_file import read_model
 from ident.vehicle.description import find_data_file, load_vehicle
 from ident.writing import write_whole
 
 Progress = Callable[[int, int], None]
 """Called with cases done and cases in all."""
-
-MODEL_FILE: Final = Path(__file__).parent / "data" / "model.toml"
-"""The model that is judged, as identified from a campaign of the prototype without effects: `quasiomni campaign
---seed 400001 --periods 8 --skip lane_change`, then `quasiomni identify`."""
 
 SALT: Final = 16
 """Length of the salt of an exam [bytes]."""
@@ -50,7 +47,8 @@ class SealingOrder:
 
     Attributes:
         out: folder.
-        prototype: of the emulator, by name.
+        world: vehicle and engine.
+        model: file of the model under test.
         composition: how many cases of each kind.
         key: file of the secret that everything is drawn from, made where it is missing; None: not sealed.
         first_seed: without a key, the first of the noise, two a case, of the excitations, and of everything drawn.
@@ -59,7 +57,8 @@ class SealingOrder:
     """
 
     out: Path
-    prototype: str
+    world: World
+    model: Path
     composition: Composition
     key: Path | None
     first_seed: int | None
@@ -75,6 +74,7 @@ def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
     Raises:
         UserError: no case is asked for, neither or both of key and first seed are given, the key is another one, or the
             folder holds another exam.
+        DataFileError: vehicle or model cannot be read.
     """
     _refuse_impossible(order)
     folder = ExamFolder(order.out)
@@ -87,8 +87,9 @@ def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
     key = key_of_exam(folder, exam, order.key)
     cases = open_answer(folder, exam, key)
     _refuse_other(cases, exam, order)
+    _refuse_other_files(folder, order)
     left = [case for case in cases if not _finished(folder, case.identifier)]
-    tasks = [(exam.plans[case.excitation], exam.prototype, exam.cycle, case) for case in left]
+    tasks = [(exam.plans[case.excitation], order.world, exam.cycle, case) for case in left]
     done = len(cases) - len(left)
     progress(done, len(cases))
     for identifier, contents in run_all(drive_case, tasks, jobs=order.jobs, scheduler=order.scheduler):
@@ -128,13 +129,13 @@ def _hide_order(folder: ExamFolder, exam: Exam) -> None:
             _write_records(folder, identifier, (fit, confirm))
 
 
-def drive_case(plans: str, prototype: str, cycle: float, case: Case) -> tuple[str, tuple[bytes, bytes] | str]:
+def drive_case(plans: str, world: World, cycle: float, case: Case) -> tuple[str, tuple[bytes, bytes] | str]:
     """Both records of a case, or why the vehicle cannot be driven with its effects; runs in a worker."""
-    both = _plans(plans, prototype, cycle)
+    both = _plans(plans, world.vehicle, cycle)
     effects = [effect_of(injected) for injected in case.effects]
     try:
-        fit = drive(both.fit, prototype, case.seed, effects)
-        confirm = drive(both.confirm, prototype, case.seed + 1, effects)
+        fit = drive(both.fit, world, case.seed, effects)
+        confirm = drive(both.confirm, world, case.seed + 1, effects)
     except UserError as error:
         return case.identifier, f"{error.what} {error.remedy}\n"
     return case.identifier, (record_bytes(fit), record_bytes(confirm))
@@ -148,19 +149,21 @@ def effect_of(injected: Injected) -> Wanted:
 
 
 @lru_cache(maxsize=Composition.excitations)
-def _plans(text: str, prototype: str, cycle: float) -> ExamPlans:
-    return plans_from_text(text, load_vehicle(prototype), cycle)
+def _plans(text: str, vehicle: str, cycle: float) -> ExamPlans:
+    return plans_from_text(text, load_vehicle(vehicle), cycle)
 
 
 def _draw(folder: ExamFolder, order: SealingOrder, table: SizeTable) -> None:
     """Everything but the records."""
-    cycle = load_network(network_file_of(order.prototype)).cycle_period
+    read_model(order.model)  # Whether it is one must show now, not when the exam is diagnosed.
+    cycle = load_network(order.world.network_file).cycle_period
     key = None if order.key is None else make_key(order.key, folder.path)
     salt = b"" if key is None else secrets.token_bytes(SALT)
     lots = _lots(order, key, salt)
     cases = draw_cases(table, order.composition, lots.noise, lots.questions, lots.identifiers)
     exam = Exam(
-        prototype=order.prototype,
+        vehicle=order.world.vehicle,
+        engine=str(order.world.engine),
         cycle=cycle,
         plans=_draw_plans(order, lots, cycle),
         identifiers=tuple(case.identifier for case in cases),
@@ -170,8 +173,8 @@ def _draw(folder: ExamFolder, order: SealingOrder, table: SizeTable) -> None:
     )
     answer = answer_text(cases, exam, key)
     write_whole(answer, folder.answer)
-    write_whole(find_data_file("ident.vehicle", order.prototype).read_bytes(), folder.vehicle)
-    write_whole(MODEL_FILE.read_bytes(), folder.model)
+    write_whole(find_data_file("ident.vehicle", order.world.vehicle).read_bytes(), folder.vehicle)
+    write_whole(order.model.read_bytes(), folder.model)
     write_exam(folder, replace(exam, answer_hash=answer_hash(answer)))
 
 
@@ -183,13 +186,15 @@ def _lots(order: SealingOrder, key: Key | None, salt: bytes) -> Lots:
 
 
 def _draw_plans(order: SealingOrder, lots: Lots, cycle: float) -> tuple[str, ...]:
-    tasks = [(number, order.prototype, lots.excitation(number), cycle) for number in range(order.composition.driven)]
+    tasks = [
+        (number, order.world.vehicle, lots.excitation(number), cycle) for number in range(order.composition.driven)
+    ]
     return tuple(text for _, text in sorted(run_all(draw_plans, tasks, jobs=order.jobs, scheduler=order.scheduler)))
 
 
-def draw_plans(number: int, prototype: str, seed: int, cycle: float) -> tuple[int, str]:
+def draw_plans(number: int, vehicle: str, seed: int, cycle: float) -> tuple[int, str]:
     """A pair of campaigns under its number; runs in a worker."""
-    return number, plans_text(plan_exam(load_vehicle(prototype), seed, cycle))
+    return number, plans_text(plan_exam(load_vehicle(vehicle), seed, cycle))
 
 
 def _refuse_other_lots(exam: Exam, order: SealingOrder) -> None:
@@ -210,12 +215,26 @@ def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
         zip(_KINDS, (wanted.effects, wanted.pairs, wanted.none, wanted.unknown, wanted.invisible), strict=True)
     )
     held = Counter(case.kind for case in cases)
-    if (exam.prototype, len(exam.plans), held) != (order.prototype, wanted.driven, Counter(asked)):
+    ours = (order.world.vehicle, order.world.engine, wanted.driven, Counter(asked))
+    if (exam.vehicle, exam.engine, len(exam.plans), held) != ours:
         kinds = ", ".join(f"{held[kind]} {kind}" for kind in _KINDS)
         raise UserError(
-            f"{order.out} holds another exam: {kinds} of {exam.prototype} on {len(exam.plans)} excitations.",
+            f"{order.out} holds another exam: {kinds} of {exam.world} on {len(exam.plans)} excitations.",
             "Go on with it as it was begun, or name another folder (--out).",
         )
+
+
+def _refuse_other_files(folder: ExamFolder, order: SealingOrder) -> None:
+    """The cases that are left are driven with the vehicle file of the order, not with its copy in the folder."""
+    for asked, held in (
+        (find_data_file("ident.vehicle", order.world.vehicle), folder.vehicle),
+        (order.model, folder.model),
+    ):
+        if asked.read_bytes() != held.read_bytes():
+            raise UserError(
+                f"{asked} is not the {held.name} that {order.out} was begun with.",
+                "Go on with it as it was begun, or name another folder (--out).",
+            )
 
 
 def _finished(folder: ExamFolder, identifier: str) -> bool:

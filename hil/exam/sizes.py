@@ -7,14 +7,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from ident.errors import DataFileError
-
-SIZES_FILE: Final = Path(__file__).parent / "data" / "sizes.json"
-"""Sizes of the prototype; `quasiomni exam calibrate` writes it anew."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +67,11 @@ class SizeTable:
 
 
 def table_text(rows: Sequence[EffectSize]) -> str:
-    """The table as JSON."""
-    return json.dumps([vars(row) for row in rows], indent=1) + "\n"
+    """The table as JSON, an effect a line."""
+    return "[\n" + ",\n".join(json.dumps(vars(row)) for row in rows) + "\n]\n"
 
 
-def load_sizes(path: Path = SIZES_FILE) -> SizeTable:
+def load_sizes(path: Path) -> SizeTable:
     """Read a table.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What can be wrong with a network, one class each, so that programs can tell them apart."""
+"""What can be wrong with a network, one class each, so that programs can distinguish them."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class NmtCommand(IntEnum):
 
 
 class NmtState(IntEnum):
-    """States as heartbeats tell them (CiA 301, NMT error control)."""
+    """States as heartbeats report them (CiA 301, NMT error control)."""
 
     BOOT_UP = 0x00
     STOPPED = 0x04

@@ -53,7 +53,7 @@ class TrialError(UserError):
 
 @dataclass(frozen=True)
 class StopSettings:
-    """How fast to go, and what the drives are told to do without their master.
+    """How fast to go, and what the drives are set to do without their master.
 
     Attributes:
         speed: of the vehicle when the master dies [m/s].

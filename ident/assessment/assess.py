@@ -10,7 +10,7 @@ from ident.assessment.fit import fit_reasons
 from ident.assessment.signals import signal_reasons
 from ident.assessment.values import value_reasons
 from ident.assessment.verdict import Assessment, assessment_of
-from ident.estimate.identify import Identification
+from ident.estimate.result import Identification
 from ident.faults import Fault
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription

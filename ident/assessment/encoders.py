@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from ident.assessment.verdict import Reason, ReasonCode, Verdict
 from ident.estimate.equations import ROWS, motion_of
 from ident.estimate.filters import Processing
-from ident.estimate.identify import FIT_STEPS, INERTIAL, Identification
+from ident.estimate.identify import FIT_STEPS, INERTIAL
+from ident.estimate.result import Identification
 from ident.plant import kinematics
 from ident.records.record import Record, Segment, Step
 from ident.vehicle.geometry import WHEELS, Geometry

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ident.assessment.verdict import Reason, ReasonCode, Verdict
 from ident.estimate.equations import Equations
-from ident.estimate.identify import FIT_STEPS, VALIDATION_STEPS, Identification
+from ident.estimate.identify import FIT_STEPS, VALIDATION_STEPS
 from ident.estimate.noise import NoiseFloor
+from ident.estimate.result import Identification
 from ident.records.repeats import repeats_of
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from ident.assessment.verdict import Reason, ReasonCode, Verdict
-from ident.estimate.identify import Estimate, Identification
+from ident.estimate.result import Estimate, Identification
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import Parameters
@@ -52,7 +52,7 @@ def _sign(estimate: Estimate) -> Iterator[Reason]:
     certain = _inertial(estimate) or estimate.ci95[1] < 0
     text = (
         f"{estimate.name} = {estimate.value:.4g} ± {estimate.std:.2g} {estimate.unit}: no {kind} is negative or zero. "
-        + ("The record or the vehicle file is wrong." if certain else "It cannot be told from zero here.")
+        + ("The record or the vehicle file is wrong." if certain else "It cannot be distinguished from zero here.")
     )
     verdict = Verdict.UNUSABLE if certain else Verdict.DOUBTFUL
     yield Reason(ReasonCode.NOT_POSITIVE, estimate.name, estimate.value, 0.0, text, verdict)

@@ -2,7 +2,7 @@
 
 Both sides against each other press the wheels sideways against the floor; front against rear wheel of a side twists
 its steering, which dry friction holds. Each combination has a frequency of its own, so that the torque of every single
-drive is told from the others, whatever the vehicle does.
+drive is distinguished from the others, whatever the vehicle does.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ Motion = tuple[Array, Array, Array]
 """Position, velocity and acceleration of a coordinate, (N,) each, or (m, N) of many motions."""
 
 SAMPLES = 240
-"""Points of a period at which excitation is judged."""
+"""Points of a period at which an excitation is evaluated."""
 
 TORQUE_RESERVE = 0.7
 """Share of the peak torque that a planned motion may use; the rest is the controller's."""
@@ -80,7 +80,7 @@ class Excitation:
 
 @dataclass(frozen=True)
 class Problem:
-    """What an excitation is judged by."""
+    """Criteria of an excitation."""
 
     spec: StepSpec
     axis: Axis

@@ -13,17 +13,16 @@ from numpy.typing import NDArray
 from ident.campaign.axis import Axis, axis_of
 from ident.campaign.controller import LoopLimits
 from ident.campaign.dither import add_dither
+from ident.campaign.lane_change import LaneChange, lane_change_reference
 from ident.campaign.loops import STEERING_RATE_CYCLES, LoopDesign, design_loop
 from ident.campaign.optimise import Excitation, Problem, optimise
 from ident.campaign.reference import (
     LIFTED_LOOPS,
     STEERING_LOOPS,
-    LaneChange,
     Reference,
     alignment_reference,
     excitation_path,
     excitation_reference,
-    lane_change_reference,
     repeats_of,
     turn_reference,
 )

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import integrate, optimize
 
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.steps import StepSpec
@@ -162,7 +160,7 @@ def alignment_reference(
     alpha = start + position
     smooth = parameters.replaced(d_cl=0.0, d_cr=0.0, d_cw=0.0)
     torques = dynamics.feed_forward(Mode.ALIGNMENT, alpha, velocity, acceleration, smooth.values, vehicle.geometry)
-    tracks = _steering_tracks(alpha, velocity, vehicle.geometry)
+    tracks = steering_tracks(alpha, velocity, vehicle.geometry)
     period = np.full(len(time), -1)
     return Reference(Step.ALIGNMENT, "alpha", sample_time, tracks, torques, period, np.zeros((len(time), 3)))
 
@@ -186,68 +184,9 @@ ALIGNMENT_SPEED: Final = 0.8
 """Mean steering speed of an alignment [rad/s]."""
 
 
-@dataclass(frozen=True)
-class LaneChange:
-    """The validation manoeuvre: a steered shift to the left on the move.
-
-    Attributes:
-        speed: of the chassis [m/s].
-        acceleration: mean, at start and end [m/s²].
-        shift: to the left [m].
-        length: of the shift along the path [m].
-    """
-
-    speed: float = 0.9
-    acceleration: float = 0.5
-    shift: float = 1.2
-    length: float = 5.0
-
-
-def lane_change_reference(
-    manoeuvre: LaneChange, vehicle: VehicleDescription, parameters: Parameters, sample_time: float
-) -> Reference:
-    """Speed up, shift the lane with a curvature that starts and ends smoothly, slow down."""
-    geometry = vehicle.geometry
-    travel, velocity, acceleration = _speed_profile(manoeuvre, sample_time)
-    run_in = (travel[-1] - manoeuvre.length) / 2
-    curvature = _curvature_of_shift(manoeuvre)(travel - run_in)
-    alpha_v = np.arctan(curvature * geometry.wheelbase / 2)
-    alpha_v_rate = np.gradient(alpha_v, sample_time)
-    velocities = np.stack([alpha_v_rate, velocity], axis=1)
-    accelerations = np.stack([np.gradient(alpha_v_rate, sample_time), acceleration], axis=1)
-    alpha = kinematics.steering_from_virtual(alpha_v, geometry)
-    torques = _self_sufficient_sides(alpha, velocities, accelerations, geometry, parameters)
-    column = kinematics.complement(Mode.STEERED, alpha, geometry)[:, 5:, 1]
-    tracks = {
-        **_steering_tracks(alpha, np.gradient(alpha, sample_time, axis=0), geometry),
-        "x": Track(travel, velocity, column),
-    }
-    twist = np.stack([velocity, np.zeros_like(velocity), curvature * velocity], axis=1)
-    path = kinematics.integrate_pose(twist, sample_time)
-    return Reference(Step.LANE_CHANGE, "x", sample_time, tracks, torques, np.full(len(travel), -1), path)
-
-
 def sample_times(samples: int, sample_time: float) -> Array:
     """Times of a number of samples from zero (N,) [s]."""
     return np.asarray(np.arange(samples) * sample_time, dtype=np.float64)
-
-
-def _self_sufficient_sides(
-    alpha: Array, velocities: Array, accelerations: Array, geometry: Geometry, parameters: Parameters
-) -> Array:
-    """Feed-forward of steered motion in which each side brings the torque that its own steering needs.
-
-    It satisfies (21), whose α_v row is a combination of both steering rows, but not with the least torque: that one
-    leaves the difference between the sides to the constraint forces, and wheels that carry steering torque slip.
-    """
-    rates, lifted = dynamics.lift_velocities(Mode.STEERED, alpha, velocities, accelerations, geometry)
-    wanted, matrix = [], []
-    for mode, rows in ((Mode.ALIGNMENT, [0, 1]), (Mode.STEERED, [1])):
-        theta = dynamics.projected_regressor(mode, alpha, rates, lifted, geometry)
-        wanted.append((theta @ parameters.values)[:, rows])
-        matrix.append(dynamics.projected_input(mode, alpha, geometry)[:, rows])
-    inverse = np.linalg.pinv(np.concatenate(matrix, axis=1))
-    return np.asarray(np.einsum("nij,nj->ni", inverse, np.concatenate(wanted, axis=1)))
 
 
 def smooth_step(progress: Array) -> tuple[Array, Array, Array]:
@@ -256,49 +195,12 @@ def smooth_step(progress: Array) -> tuple[Array, Array, Array]:
     return t**3 * (10 - 15 * t + 6 * t**2), 30 * t**2 * (1 - t) ** 2, 60 * t * (1 - t) * (1 - 2 * t)
 
 
-def _speed_profile(manoeuvre: LaneChange, sample_time: float) -> tuple[Array, Array, Array]:
-    ramp = manoeuvre.speed / manoeuvre.acceleration
-    run_in = manoeuvre.speed * ramp / 2 + 0.3
-    cruise = (manoeuvre.length + 2 * (run_in - manoeuvre.speed * ramp / 2)) / manoeuvre.speed
-    samples = round((2 * ramp + cruise + 2 * SETTLING) / sample_time)
-    time = sample_times(samples, sample_time) - SETTLING
-    up, up_rate, _ = smooth_step(time / ramp)
-    down, down_rate, _ = smooth_step((time - ramp - cruise) / ramp)
-    velocity = manoeuvre.speed * (up - down)
-    acceleration = manoeuvre.speed * (up_rate - down_rate) / ramp
-    steps = (velocity[1:] + velocity[:-1]) * sample_time / 2
-    return np.concatenate([[0.0], np.cumsum(steps)]), velocity, acceleration
-
-
-def _curvature_of_shift(manoeuvre: LaneChange) -> _CurvatureOfShift:
-    """The curvature whose path ends beside its start by the shift asked for; the heading returns by itself."""
-    arc = np.linspace(0.0, manoeuvre.length, 2001)
-    heading = integrate.cumulative_trapezoid(_CurvatureOfShift(1.0, manoeuvre.length)(arc), arc, initial=0.0)
-
-    def excess(amplitude: float) -> float:
-        return float(integrate.trapezoid(np.sin(amplitude * heading), arc)) - manoeuvre.shift
-
-    steepest = math.pi / 2 / float(np.abs(heading).max())
-    return _CurvatureOfShift(float(optimize.brentq(excess, 0.0, steepest)), manoeuvre.length)
-
-
-@dataclass(frozen=True)
-class _CurvatureOfShift:
-    """κ(s) = A (sin 2πσ - ½ sin 4πσ), σ = s/length: zero with zero slope at both ends."""
-
-    amplitude: float
-    length: float
-
-    def __call__(self, arc: Array) -> Array:
-        phase = 2 * math.pi * np.clip(arc / self.length, 0.0, 1.0)
-        return np.asarray(self.amplitude * (np.sin(phase) - np.sin(2 * phase) / 2))
-
-
 def _padded(values: Array, rest: int) -> Array:
     return np.concatenate([np.zeros(rest), values, np.zeros(rest)])
 
 
-def _steering_tracks(alpha: Array, velocity: Array, geometry: Geometry) -> dict[str, Track]:
+def steering_tracks(alpha: Array, velocity: Array, geometry: Geometry) -> dict[str, Track]:
+    """Both steering loops: angles (N, 2) [rad] and rates of them."""
     columns = kinematics.complement(Mode.ALIGNMENT, alpha[:1], geometry)[0, 5:]
     shape = (len(alpha), 4)
     return {
@@ -313,12 +215,12 @@ def _tracks(spec: StepSpec, alpha: Array, position: Array, velocity: Array, geom
         moved, rate = alpha.copy(), np.zeros_like(alpha)
         moved[:, side] += position
         rate[:, side] = velocity
-        return _steering_tracks(moved, rate, geometry)
+        return steering_tracks(moved, rate, geometry)
     assert spec.mode is not None
     row = kinematics.GENERALIZED_VELOCITIES[spec.mode].index(spec.coordinate)
     column = kinematics.complement(spec.mode, alpha[:1], geometry)[0, 5:, row]
     wheels = np.broadcast_to(column, (len(alpha), 4))
-    held = _steering_tracks(alpha, np.zeros_like(alpha), geometry)
+    held = steering_tracks(alpha, np.zeros_like(alpha), geometry)
     return {**held, spec.coordinate: Track(position, velocity, wheels)}
 
 

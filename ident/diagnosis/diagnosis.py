@@ -12,7 +12,7 @@ from typing import Any
 
 from ident.faults import Fault
 from ident.vehicle.quantities import Quantity
-from ident.writing import write_whole
+from ident.writing import json_number, write_whole
 
 
 class Verdict(enum.StrEnum):
@@ -125,11 +125,11 @@ class Diagnosis:
 
     def as_json(self) -> dict[str, Any]:
         """Plain values, numbers that JSON can hold."""
-        gap = {name: _number(getattr(self.gap, name)) for name in ("before", "after", "floor", "closed")}
+        gap = {name: json_number(getattr(self.gap, name)) for name in ("before", "after", "floor", "closed")}
         return {
             "verdict": str(self.verdict),
             "effects": [_effect(effect) for effect in self.effects],
-            "where": [vars(share) | {"share": _number(share.share)} for share in self.where],
+            "where": [vars(share) | {"share": json_number(share.share)} for share in self.where],
             "gap": gap,
             "invisible": list(self.invisible),
             "next_experiment": self.next_experiment,
@@ -157,15 +157,10 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
         "name": effect.name,
         "where": effect.where,
         "parameters": {
-            name: {"value": _number(quantity.value), "std": _number(quantity.std), "unit": quantity.unit}
+            name: {"value": json_number(quantity.value), "std": json_number(quantity.std), "unit": quantity.unit}
             for name, quantity in effect.parameters.items()
         },
-        "probability": _number(effect.probability),
+        "probability": json_number(effect.probability),
         "ambiguity_set": list(effect.ambiguity_set),
-        "gap_closed_held_out": _number(effect.gap_closed_held_out),
+        "gap_closed_held_out": json_number(effect.gap_closed_held_out),
     }
-
-
-def _number(value: float) -> float | None:
-    """JSON has no NaN and no infinity."""
-    return float(value) if math.isfinite(value) else None

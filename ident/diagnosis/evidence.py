@@ -17,129 +17,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.directions import Directions, White, directions
 from ident.diagnosis.linear import orthonormal
 from ident.diagnosis.rows import Column
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-VISIBLE: Final = 0.02
-"""Part of a column that the baseline must leave for it to count as visible."""
 BESIDE: Final = 4.0
 """Log evidence that what comes along with an effect must bring more than the price of its number: few effects do not
 come alone, one in fifty by this."""
-
-
-@dataclass(frozen=True)
-class White:
-    """Whitened regression, rows of prior knowledge behind those of the records.
-
-    Attributes:
-        target: (n,).
-        baseline: (n, p + c) columns of the model, and of effects that are taken as given.
-        columns: (n, K) of all candidates.
-        stretch: (n,) number of the stretch whose sign is flipped as one, increasing.
-        confirming: (n,) rows that take no part in the fit.
-    """
-
-    target: Array
-    baseline: Array
-    columns: Array
-    stretch: NDArray[np.int64]
-    confirming: Mask
-
-
-@dataclass(frozen=True)
-class Bounded:
-    """A variant of k columns whose coefficients have a least value.
-
-    Attributes:
-        variant: which.
-        place: of its directions.
-        turn: (k, directions) amplitudes -> coefficients.
-        least: of all coefficients.
-    """
-
-    variant: int
-    place: slice
-    turn: Array
-    least: float
-
-
-@dataclass(frozen=True)
-class Directions:
-    """Orthonormal directions that each variant of a candidate adds to the baseline.
-
-    Attributes:
-        basis: (n, D).
-        places: of every variant in the basis; empty where the baseline absorbs it.
-        least, negligible: (D,) amplitudes, and sizes of them, below which a direction counts nothing.
-        bounded: variants of several columns whose coefficients have a least value.
-        residual: (n,) target minus its projection on the baseline.
-        volume: log of the determinant of each variant's columns beside the baseline.
-    """
-
-    basis: Array
-    places: tuple[slice, ...]
-    least: Array
-    negligible: Array
-    residual: Array
-    volume: Array
-    bounded: tuple[Bounded, ...] = ()
-
-    @property
-    def sizes(self) -> Array:
-        """Number of directions of every variant."""
-        return np.array([place.stop - place.start for place in self.places])
-
-    def possible(self, amplitudes: Array) -> Mask:
-        """Which amplitudes (..., D) are as large as they must be."""
-        found = (amplitudes >= self.least) & (np.abs(amplitudes) >= self.negligible)
-        for several in self.bounded:
-            coefficients = amplitudes[..., several.place] @ several.turn.T
-            found[..., several.place] &= np.all(coefficients >= several.least, axis=-1, keepdims=True)
-        return np.asarray(found)
-
-    def ratios(self, amplitudes: Array) -> Array:
-        """Sums of squared amplitudes (..., D) over the directions of every variant, (..., V)."""
-        return self.lengths(np.where(self.possible(amplitudes), amplitudes, 0.0))
-
-    def lengths(self, amplitudes: Array) -> Array:
-        """The same whatever the amplitudes are."""
-        squares = np.concatenate([np.zeros((*amplitudes.shape[:-1], 1)), np.cumsum(amplitudes**2, axis=-1)], axis=-1)
-        starts = [place.start for place in self.places]
-        stops = [place.stop for place in self.places]
-        return np.asarray(squares[..., stops] - squares[..., starts])
-
-
-def directions(white: White, layout: Sequence[Column], rows: Mask | None = None) -> Directions:
-    """Directions beside the baseline, in all rows or in some."""
-    chosen = slice(None) if rows is None else rows
-    base = orthonormal(white.baseline[chosen])
-    target, columns = white.target[chosen], white.columns[chosen]
-    residual = target - base @ (base.T @ target)
-    left = columns - base @ (base.T @ columns)
-    full = np.linalg.norm(white.columns, axis=0)
-    parts, places, volumes, end = [np.zeros((len(target), 0))], [], [], 0
-    bounds: list[tuple[float, float]] = []
-    bounded: list[Bounded] = []
-    for column in layout:
-        scale = np.where(full[column.place] > 0, full[column.place], 1.0)
-        vectors, singular, turn = np.linalg.svd(left[:, column.place] / scale, full_matrices=False)
-        count = int(np.sum(singular > VISIBLE))
-        single = count == 1 and vectors.shape[1] == 1
-        length = float(vectors[:, 0] @ left[:, column.place.start]) if single else 1.0
-        parts.append(vectors[:, :count] * np.sign(length))
-        least = column.least if single else -math.inf
-        bounds += [(least * abs(length), column.negligible * abs(length))] * count
-        places.append(slice(end, end + count))
-        if count and not single and math.isfinite(column.least):
-            coefficients = (turn[:count].T / singular[:count]) / scale[:, None]
-            bounded.append(Bounded(len(places) - 1, places[-1], coefficients, column.least))
-        volumes.append(2 * float(np.sum(np.log(np.maximum(singular, VISIBLE)))))
-        end += count
-    low, small = np.array(bounds).reshape(-1, 2).T
-    return Directions(np.hstack(parts), tuple(places), low, small, residual, np.array(volumes), tuple(bounded))
 
 
 @dataclass(frozen=True)

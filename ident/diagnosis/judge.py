@@ -11,9 +11,10 @@ from ident.diagnosis.findings import Findings
 from ident.diagnosis.judgement import Judgement
 from ident.diagnosis.limits import Limits
 from ident.diagnosis.problem import Problem
-from ident.diagnosis.regression import Regression, Settings
+from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import make_rows
 from ident.diagnosis.search import concluded
+from ident.diagnosis.settings import Settings
 from ident.diagnosis.shapes import search
 from ident.stages import Stage, untold
 

@@ -11,7 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.evidence import VISIBLE, Evidence, significance
+from ident.diagnosis.directions import VISIBLE
+from ident.diagnosis.evidence import Evidence, significance
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

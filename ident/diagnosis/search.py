@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ident.diagnosis.pairs import best_pair
-from ident.diagnosis.regression import Regression, Settings, Slot, Whole, in_both
+from ident.diagnosis.regression import Regression, Slot, Whole, in_both
+from ident.diagnosis.settings import Settings
 from ident.diagnosis.whitening import Whitener
 
 

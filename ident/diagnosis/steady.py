@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.evidence import directions, scatter
+from ident.diagnosis.directions import directions
+from ident.diagnosis.evidence import scatter
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Column
 from ident.diagnosis.search import Found

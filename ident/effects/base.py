@@ -20,7 +20,6 @@ from ident.plant.places import indices, members, rows_of
 from ident.plant.symbolic import EPSILON, Expression
 from ident.plant.terms import Masses, State, Term
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.parameters import PARAMETER_NAMES
 from ident.vehicle.quantities import Quantity
 
 FRICTION: Final[Mapping[int, tuple[str, str]]] = MappingProxyType(
@@ -208,11 +207,6 @@ def viscous_friction(vehicle: VehicleDescription, where: str) -> float:
 def coulomb_friction(vehicle: VehicleDescription, where: str) -> float:
     """Of a joint as the vehicle file has it [Nm]."""
     return vehicle.prior[FRICTION[rows_of(where)[0]][1]]
-
-
-def parameter_column(name: str) -> int:
-    """Place of a parameter in p."""
-    return PARAMETER_NAMES.index(name)
 
 
 def effect_of(

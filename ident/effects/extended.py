@@ -1,32 +1,24 @@
-"""A model of the platform with effects: parameters and `[[effects]]` of one file."""
+"""A model of the platform with effects."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from ident.effects import Effect, EffectTerm, terms_of
-from ident.effects.text import effects_text, read_effects
 from ident.plant.modes import Mode
 from ident.plant.places import DRIVES, ENCODERS
 from ident.plant.simulation import Simulation
 from ident.plant.terms import delay_at, steering_errors
 from ident.plant.transmissions import Spring, springs_of
 from ident.vehicle.geometry import Geometry
-from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters, read_parameters
-from ident.vehicle.quantities import read_toml
-from ident.writing import write_whole
+from ident.vehicle.parameters import Parameters
 
 Array = NDArray[np.float64]
-
-SCHEMA: Final = "quasiomni.parameters/1"
 
 
 @dataclass(frozen=True)
@@ -70,32 +62,3 @@ class ExtendedModel:
 def simulation_of(model: ExtendedModel, mode: Mode, geometry: Geometry) -> Simulation:
     """One mode of a model, forward in time."""
     return Simulation(model.parameters.values, model.terms, mode, geometry)
-
-
-def read_model(path: Path) -> ExtendedModel:
-    """The model of a `parameters.toml`, effects included.
-
-    Raises:
-        DataFileError: the file cannot be used; says where.
-    """
-    return ExtendedModel(read_parameters(path), read_effects(read_toml(path), str(path)))
-
-
-def model_text(model: ExtendedModel, provenance: Mapping[str, str]) -> str:
-    """A `parameters.toml`; `provenance` says where the values come from."""
-    source = json.dumps(provenance.get("run", "record"))
-    lines = [f'schema = "{SCHEMA}"', "", "[source]"]
-    lines += [f"{key} = {json.dumps(value)}" for key, value in provenance.items()]
-    for name, value, std in zip(PARAMETER_NAMES, model.parameters.values, model.parameters.std, strict=True):
-        entry = [f"value = {value:.9g}", f'unit = "{PARAMETER_UNITS[name]}"', f"std = {std:.6g}", f"source = {source}"]
-        lines += ["", f"[parameters.{name}]", *entry]
-    return "\n".join(lines) + "\n" + effects_text(model.effects)
-
-
-def write_model(model: ExtendedModel, path: Path, provenance: Mapping[str, str]) -> None:
-    """Write the file whole or not at all.
-
-    Raises:
-        UserError: it cannot be written.
-    """
-    write_whole(model_text(model, provenance), path)

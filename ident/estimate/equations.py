@@ -12,8 +12,8 @@ from ident.estimate.filters import (
     Processing,
     differentiate,
     moving_rows,
-    second_derivative,
     sliding_samples,
+    smooth,
     zero_phase,
 )
 from ident.plant import dynamics, kinematics
@@ -21,7 +21,7 @@ from ident.plant.modes import Mode
 from ident.records.checks import UNJUDGED
 from ident.records.record import Segment, Step
 from ident.vehicle.geometry import WHEELS, Geometry
-from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
+from ident.vehicle.parameters import COULOMB_EPSILON, parameter_column
 
 Array = NDArray[np.float64]
 
@@ -97,13 +97,15 @@ class Equations:
 def motion_of(segment: Segment, geometry: Geometry, processing: Processing) -> Motion:
     """Smoothed angles, rates and accelerations of a segment; the twist by odometry (3)."""
     dt = segment.sample_time
-    alpha = zero_phase(segment.steering_angles, processing.signal_cutoff, dt, UNJUDGED)
-    beta = zero_phase(segment.wheel_angles, processing.signal_cutoff, dt, UNJUDGED)
-    alpha_rate, beta_rate = differentiate(alpha, dt), differentiate(beta, dt)
-    twist = kinematics.odometry(alpha, alpha_rate, beta_rate, geometry)
-    rates = np.hstack([twist, alpha_rate, beta_rate])
-    accelerations = np.hstack([differentiate(twist, dt), second_derivative(alpha, dt), second_derivative(beta, dt)])
-    return Motion(alpha, rates, accelerations)
+    alpha, beta = (
+        smooth(angles, processing, dt, unjudged=UNJUDGED) for angles in (segment.steering_angles, segment.wheel_angles)
+    )
+    twist = kinematics.odometry(alpha.angles, alpha.rates, beta.rates, geometry)
+    return Motion(
+        alpha.angles,
+        rates=np.hstack([twist, alpha.rates, beta.rates]),
+        accelerations=np.hstack([differentiate(twist, dt), alpha.accelerations, beta.accelerations]),
+    )
 
 
 def equations_of(
@@ -155,7 +157,7 @@ def _raw_rows(
     theta = dynamics.projected_regressor(spec.mode, motion.alpha, motion.rates, motion.accelerations, geometry, epsilon)
     torque = dynamics.generalized_torques(spec.mode, motion.alpha, segment.motor_torques, geometry)
     # A load over the centre moves as m_ch does; what it takes is known.
-    torque = torque - segment.payload * theta[:, :, column("m_ch")]
+    torque = torque - segment.payload * theta[:, :, parameter_column("m_ch")]
     return theta, torque, kinematics.GENERALIZED_VELOCITIES[spec.mode]
 
 
@@ -175,8 +177,3 @@ def usable_equations(segments: list[Segment], geometry: Geometry, processing: Pr
         if segment.step in known
         for equations in equations_of(segment, geometry, processing)
     ]
-
-
-def column(name: str) -> int:
-    """Column of a parameter in every regressor."""
-    return PARAMETER_NAMES.index(name)

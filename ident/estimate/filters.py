@@ -1,4 +1,4 @@
-"""Zero-phase filters and derivatives (paper, section 7)."""
+"""Zero-phase filters and derivatives (paper, section 7): how a record becomes angles, rates and accelerations."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def zero_phase(values: Array, cutoff: float, sample_time: float, unjudged: int =
     """Butterworth low-pass forwards and backwards along axis 0, cutoff in rad/s.
 
     Beyond its ends a signal is continued by its reflection in a point. Were that the end sample of a record, an error
-    of that one sample would count twice in all that lies beyond; so it is the first that has been judged.
+    of that one sample would count twice in all that lies beyond; so it is the first that has been checked.
 
     Args:
         values: (N, ...).
@@ -72,15 +72,71 @@ def _sections(cutoff: float, sample_time: float) -> Array:
     return np.asarray(signal.butter(FILTER_ORDER, cutoff / (2 * math.pi), fs=1 / sample_time, output="sos"))
 
 
-def differentiate(values: Array, sample_time: float) -> Array:
-    """Central differences along axis 0."""
-    return np.asarray(np.gradient(values, sample_time, axis=0))
+THREE: Final = 3
+SEVEN: Final = 7
+"""Samples that a central difference is taken from.
+
+Those of three, of second order, are the estimate's: its rows end at 40 rad/s. They lose a sixth of (ω T)² of a rate,
+twice for an acceleration: as much as an elastic drive would. At 500 Hz that is 8 % of the acceleration of a motor that
+rings at 490 rad/s on its gear. Those of seven, of sixth order, lose 0.1 % of it; they are the diagnosis', which looks
+for such drives.
+"""
+
+_FIRST: Final = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60
+_SECOND: Final = np.array([2, -27, 270, -490, 270, -27, 2]) / 180
+"""Weights of seven neighbours."""
 
 
-def second_derivative(values: Array, sample_time: float) -> Array:
-    """Three-point second differences along axis 0; the ends repeat their neighbours."""
+def differentiate(values: Array, sample_time: float, samples: int = THREE) -> Array:
+    """First derivative along axis 0 by central differences; of three samples at the ends, of two at the last."""
+    found = np.asarray(np.gradient(values, sample_time, axis=0))
+    return found if samples == THREE else _refined(found, values, _FIRST, sample_time)
+
+
+def second_derivative(values: Array, sample_time: float, samples: int = THREE) -> Array:
+    """Second derivative along axis 0 by central differences; of three samples at the ends, the last repeat theirs."""
     inner = (values[2:] - 2 * values[1:-1] + values[:-2]) / sample_time**2
-    return np.concatenate([inner[:1], inner, inner[-1:]])
+    found = np.concatenate([inner[:1], inner, inner[-1:]])
+    return found if samples == THREE else _refined(found, values, _SECOND, sample_time**2)
+
+
+def _refined(found: Array, values: Array, weights: Array, unit: float) -> Array:
+    """A derivative, taken anew wherever all the neighbours are there."""
+    reach = len(weights) // 2
+    inner = slice(reach, len(found) - reach)
+    found[inner] = ndimage.correlate1d(values, weights, axis=0)[inner] / unit
+    return found
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """Measured angles of some joints, smoothed, with their derivatives.
+
+    Attributes:
+        angles, rates, accelerations: (N, n) [rad, rad/s, rad/s²].
+    """
+
+    angles: Array
+    rates: Array
+    accelerations: Array
+
+
+def smooth(
+    angles: Array, processing: Processing, sample_time: float, samples: int = THREE, unjudged: int = 0
+) -> Smoothed:
+    """Angles below `signal_cutoff`, and their derivatives: the one way from a record to motion.
+
+    Args:
+        angles: (N, n) as measured [rad].
+        processing: the filter.
+        sample_time: [s].
+        samples: that the derivatives are taken from, THREE or SEVEN.
+        unjudged: samples at each end that `zero_phase` continues. The estimate distrusts those that no neighbour has
+            checked; the diagnosis takes all, and uses no row that is so near to an end.
+    """
+    smoothed = zero_phase(angles, processing.signal_cutoff, sample_time, unjudged)
+    rates = differentiate(smoothed, sample_time, samples)
+    return Smoothed(smoothed, rates, second_derivative(smoothed, sample_time, samples))
 
 
 def moving_rows(rates: Array, processing: Processing, sample_time: float) -> NDArray[np.bool_]:

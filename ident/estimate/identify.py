@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ident.errors import EstimationError
-from ident.estimate.equations import Equations, column, usable_equations
+from ident.estimate.equations import Equations, usable_equations
 from ident.estimate.filters import Processing
 from ident.estimate.least_squares import ORDINARY, Estimator, LinearSystem, Solution
-from ident.estimate.noise import NoiseFloor, noise_floor
+from ident.estimate.noise import noise_floor
+from ident.estimate.result import Estimate, Identification, KnownInertia
 from ident.estimate.uncertainty import ErrorCovariance, FittedRows, error_covariance, interval_factor
-from ident.records.record import Record, Step
+from ident.records.record import FOUR_STEPS, Record, Step
 from ident.vehicle.geometry import Geometry
-from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS
+from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, parameter_column
 
 Array = NDArray[np.float64]
 
@@ -38,89 +39,8 @@ INERTIAL: Final = {
 }
 """Inertias, which are never near zero, and the steps that excite them."""
 
-FIT_STEPS: Final = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION, Step.LATERAL)
+FIT_STEPS: Final = (*FOUR_STEPS, Step.LATERAL)
 VALIDATION_STEPS: Final = (Step.LANE_CHANGE,)
-
-POOR_RELATIVE_HALF_WIDTH = 0.5
-"""A parameter whose 95 % half-width exceeds this fraction of its value is said to be poorly excited."""
-
-
-@dataclass(frozen=True)
-class KnownInertia:
-    """B_w from elsewhere: data sheet or earlier identification [kg m²]."""
-
-    value: float
-    std: float
-    source: str
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """One identified parameter.
-
-    Attributes:
-        name, unit: by the paper's symbol.
-        value, std: SI.
-        ci95: two-sided interval.
-        naive_std: what white residuals of one size would give, as the paper's Table 2.
-        b_w_std: the part of `std` that comes from the uncertainty of B_w.
-        independence: norm of the parameter's column after projection on the others, over its norm: 1 is
-            excitation that nothing else imitates, 0 is none.
-        method: how it was found.
-    """
-
-    name: str
-    unit: str
-    value: float
-    std: float
-    ci95: tuple[float, float]
-    naive_std: float
-    b_w_std: float
-    independence: float
-    method: str
-
-    @property
-    def poor(self) -> bool:
-        """Whether the interval is too wide to build on, or the value negative, which none of these can be."""
-        half_width = (self.ci95[1] - self.ci95[0]) / 2
-        return not half_width < POOR_RELATIVE_HALF_WIDTH * self.value
-
-    @property
-    def quality(self) -> str:
-        """In a word: `impossible` for a value that is not positive, which no lack of excitation explains."""
-        if not self.value > 0:
-            return "impossible"
-        return "poor" if self.poor else "good"
-
-
-@dataclass(frozen=True)
-class Identification:
-    """Result of an identification.
-
-    Attributes:
-        estimates: eleven, in the order of (18).
-        correlation: (11, 11).
-        condition: cond(Θ₁ᵀΘ₁), unit-norm columns, unweighted, on measured, filtered and masked rows.
-        floors: signal, residual, noise and model error of every step that was used or validated.
-        equations: all rows, fitted ones first, for plots.
-        processing: the filters and thresholds used.
-    """
-
-    estimates: tuple[Estimate, ...]
-    correlation: Array
-    condition: float
-    floors: tuple[NoiseFloor, ...]
-    equations: tuple[Equations, ...]
-    processing: Processing
-
-    @property
-    def values(self) -> Array:
-        """p (11,)."""
-        return np.array([estimate.value for estimate in self.estimates])
-
-    def __getitem__(self, name: str) -> Estimate:
-        """One estimate by its symbol."""
-        return self.estimates[PARAMETER_NAMES.index(name)]
 
 
 @dataclass(frozen=True)
@@ -225,11 +145,11 @@ def _fit(rows: Sequence[Equations], names: tuple[str, ...], known: dict[str, flo
             "The record holds none of the steps of an identification.",
             f"It needs {', '.join(FIT_STEPS)} by these names in the channel step.",
         )
-    columns = [column(name) for name in names]
+    columns = [parameter_column(name) for name in names]
     theta = np.concatenate([row.regressor[row.moving] for row in rows])
     torque = np.concatenate([row.torque[row.moving] for row in rows])
     for name, value in known.items():
-        torque = torque - theta[:, column(name)] * value
+        torque = torque - theta[:, parameter_column(name)] * value
     part = np.repeat(np.arange(len(rows)), [int(row.moving.sum()) for row in rows])
     system = LinearSystem(names, theta[:, columns], torque, part)
     solution = estimator(system)
@@ -262,7 +182,7 @@ def _fitted_rows(rows: Sequence[Equations], solution: Solution, columns: list[in
 
 def _sensitivity_to_inertia(fit: _Fit, rows: Sequence[Equations]) -> Array:
     """∂p₁/∂B_w = -ψᵀΘ₂, (n,)."""
-    theta = np.concatenate([row.regressor[row.moving, column("B_w")] for row in rows])
+    theta = np.concatenate([row.regressor[row.moving, parameter_column("B_w")] for row in rows])
     return np.asarray(-fit.solution.influence.T @ theta)
 
 

@@ -19,7 +19,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 Array = NDArray[np.float64]
 
 WINDOW_ROWS = 10
-"""Independent differences by which the size of the noise at a phase is told."""
+"""Independent differences by which the size of the noise at a phase is estimated."""
 
 _ROUNDING = 1e-9
 """Part of all pairs below which there is none."""

@@ -62,19 +62,6 @@ class FittedRows:
     period: NDArray[np.int64]
     sample_time: float
 
-    @classmethod
-    def of_least_squares(
-        cls,
-        regressor: Array,
-        residual: Array,
-        kept: NDArray[np.bool_],
-        period: NDArray[np.int64],
-        sample_time: float,
-        normal_inverse: Array,
-    ) -> Self:
-        """Rows that were fitted by least squares with (Θᵀ Θ)⁻¹ (n, n)."""
-        return cls(regressor, regressor @ normal_inverse, residual, kept, period, sample_time)
-
 
 @dataclass(frozen=True)
 class ErrorCovariance:

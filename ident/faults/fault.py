@@ -7,6 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, Final
 
+from ident.writing import json_number
+
 
 class FaultName(enum.StrEnum):
     """Canonical names of what can be wrong with a record."""
@@ -54,10 +56,10 @@ class Fault:
         return {
             "name": str(self.name),
             "channel": self.channel,
-            "value": _number(self.value),
+            "value": json_number(self.value),
             "unit": self.unit,
-            "std": _number(self.std),
-            "evidence": _number(self.evidence),
+            "std": json_number(self.std),
+            "evidence": json_number(self.evidence),
             "undo_fits": self.undo_fits,
             "also": list(self.also),
             "step": self.step,
@@ -111,8 +113,3 @@ _REMEDIES: Final = {
     FaultName.LATE: "Shift {channel} in time, or record all channels by one clock.",
     FaultName.LOST: "Drive that step again, or cut the record there and give both sides names of their own.",
 }
-
-
-def _number(value: float) -> float | None:
-    """JSON has no NaN and no infinity."""
-    return float(value) if math.isfinite(value) else None

@@ -138,7 +138,7 @@ def _off_chassis(chassis: Array) -> Array:
 
 
 def predicted_wheel_rate(rates: Rates, geometry: Geometry, wheel: int) -> Array:
-    """Rate of a wheel (N,) as all other encoders tell it [rad/s]."""
+    """Rate of a wheel (N,) by all other encoders [rad/s]."""
     matrix = kinematics.constraint_matrix(rates.alpha, geometry)
     row = LATERAL + wheel
     kept = [other for other in range(matrix.shape[1]) if other != row]
@@ -152,13 +152,13 @@ def predicted_wheel_rate(rates: Rates, geometry: Geometry, wheel: int) -> Array:
 
 
 def predicted_steering_rate(rates: Rates, geometry: Geometry, side: int) -> Array:
-    """Steering rate of a side (N,) as its wheels tell it, which roll apart by nothing else in most steps [rad/s]."""
+    """Steering rate of a side (N,) by its wheels, which roll differently by nothing else in most steps [rad/s]."""
     front, rear = rates.wheels[:, SIDES * side], rates.wheels[:, SIDES * side + 1]
     return np.asarray((1 - 2 * side) * (rear - front) / (2 * geometry.lever_ratio))
 
 
 def independent_samples(rates: Array, sample_time: float) -> float:
-    """Twice the bandwidth of a motion (N, n) times its duration: so many values tell it (Shannon).
+    """Twice the bandwidth of a motion (N, n) times its duration: so many values determine it (Shannon).
 
     The bandwidth is the rms frequency of the rates: the power of their derivative over their own, its root.
     """

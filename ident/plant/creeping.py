@@ -3,7 +3,7 @@
     Θ(q, q̇, q̈) p′ + f(q, q̇, q̈, p′) = B u′ + Aᵀ F
 
 The forces F of the contacts stand for the constraint forces λ of (15). A flexible gear takes the motor's part of B_w
-off the wheel, and its spring stands for the motor. States, inputs and parameters are told by their names.
+off the wheel, and its spring stands for the motor. States, inputs and parameters are identified by their names.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ class AxisSignals:
         name: what follows `position_` in the file, empty for a single axis.
         kind: linear or rotary.
         position, effort: (N,) [m, N or rad, Nm].
-        assumed: the file states no unit; the kind is what its reader was told, or linear.
+        assumed: the file states no unit; the kind is what its reader was given, or linear.
     """
 
     name: str

@@ -23,7 +23,7 @@ ALONE: Final = 16.0
 White noise of a million samples reaches 2.6, and steps of force or speed are no single samples, however large.
 """
 UNJUDGED: Final = 3
-"""Samples at each end that have too few neighbours to be judged by them; nothing may lean on one of them alone."""
+"""Samples at each end that have too few neighbours to be checked against; nothing may depend on one of them alone."""
 _ENOUGH: Final = 100
 """Samples without which nothing is usual."""
 _NEAR: Final = 12

@@ -45,6 +45,10 @@ class Step(enum.StrEnum):
     LANE_CHANGE = "lane_change"
 
 
+FOUR_STEPS: Final = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION)
+"""Of the paper, section 6: without them nothing is identified."""
+
+
 def base_step(name: str) -> Step | None:
     """The known step that a step is a variant of: `straight` for itself and for `straight_dither`.
 

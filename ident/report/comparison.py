@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.campaign.reference import sample_times
-from ident.estimate.equations import Equations, column
-from ident.estimate.identify import Identification
+from ident.estimate.equations import Equations
+from ident.estimate.result import Identification
 from ident.records.repeats import repeats_of
 from ident.report.rows import Role, role_of
+from ident.vehicle.parameters import parameter_column
 
 Array = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def _compare(equations: Equations, identification: Identification) -> Comparison
     modelled = equations.regressor @ values
     known = np.zeros(len(modelled))
     if role in (Role.FIT, Role.VALIDATION):
-        known = equations.regressor[:, column("B_w")] * identification["B_w"].value
+        known = equations.regressor[:, parameter_column("B_w")] * identification["B_w"].value
     return Comparison(
         step=equations.step,
         coordinate=equations.coordinate,

@@ -53,3 +53,8 @@ def unit_text(unit: str) -> str:
     for plain, raised in _SUPERSCRIPTS.items():
         unit = unit.replace(plain, raised)
     return unit
+
+
+def plain(name: str) -> str:
+    """A canonical name for reading."""
+    return name.replace("_", " ")

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import jinja2
-
 from ident.faults import Fault
 from ident.report.digits import with_std
+from ident.report.page import render
 from ident.writing import write_whole
 
 
@@ -42,15 +41,7 @@ def _also(fault: Fault) -> str:
 
 def render_fault_report(faults: Sequence[Fault], records: Sequence[str]) -> str:
     """The whole page as a string; styles inline, nothing is loaded from anywhere."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("ident.report", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    template = environment.get_template("faults.html.j2")
-    return template.render(headline=headline(faults), faults=faults, records=records, evidence=evidence_text)
+    return render("faults.html.j2", headline=headline(faults), faults=faults, records=records, evidence=evidence_text)
 
 
 def write_fault_report(faults: Sequence[Fault], records: Sequence[str], path: Path) -> None:

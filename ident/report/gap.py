@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-import jinja2
 from markupsafe import Markup
 from plotly import offline
 
@@ -16,8 +14,10 @@ from ident.diagnosis.diagnosis import Diagnosis, Verdict
 from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.vehicle.outcome import HORIZON
 from ident.report import digits
+from ident.report.digits import plain
 from ident.report.gap_figures import Figure, map_figure, residual_figures
-from ident.report.gap_summary import gap_line, next_text, plain, verdict_line
+from ident.report.gap_summary import gap_line, next_text, verdict_line
+from ident.report.page import render, script_json
 from ident.writing import write_whole
 
 BIASED: Final = 2.0
@@ -36,7 +36,7 @@ class GapReport:
         findings: everything that was found.
         diagnosis: the answer.
         records, confirm: names of the records.
-        model: name of the model that was given to be judged; None where the parameters were refitted.
+        model: name of the model under test; None where the parameters were refitted.
     """
 
     findings: Findings
@@ -77,17 +77,8 @@ def render_gap_report(content: GapReport) -> str:
     figures: dict[str, Figure] = {"map": map_figure(diagnosis.where)} if _has_gap(diagnosis) else {}
     residuals = residual_figures(findings)
     figures |= {key: figure for key, _, figure in residuals}
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("ident.report", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters.update(
-        percent=digits.percent, significant=digits.significant, unit=digits.unit_text, plain=plain
-    )
-    return environment.get_template("gap.html.j2").render(
+    return render(
+        "gap.html.j2",
         verdict=str(diagnosis.verdict),
         headline=verdict_line(diagnosis, findings),
         gap=diagnosis.gap,
@@ -110,7 +101,7 @@ def render_gap_report(content: GapReport) -> str:
         records=content.records,
         confirm=content.confirm,
         has_map="map" in figures,
-        figures=_json(figures),
+        figures=script_json(figures),
         plotly=Markup(offline.get_plotlyjs()),
     )
 
@@ -173,8 +164,3 @@ def _repeated(findings: Findings) -> list[tuple[str, float, float]]:
     found, after = findings.repeated_before, findings.repeated_after
     pairs = [(label, before, after.get(label, 0.0)) for label, before in found.items()]
     return [(label, before, now) for label, before, now in pairs if max(before, now) >= REPEATS]
-
-
-def _json(value: Any) -> Markup:
-    """JSON that cannot end the script element it stands in."""
-    return Markup(json.dumps(value, separators=(",", ":")).replace("<", "\\u003c"))

@@ -7,7 +7,7 @@ from typing import Final
 
 from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Share, Verdict
 from ident.diagnosis.findings import Cause, Findings
-from ident.report.digits import percent, significant, unit_text, with_std
+from ident.report.digits import percent, plain, significant, unit_text, with_std
 
 MOST_LINES: Final = 10
 MOST_EVENTS: Final = 3
@@ -118,8 +118,3 @@ def next_text(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict is Verdict.UNKNOWN:
         return "look at the map of the gap (--report), and drive other speeds and loads where it lies."
     return "use the model."
-
-
-def plain(name: str) -> str:
-    """A canonical name for reading."""
-    return name.replace("_", " ")

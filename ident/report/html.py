@@ -2,35 +2,32 @@
 
 from __future__ import annotations
 
-import json
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-import jinja2
-from markupsafe import Markup, escape
+from markupsafe import Markup
 from plotly import offline
 
 from ident.assessment import Assessment
 from ident.campaign.plan import Plan
-from ident.estimate.identify import Identification
 from ident.estimate.noise import torque_unit
+from ident.estimate.result import Identification
 from ident.records.record import Record
 from ident.report import digits, figures
 from ident.report.assessment import headline
 from ident.report.comparison import Comparison, comparisons, folded
 from ident.report.driven_path import Leg, covered_floor, driven_legs
 from ident.report.excitation import phase_planes
+from ident.report.page import render, script_json
 from ident.report.paper import load_paper_result
 from ident.report.rows import Role, loop_rows, parameter_rows, step_rows
 from ident.report.summary import summarise
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 from ident.writing import write_whole
-
-_SYMBOL: Final = re.compile(r"(?P<letter>[A-Za-z])_(?P<index>\w+)")
 
 
 @dataclass(frozen=True)
@@ -80,27 +77,24 @@ def render_report(content: ReportContent) -> str:
     rows = parameter_rows(content.identification, content.truth, paper.parameters if content.paper else None)
     steps = step_rows(content.identification)
     summary = summarise(content.vehicle.name, content.identification, content.record, rows, steps)
-    return (
-        _environment()
-        .get_template("report.html.j2")
-        .render(
-            content=content,
-            identification=content.identification,
-            summary=summary,
-            headline=headline(content.assessment),
-            warnings=[*content.warnings, *summary.warnings],
-            rows=rows,
-            steps=steps,
-            checks=[row for row in steps if row.role is Role.VALIDATION],
-            panels=panels,
-            names=PARAMETER_NAMES,
-            paper=paper if content.paper else None,
-            loops=loop_rows(content.plan.designs) if content.plan else [],
-            room=content.plan.room() if content.plan else None,
-            settings=_settings(content),
-            figures=_json(drawn),
-            plotly=Markup(offline.get_plotlyjs()),
-        )
+    return render(
+        "report.html.j2",
+        content=content,
+        identification=content.identification,
+        summary=summary,
+        headline=headline(content.assessment),
+        warnings=[*content.warnings, *summary.warnings],
+        rows=rows,
+        steps=steps,
+        checks=[row for row in steps if row.role is Role.VALIDATION],
+        panels=panels,
+        names=PARAMETER_NAMES,
+        paper=paper if content.paper else None,
+        loops=loop_rows(content.plan.designs) if content.plan else [],
+        room=content.plan.room() if content.plan else None,
+        settings=_settings(content),
+        figures=script_json(drawn),
+        plotly=Markup(offline.get_plotlyjs()),
     )
 
 
@@ -111,43 +105,6 @@ def write_report(content: ReportContent, path: Path) -> None:
         UserError: the folder cannot be made or written.
     """
     write_whole(render_report(content), path)
-
-
-def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("ident.report", "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters.update(
-        digits=digits.digits,
-        percent=digits.percent,
-        significant=digits.significant,
-        unit=digits.unit_text,
-        with_std=digits.with_std,
-        symbol=_symbol,
-        symbols=_symbols,
-    )
-    return environment
-
-
-def _symbol(name: str) -> Markup:
-    """C_l as C with its index set low; d_vl with the comma of the paper."""
-    letter, _, index = name.partition("_")
-    if letter == "d":
-        index = f"{index[0]},{index[1:]}"
-    return Markup("<var>{}<sub>{}</sub></var>").format(letter, index)
-
-
-def _symbols(text: str) -> Markup:
-    """A sentence with the names of (18) in it set as symbols."""
-
-    def typeset(match: re.Match[str]) -> str:
-        return str(_symbol(match.group())) if match.group() in PARAMETER_NAMES else match.group()
-
-    return Markup(_SYMBOL.sub(typeset, str(escape(text))))
 
 
 def _settings(content: ReportContent) -> dict[str, str]:
@@ -162,11 +119,6 @@ def _settings(content: ReportContent) -> dict[str, str]:
         f"and {processing.guard:g} s around them",
         "Source of B_w": f"{inertia.method}: {digits.with_std(inertia.value, inertia.std)} kg m²",
     }
-
-
-def _json(value: Any) -> Markup:
-    """JSON that cannot end the script element it stands in."""
-    return Markup(json.dumps(value, separators=(",", ":")).replace("<", "\\u003c"))
 
 
 def _torque_panels(content: ReportContent, roles: Sequence[Role]) -> list[_Panel]:
@@ -186,18 +138,6 @@ def _torque_panels(content: ReportContent, roles: Sequence[Role]) -> list[_Panel
 def _torque_caption(comparison: Comparison) -> str:
     duration = len(comparison.time) * comparison.sample_time
     return f"{duration:.1f} s, {digits.percent(float(comparison.moving.mean()))} of the rows outside of stiction."
-
-
-def _identification_panels(content: ReportContent) -> list[_Panel]:
-    return _torque_panels(content, (Role.FIT,))
-
-
-def _validation_panels(content: ReportContent) -> list[_Panel]:
-    return _torque_panels(content, (Role.VALIDATION,))
-
-
-def _lifted_panels(content: ReportContent) -> list[_Panel]:
-    return _torque_panels(content, (Role.INERTIA, Role.SHOWN))
 
 
 def _folded_panels(content: ReportContent) -> list[_Panel]:
@@ -247,11 +187,11 @@ def _interval_panels(content: ReportContent) -> list[_Panel]:
     return [_Panel("intervals", "", "", figures.interval_figure(rows))]
 
 
-_SECTIONS: Final = {
+_SECTIONS: Final[Mapping[str, Callable[[ReportContent], list[_Panel]]]] = {
     "intervals": _interval_panels,
-    "identification": _identification_panels,
-    "validation": _validation_panels,
-    "lifted": _lifted_panels,
+    "identification": partial(_torque_panels, roles=(Role.FIT,)),
+    "validation": partial(_torque_panels, roles=(Role.VALIDATION,)),
+    "lifted": partial(_torque_panels, roles=(Role.INERTIA, Role.SHOWN)),
     "folded": _folded_panels,
     "excitation": _excitation_panels,
     "path": _path_panels,

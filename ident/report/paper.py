@@ -26,4 +26,4 @@ def load_paper_result() -> PaperResult:
     """Read the shipped Table 2."""
     path = find_data_file("ident.report", "paper_table2")
     quality = read_quantities(require_table(read_toml(path), "quality", path), {"condition": "1"}, f"{path}: quality")
-    return PaperResult(read_parameters(path), quality["condition"].value)
+    return PaperResult(read_parameters(path, "parameters"), quality["condition"].value)

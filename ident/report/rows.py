@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from ident.campaign.loops import LoopDesign
-from ident.estimate.identify import FIT_STEPS, VALIDATION_STEPS, Estimate, Identification
+from ident.estimate.identify import FIT_STEPS, VALIDATION_STEPS
 from ident.estimate.noise import NoiseFloor
+from ident.estimate.result import Estimate, Identification
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 MEANINGS: Final = {

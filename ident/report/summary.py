@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ident.assessment.fit import COORDINATE_WORDS
-from ident.estimate.identify import Identification
+from ident.estimate.result import Identification
 from ident.records.record import Record
 from ident.report.digits import percent
 from ident.report.rows import LEAST_SQUARES, ParameterRow, Role, StepRow
@@ -106,7 +106,7 @@ def _unrepeated(steps: Sequence[StepRow]) -> list[str]:
     steps_without = [row.floor.step for row in steps if row.role is Role.FIT and not row.floor.noise >= 0]
     if not steps_without:
         return []
-    return [f"No repeated periods in {', '.join(steps_without)}: noise and model error cannot be told apart there."]
+    return [f"No repeated periods in {', '.join(steps_without)}: noise and model error cannot be separated there."]
 
 
 def _not_validated(steps: Sequence[StepRow]) -> list[str]:

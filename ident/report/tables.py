@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ident.campaign.plan import Plan
-from ident.estimate.identify import Identification
+from ident.estimate.result import Identification
 from ident.report.digits import MISSING, digits, percent, significant, unit_text, with_std
 from ident.report.paper import PaperResult, load_paper_result
 from ident.report.rows import ParameterRow, StepRow, loop_rows, parameter_rows, step_rows

@@ -32,6 +32,11 @@ COULOMB_EPSILON: Final = 0.01
 """ε of tanh(rate/ε) in (16) [rad/s]; paper, section 7."""
 
 
+def parameter_column(name: str) -> int:
+    """Place of a parameter in p, and of its column in every regressor."""
+    return PARAMETER_NAMES.index(name)
+
+
 @dataclass(frozen=True)
 class Parameters:
     """Values and standard deviations of p (18).
@@ -46,17 +51,17 @@ class Parameters:
 
     def __getitem__(self, name: str) -> float:
         """Value of one parameter by its symbol."""
-        return float(self.values[PARAMETER_NAMES.index(name)])
+        return float(self.values[parameter_column(name)])
 
     def std_of(self, name: str) -> float:
         """Standard uncertainty of one parameter by its symbol."""
-        return float(self.std[PARAMETER_NAMES.index(name)])
+        return float(self.std[parameter_column(name)])
 
     def replaced(self, **values: float) -> Parameters:
         """A copy with some values changed."""
         changed = self.values.copy()
         for name, value in values.items():
-            changed[PARAMETER_NAMES.index(name)] = value
+            changed[parameter_column(name)] = value
         return Parameters(changed, self.std)
 
 
@@ -68,7 +73,7 @@ def parameters_from(quantities: Mapping[str, Quantity]) -> Parameters:
     )
 
 
-def read_parameters(path: Path, table: str = "parameters") -> Parameters:
+def read_parameters(path: Path, table: str) -> Parameters:
     """Parameters from the table of that name in a TOML file.
 
     Entries of [parameters], which an identification writes, hold more than value, unit, std and source; it is ignored.

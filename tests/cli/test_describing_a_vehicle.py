@@ -16,7 +16,7 @@ import pytest
 from hil.bench.prototypes import load_emulated
 from hil.campaign.folder import RunFolder, network_file_of
 from hil.network.described import load_described
-from ident.estimate.identify import KnownInertia
+from ident.estimate.result import KnownInertia
 from ident.records.record import Step
 from ident.vehicle.description import find_data_file, load_vehicle
 from ident.vehicle.parameters import PARAMETER_NAMES

@@ -13,7 +13,7 @@ import pytest
 from scipy import signal
 
 from ident.diagnosis.vehicle.ideal import FOUR, ideal_record
-from ident.effects.extended import read_model
+from ident.parameters_file import read_model
 from ident.records.channels import Channels, write_channels
 from ident.records.files import write_record
 from ident.records.record import Record

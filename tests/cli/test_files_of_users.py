@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hil.campaign.folder import Run, RunFolder, create_run
+from hil.campaign.creating import create_run
+from hil.campaign.folder import Run, RunFolder
 from hil.campaign.lock import driving
 from hil.network import DEFAULT_NETWORK, load_network
 from ident.campaign.excitation import FourierSeries

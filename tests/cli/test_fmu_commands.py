@@ -12,15 +12,17 @@ import fmpy.validation
 import numpy as np
 import pytest
 
-from hil.campaign.folder import Run, RunFolder, create_run
+from hil.campaign.creating import create_run
+from hil.campaign.folder import Run, RunFolder
 from hil.network import load_network
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.plan import make_plan
 from ident.campaign.reference import excitation_reference
 from ident.campaign.steps import EXCITATIONS
 from ident.effects import make_effect
-from ident.effects.extended import ExtendedModel, write_model
+from ident.effects.extended import ExtendedModel
 from ident.effects.text import effects_text
+from ident.parameters_file import write_model
 from ident.records.files import write_record
 from ident.records.record import Record, Segment, Step, make_segment
 from ident.vehicle.description import find_data_file, load_vehicle

@@ -13,7 +13,7 @@ from hil.network import DEFAULT_NETWORK
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.reference import excitation_reference
 from ident.campaign.steps import EXCITATIONS
-from ident.estimate.identify import KnownInertia
+from ident.estimate.result import KnownInertia
 from ident.records.files import write_record
 from ident.records.record import Record, Segment, Step, make_segment
 from ident.vehicle.description import load_vehicle

@@ -26,7 +26,8 @@ from hil.exam.sealing import effect_of
 from ident.campaign.feed_forward import Course, feed_forward
 from ident.diagnosis.names import MEMORIES, EffectName, places_of, refuse_strangers
 from ident.diagnosis.problem import Channel
-from ident.diagnosis.vehicle.rows import INPUTS, Formulas, kinematic_coordinates
+from ident.diagnosis.vehicle.inputs import INPUTS
+from ident.diagnosis.vehicle.rows import Formulas, kinematic_coordinates
 from ident.diagnosis.vehicle.sliding import sliding_cause
 from ident.diagnosis.vehicle.transforms import transform_cause
 from ident.effects import EFFECTS, Effect, at_single_places, make_effect

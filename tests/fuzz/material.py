@@ -13,14 +13,16 @@ import numpy as np
 
 from emulator.firmware.flywheels import Flywheels
 from hil.bench.lockstep import LockstepBench
-from hil.campaign.folder import Run, RunFolder, create_run
+from hil.campaign.creating import create_run
+from hil.campaign.folder import Run, RunFolder
 from hil.campaign.reading import read_logs
 from hil.frames.recorder import Recorder
 from hil.master import Master
 from hil.network import DEFAULT_NETWORK, load_network
 from ident.campaign.plan import make_plan
-from ident.effects.extended import ExtendedModel, write_model
-from ident.estimate.identify import KnownInertia
+from ident.effects.extended import ExtendedModel
+from ident.estimate.result import KnownInertia
+from ident.parameters_file import write_model
 from ident.records.files import write_record
 from ident.records.record import Record, Segment, Step, make_segment
 from ident.vehicle.description import find_data_file, load_vehicle

@@ -22,8 +22,8 @@ import numpy as np
 from hil.campaign.folder import open_run
 from hil.campaign.reading import read_logs
 from hil.network import load_network
-from ident.effects.extended import read_model
 from ident.errors import UserError
+from ident.parameters_file import read_model
 from ident.records.files import read_record
 from ident.records.record import Record
 from ident.vehicle.description import load_vehicle

@@ -27,7 +27,8 @@ from ident.campaign.plan import Plan, assemble_plan
 from ident.campaign.reference import STEERING_LOOPS, Reference
 from ident.campaign.steps import EXCITATIONS
 from ident.estimate.filters import Processing
-from ident.estimate.identify import Identification, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import Identification
 from ident.plant import dynamics, kinematics
 from ident.plant.kinematics import virtual_steering
 from ident.plant.modes import Mode

@@ -29,7 +29,7 @@ from emulator.firmware.drive.parameters import Parameters
 from emulator.firmware.drive.states import Command, State, StateMachine
 from emulator.firmware.drive.status import compose
 from emulator.firmware.drive.stopping import Stop
-from emulator.firmware.drive.supervision import EncoderWatch
+from emulator.firmware.drive.supervision import Supervision
 from emulator.firmware.hardware import DriveHardware
 from emulator.firmware.nmt import NmtState
 from emulator.firmware.node import Node
@@ -38,9 +38,6 @@ from emulator.power_stage import Trip
 _HALT = 1 << 8
 _COMMAND_BITS = 0x8F
 _ENABLE_OPERATION = 0x0F
-
-_WARNING_LOAD = 0.9
-"""I2t load from which on bit 7 warns [-]; the protection responds at 1.05."""
 
 _OPERATING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
@@ -68,7 +65,7 @@ class DriveApplication:
         self._machine = StateMachine(self._carry_out, self._ready)
         self._motions = make_motions(self.axis)
         self._activity = Activity(node.timers, self._tick)
-        self._encoder = EncoderWatch(hardware.counts_per_revolution)
+        self._supervision = Supervision(self.axis, hardware, self._parameters)
         self._stop = Stop(self.axis)
         self._reaction = StopKind.DISABLE
         self._after_stop: int | None = None
@@ -88,8 +85,6 @@ class DriveApplication:
         self.error_code = 0
         self.statusword = 0
         self._halted = False
-        self._warns = False
-        self._supervised_at = 0.0
         hardware.watch(self._tripped)
         bind(self, node.object_dictionary)
 
@@ -267,7 +262,7 @@ class DriveApplication:
 
     def _run(self, motion: Motion | None) -> None:
         if motion is None:
-            self._encoder.reset()
+            self._supervision.reset()
         self._activity.run(motion)
 
     def _tick(self, motion: Motion) -> None:
@@ -282,16 +277,10 @@ class DriveApplication:
         self._update_status()
 
     def _supervise(self) -> None:
-        axis = self.axis
-        if axis.read_at == self._supervised_at:
-            # Nobody has asked for the position since the last time.
-            axis.position()
-        self._supervised_at = axis.read_at
-        speed = self._parameters.max_motor_speed * axis.increments
-        if not self._encoder.accepts(axis.count, axis.read_at, speed, axis.torque_demand):
+        warned = self._supervision.warns
+        if not self._supervision.passes():
             self.fail(OF_TRIP[Trip.ENCODER])
-        elif (self._hardware.thermal_load > _WARNING_LOAD) is not self._warns:
-            self._warns = not self._warns
+        elif self._supervision.warns is not warned:
             self._update_status()
 
     def _update_status(self) -> None:
@@ -299,7 +288,7 @@ class DriveApplication:
         self.statusword = compose(
             self._machine.state,
             remote=self._node.nmt.state is NmtState.OPERATIONAL,
-            warns=self._warns,
+            warns=self._supervision.warns,
             limited=self.axis.limited,
             of_mode=motion.status() if motion is not None else 0,
         )

@@ -1,10 +1,15 @@
-"""Plausibility of the motor encoder: a count that the shaft cannot have reached, or that stays when it must not."""
+"""What a running drive looks after: thermal load, and counts of the motor encoder that cannot be true."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from emulator.firmware.drive.axis import wrap
+from emulator.firmware.drive.axis import Axis, wrap
+from emulator.firmware.drive.parameters import Parameters
+from emulator.firmware.hardware import DriveHardware
+
+_WARNING_LOAD: Final = 0.9
+"""I2t load from which on bit 7 warns [-]; the protection responds at 1.05."""
 
 _SPEED_MARGIN: Final = 2.0
 """Times the highest motor speed that a reading may suggest [-]: slopes and collisions drive a motor too."""
@@ -20,8 +25,44 @@ _STUCK_TORQUE: Final = 1000
 hold its count by chance."""
 
 
+class Supervision:
+    """Looks after one drive.
+
+    Args:
+        axis, hardware, parameters: of it.
+
+    Attributes:
+        warns: the thermal load is near to its limit.
+    """
+
+    def __init__(self, axis: Axis, hardware: DriveHardware, parameters: Parameters) -> None:
+        self._axis = axis
+        self._hardware = hardware
+        self._parameters = parameters
+        self._encoder = EncoderWatch(hardware.counts_per_revolution)
+        self._looked_at = 0.0
+        self.warns = False
+
+    def reset(self) -> None:
+        """Begin anew with the next count."""
+        self._encoder.reset()
+
+    def passes(self) -> bool:
+        """Look once: whether the encoder can be believed."""
+        axis = self._axis
+        if axis.read_at == self._looked_at:
+            # Nobody has asked for the position since the last time.
+            axis.position()
+        self._looked_at = axis.read_at
+        speed = self._parameters.max_motor_speed * axis.increments
+        accepted = self._encoder.accepts(axis.count, axis.read_at, speed, axis.torque_demand)
+        if accepted:
+            self.warns = self._hardware.thermal_load > _WARNING_LOAD
+        return accepted
+
+
 class EncoderWatch:
-    """Compares each count with the one before.
+    """Compares each count with the one before: one that the shaft cannot have reached, or that stays when it must not.
 
     Args:
         counts: increments per revolution of the motor.

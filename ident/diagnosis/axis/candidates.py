@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.motion import AxisMotion
-from ident.diagnosis.derivatives import delayed, derivative
+from ident.diagnosis.delays import delayed
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate, Variant
 from ident.effects import EffectParameter
+from ident.estimate.filters import SEVEN, differentiate
 from ident.records.axis_record import AxisKind
 
 Array = NDArray[np.float64]
@@ -174,7 +175,7 @@ def _time_delay(axis: AxisModel) -> Candidate:
         return axis.alone(delayed(axis.effort, -float(values[0]), axis.sample_time) - axis.effort)
 
     parameters = (EffectParameter("delay", "s", "of the motion behind the effort, as reported"),)
-    slope = derivative(axis.effort, axis.sample_time)
+    slope = differentiate(axis.effort, axis.sample_time, SEVEN)
     variants = (Variant(axis.alone(slope[:, None])),)
     shortest = LONGEST_HOLD * axis.sample_time
     return Candidate(EffectName.TIME_DELAY, axis.place, parameters, variants, contribution, negligible=shortest)
@@ -184,7 +185,7 @@ def _elasticity(axis: AxisModel) -> Candidate:
     """u = M q'' + ... - c M u'': the load follows the drive through a spring; first order in its compliance c."""
     unit = f"{axis.kind.position_unit}/{axis.kind.effort_unit}"
     meaning = "between drive and load, all inertia behind it; negative where the position is measured behind it"
-    bend = derivative(derivative(axis.effort, axis.sample_time), axis.sample_time)
+    bend = differentiate(differentiate(axis.effort, axis.sample_time, SEVEN), axis.sample_time, SEVEN)
     sampling = axis.sample_time**2 / abs(axis.inertia)
     column = axis.alone((-axis.inertia * bend)[:, None])
     parameters = (EffectParameter("compliance", unit, meaning),)

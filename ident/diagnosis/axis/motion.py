@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, signal
 
-from ident.diagnosis.derivatives import derivative
 from ident.diagnosis.rows import ROWS_PER_CUTOFF
 from ident.errors import EstimationError
 from ident.estimate.axis.processing import smoothed
+from ident.estimate.filters import SEVEN, differentiate
 from ident.records.axis_record import AxisRecord, AxisSignals
 
 Array = NDArray[np.float64]
@@ -115,15 +115,15 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth:
             "Record longer, at least some ten strokes.",
         )
     position = smoothed(axis.position, cutoff, dt)
-    velocity = derivative(position, dt)
+    velocity = differentiate(position, dt, SEVEN)
     speed = float(np.percentile(np.abs(velocity), 95))
     slow = (np.abs(velocity) < STUCK_SPEED * speed) | (np.diff(np.sign(velocity), prepend=np.sign(velocity[0])) != 0)
     moving = ~ndimage.binary_dilation(slow, np.ones(2 * round(memory / dt) + 1))
     ends = max(1, round(2 * memory / dt))
     moving[:ends] = moving[-ends:] = False
-    rate = derivative(axis.position, dt)
-    linear = np.stack([derivative(rate, dt), rate], axis=1)
-    return AxisMotion(position, velocity, derivative(velocity, dt), linear, axis.effort, moving)
+    rate = differentiate(axis.position, dt, SEVEN)
+    linear = np.stack([differentiate(rate, dt, SEVEN), rate], axis=1)
+    return AxisMotion(position, velocity, differentiate(velocity, dt, SEVEN), linear, axis.effort, moving)
 
 
 def effort_bandwidth(effort: Array, duration: float, limit: float, sample_time: float) -> float:

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from ident.diagnosis.axis.candidates import LONGEST_HOLD, AxisModel, axis_candidates
 from ident.diagnosis.axis.motion import AxisMotion, with_repeats
 from ident.diagnosis.axis.reference import Reference, Scale, Signals, axis_signals, own_columns, refuse_other_axes
-from ident.diagnosis.derivatives import derivative
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant
 from ident.diagnosis.refit import Refit
 from ident.estimate.axis.identify import PARAMETER_UNITS
 from ident.estimate.axis.processing import PARAMETERS
+from ident.estimate.filters import SEVEN, differentiate
 from ident.records.axis_record import AxisRecord, AxisSignals
 
 Array = NDArray[np.float64]
@@ -132,7 +132,7 @@ def _baselines(models: Sequence[AxisModel], signals: Signals, scales: Sequence[S
     own = [own_columns(signals.motions, index) for index in range(len(models))]
     for index, (model, scale) in enumerate(zip(models, scales, strict=True)):
         if scale.hold is not None:
-            change = model.sample_time * derivative(model.effort, model.sample_time)
+            change = model.sample_time * differentiate(model.effort, model.sample_time, SEVEN)
             own[index] = np.column_stack([own[index], change])
     return [
         np.hstack([columns if place == index else np.zeros_like(columns) for place, columns in enumerate(own)])

@@ -20,10 +20,10 @@ from ident.diagnosis.axis.motion import (
     position_cutoff,
     repeat_duration,
 )
-from ident.diagnosis.derivatives import delayed, derivative
+from ident.diagnosis.delays import delayed
 from ident.errors import EstimationError, RecordError
 from ident.estimate.axis.processing import smoothed
-from ident.estimate.filters import zero_phase
+from ident.estimate.filters import SEVEN, differentiate, zero_phase
 from ident.records.axis_record import AxisRecord, AxisSignals
 
 Array = NDArray[np.float64]
@@ -204,4 +204,4 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
 def _lagging(signals: Signals, index: int, values: Array) -> Array:
     """Filtered change (N,) of the effort of a first estimate over a sample interval."""
     dt = signals.record.sample_time
-    return signals.filtered(dt * derivative(signals.first_estimate(index, values), dt))
+    return signals.filtered(dt * differentiate(signals.first_estimate(index, values), dt, SEVEN))

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ident.diagnosis.linear import rms
 from ident.diagnosis.names import EffectName, refuse_strangers
 from ident.diagnosis.problem import Block, Channel, Nominal, Problem
-from ident.diagnosis.vehicle import rows
 from ident.diagnosis.vehicle.candidates import candidate_of, causes_of, seen_together, slid_by_any
 from ident.diagnosis.vehicle.context import MODEL_COLUMNS, Context, fitted_parameters, make_context, table_of
 from ident.diagnosis.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.library import TermCause
 from ident.diagnosis.vehicle.moments import apart_from_moments
 from ident.diagnosis.vehicle.rattling import SHAKEN
@@ -93,7 +93,7 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
         motion = coordinate_motion(source.inputs, source.spec, name, context.geometry)
         position, rate, acceleration = (values[:: source.factor] for values in motion)
         target = -table[:, row, 0]
-        load = context.filtered(np.abs(source.inputs[:, rows.SLICES["torques"]]).sum(axis=1), source)
+        load = context.filtered(np.abs(source.inputs[:, SLICES["torques"]]).sum(axis=1), source)
         yield Block(
             record=source.record,
             channel=source.channel,

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.linear import rms
-from ident.diagnosis.vehicle.rows import SLICES, in_coordinates
+from ident.diagnosis.vehicle.inputs import SLICES
+from ident.diagnosis.vehicle.rows import in_coordinates
 from ident.diagnosis.vehicle.sliding import traction, wheel_load
 from ident.diagnosis.vehicle.sources import Source
 from ident.diagnosis.vehicle.transforms import Setting

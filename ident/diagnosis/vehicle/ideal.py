@@ -18,7 +18,7 @@ from ident.diagnosis.names import EffectName
 from ident.effects import Effect, make_effect
 from ident.plant import dynamics, kinematics
 from ident.plant.modes import Mode
-from ident.records.record import PAYLOAD, Record, Segment, Step, make_segment
+from ident.records.record import FOUR_STEPS, PAYLOAD, Record, Segment, Step, make_segment
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import PARAMETER_NAMES
 from ident.vehicle.quantities import GRAVITY
@@ -81,7 +81,7 @@ class Experiment:
     given: tuple[Effect, ...] = ()
 
 
-FOUR: Final = tuple(Drive(step) for step in (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION))
+FOUR: Final = tuple(Drive(step) for step in FOUR_STEPS)
 
 DIAGNOSTIC: Final[Mapping[str, Experiment]] = MappingProxyType(
     {

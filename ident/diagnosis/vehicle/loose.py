@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.rattling import above_band, hammer, rattle_rows, rattling, rattling_at_standstill, swing
 from ident.diagnosis.vehicle.resting import moved_at_rest, rest_rows
-from ident.diagnosis.vehicle.rows import SLICES, OwnRows
+from ident.diagnosis.vehicle.rows import OwnRows
 from ident.diagnosis.vehicle.signals import Signals
 from ident.diagnosis.vehicle.sliding import rolled_with_others, rolling_rates
 from ident.diagnosis.vehicle.wandering import wander_rows, wandering

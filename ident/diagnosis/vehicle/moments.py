@@ -17,7 +17,7 @@ from scipy import ndimage
 
 from ident.diagnosis.linear import least_squares
 from ident.diagnosis.problem import Channel
-from ident.diagnosis.vehicle.rows import SLICES
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.sliding import MOVING, ahead_of_the_rest
 from ident.diagnosis.vehicle.sources import Source
 from ident.estimate.filters import Processing, zero_phase

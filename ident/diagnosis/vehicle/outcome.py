@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel
-from ident.diagnosis.vehicle.rows import SLICES
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.signals import shifted
 from ident.diagnosis.vehicle.sources import Source
 from ident.effects import make_effect
@@ -73,7 +73,7 @@ class _Runs:
 
 
 def outcomes(sources: Iterable[Source], model: ExtendedModel, geometry: Geometry) -> list[Outcome]:
-    """Differences of the coordinates that segments move; none for wheels in the air, or where nothing moves long."""
+    """SEVEN of the coordinates that segments move; none for wheels in the air, or where nothing moves long."""
     groups: dict[tuple[Mode, float, float], list[_Runs]] = {}
     for source in sources:
         runs = _runs(source, model)

@@ -20,7 +20,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.vehicle.rows import SLICES, OwnRows
+from ident.diagnosis.vehicle.inputs import SLICES
+from ident.diagnosis.vehicle.rows import OwnRows
 from ident.estimate.filters import Processing, zero_phase
 from ident.vehicle.geometry import WHEELS, Geometry
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.vehicle.rows import SLICES
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.estimate.equations import RowsOfStep
 from ident.plant.modes import Mode
 from ident.vehicle.geometry import WHEELS, Geometry

@@ -15,7 +15,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.vehicle.rows import SLICES, OwnRows
+from ident.diagnosis.vehicle.inputs import SLICES
+from ident.diagnosis.vehicle.rows import OwnRows
 from ident.vehicle.geometry import WHEELS, Geometry
 
 Array = NDArray[np.float64]

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel
+from ident.diagnosis.vehicle.inputs import Inputs, symbolic_inputs
 from ident.effects import EffectTerm, effect_term, symbolic_term
 from ident.estimate.equations import RowsOfStep
 from ident.plant import symbolic
@@ -42,43 +43,6 @@ from ident.vehicle.parameters import PARAMETER_NAMES
 
 Array = NDArray[np.float64]
 
-_SIZES: Final = {
-    "heading": 1,
-    "alpha": 2,
-    "beta": 4,
-    "alpha_rate": 2,
-    "beta_rate": 4,
-    "alpha_acceleration": 2,
-    "beta_acceleration": 4,
-    "motor_acceleration": 4,
-    "torques": 4,
-    "twist": 2,
-    "twist_rate": 2,
-    "hammer": 4,
-    "swing": 4,
-    "rattle": 4,
-    "wander": 2,
-    "rest": 4,
-    "payload": 1,
-}
-_ENDS: Final = np.cumsum(list(_SIZES.values())).tolist()
-SLICES: Final = {name: slice(end - size, end) for (name, size), end in zip(_SIZES.items(), _ENDS, strict=True)}
-"""What was measured, as columns of one array; `twist` is that of the two steering couplings.
-
-`beta` is what the encoder of a motor reads, at the wheel; its derivatives are those of the wheel once that is made to
-roll as the others say, and `motor_acceleration` stays that of the motor.
-
-Zero but where something is loose: `hammer` [-], `swing` and `rattle` [rad] where a motor rattles in its gear
-(`ident.diagnosis.vehicle.rattling`), `wander` [rad] where it can be told how far a rear unit moves in its coupling
-(`ident.diagnosis.vehicle.wandering`), `rest` [rad] where a motor moves whose wheel rests
-(`ident.diagnosis.vehicle.resting`).
-
-`payload` is the mass of a known load [kg].
-"""
-
-INPUTS: Final = _ENDS[-1]
-"""Number of those columns."""
-
 DIFFERENCES: Final = ("front_rear_left", "front_rear_right", "left_right")
 """What wheels that drive a rigid vehicle can disagree in: [m/s] at the floor."""
 
@@ -88,30 +52,6 @@ _SENSES: Final = {
     Mode.LATERAL: (-1, +1, +1, -1),
 }
 """Sense in which each wheel rolls when the mode's coordinate moves forward."""
-
-
-@dataclass(frozen=True)
-class _Inputs:
-    """The symbols behind INPUTS."""
-
-    all: Expression
-    heading: Expression
-    alpha: Expression
-    beta: Expression
-    alpha_rate: Expression
-    beta_rate: Expression
-    alpha_acceleration: Expression
-    beta_acceleration: Expression
-    motor_acceleration: Expression
-    torques: Expression
-    twist: Expression
-    twist_rate: Expression
-    hammer: Expression
-    swing: Expression
-    rattle: Expression
-    wander: Expression
-    rest: Expression
-    payload: Expression
 
 
 @dataclass(frozen=True)
@@ -137,11 +77,6 @@ class OwnRows:
         return np.asarray(self.lever * inputs[:, self.columns])
 
 
-def _inputs() -> _Inputs:
-    z = ca.SX.sym("z", INPUTS)
-    return _Inputs(z, *(z[columns] for columns in SLICES.values()))
-
-
 def dynamic_coordinates(spec: RowsOfStep) -> tuple[str, ...]:
     """Names of the dynamic rows of a mode, or of wheels in the air."""
     return tuple(f"beta_{wheel}" for wheel in WHEELS) if spec.mode is None else GENERALIZED_VELOCITIES[spec.mode]
@@ -157,7 +92,7 @@ def kinematic_coordinates(spec: RowsOfStep) -> tuple[str, ...]:
     return DIFFERENCES
 
 
-def dynamic_rows(mode: Mode | None, z: _Inputs, parameters: Expression, terms: Sequence[EffectTerm]) -> Expression:
+def dynamic_rows(mode: Mode | None, z: Inputs, parameters: Expression, terms: Sequence[EffectTerm]) -> Expression:
     """Generalized forces that must sum to zero, (n_k,), or (4,) with the wheels in the air."""
     known = effect_term(EffectName.PAYLOAD, "chassis", {"mass": z.payload, "inertia": 0.0})
     terms = [*terms, known]
@@ -176,7 +111,7 @@ def dynamic_rows(mode: Mode | None, z: _Inputs, parameters: Expression, terms: S
     return on_radii(symbolic.complement(mode, alpha), radii).T @ total
 
 
-def kinematic_rows(spec: RowsOfStep, z: _Inputs, terms: Sequence[EffectTerm]) -> Expression:
+def kinematic_rows(spec: RowsOfStep, z: Inputs, terms: Sequence[EffectTerm]) -> Expression:
     """Velocities that rolling wheels do not have, in `kinematic_coordinates` [m/s]."""
     residual = _slip(z, true_steering(terms, z.alpha), rolling_radii(terms, z.beta))
     return ca.vertcat(*in_coordinates([residual[wheel] for wheel in range(len(WHEELS))], spec))
@@ -191,7 +126,7 @@ def in_coordinates(wheels: Sequence[Any], spec: RowsOfStep) -> list[Any]:
     return [(fl - rl) / np.sqrt(2), (fr - rr) / np.sqrt(2), (fl + rl - fr - rr) / 2]
 
 
-def _slip(z: _Inputs, alpha: Expression, radii: Expression) -> Expression:
+def _slip(z: Inputs, alpha: Expression, radii: Expression) -> Expression:
     """Longitudinal rows (4,) of (1) that no twist of the chassis satisfies."""
     headings, rates = symbolic.wheel_headings(alpha), symbolic.wheel_headings(z.alpha_rate)
     rolled = []
@@ -205,12 +140,12 @@ def _slip(z: _Inputs, alpha: Expression, radii: Expression) -> Expression:
     return (measured - contacts @ ca.solve(contacts.T @ contacts, contacts.T @ measured))[4:]
 
 
-def _lifted(z: _Inputs) -> tuple[Expression, Expression]:
+def _lifted(z: Inputs) -> tuple[Expression, Expression]:
     still = ca.SX.zeros(3)
     return ca.vertcat(still, z.alpha_rate, z.beta_rate), ca.vertcat(still, z.alpha_acceleration, z.beta_acceleration)
 
 
-def _on_the_floor(z: _Inputs, alpha: Expression, radii: Expression) -> tuple[Expression, Expression]:
+def _on_the_floor(z: Inputs, alpha: Expression, radii: Expression) -> tuple[Expression, Expression]:
     """q̇, q̈ with the twist by odometry (3) on the true radii and angles."""
     A = symbolic.constraint_matrix(alpha)
     chassis, steering = A[:, :3], A[:, 3:5] @ z.alpha_rate
@@ -260,7 +195,7 @@ class Formulas:
         """
         key = (channel, spec, tuple(units))
         if key not in self._linearised:
-            z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
+            z, p = symbolic_inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
             rows = _rows(channel, spec, z, p, [*(unit.term for unit in units), *self._given])
             self._linearised[key] = _linearise(rows, z, p, units, shared=spec.mode is not None)
         return self._linearised[key]
@@ -269,7 +204,7 @@ class Formulas:
         """(z, geometry, ε, p, values) -> (N, rows, 1): the rows of a step with one effect more, or with none."""
         key = (channel, spec, name, where)
         if key not in self._exact:
-            z, p = _inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
+            z, p = symbolic_inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
             terms = [] if name is None else [symbolic_term(name, where)]
             rows = _rows(channel, spec, z, p, [*terms, *self._given])
             values = ca.vertcat(*(value for term in terms for value in term.values.values()))
@@ -283,7 +218,7 @@ def coordinates(channel: Channel, spec: RowsOfStep) -> tuple[str, ...]:
     return spec.coordinates if channel is Channel.DYNAMIC else kinematic_coordinates(spec)
 
 
-def _rows(channel: Channel, spec: RowsOfStep, z: _Inputs, p: Expression, terms: Sequence[EffectTerm]) -> Expression:
+def _rows(channel: Channel, spec: RowsOfStep, z: Inputs, p: Expression, terms: Sequence[EffectTerm]) -> Expression:
     if channel is Channel.KINEMATIC:
         return kinematic_rows(spec, z, terms)
     names, rows = dynamic_coordinates(spec), dynamic_rows(spec.mode, z, p, terms)
@@ -299,7 +234,7 @@ def _asked_for(rows: Expression, torques: Expression) -> Expression:
     return torques - driving.T @ ca.solve(driving @ driving.T, rows)
 
 
-def _linearise(rows: Expression, z: _Inputs, p: Expression, units: Sequence[UnitTerm], *, shared: bool) -> Vectorised:
+def _linearise(rows: Expression, z: Inputs, p: Expression, units: Sequence[UnitTerm], *, shared: bool) -> Vectorised:
     """`shared`: whether a row is driven by several motors."""
     asking = ca.SX.sym("asking", p.shape[0])
     symbols = ca.vertcat(*(unit.symbol for unit in units))

@@ -8,10 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.derivatives import derivative, second_derivative
-from ident.diagnosis.vehicle.rows import INPUTS, SLICES
+from ident.diagnosis.vehicle.inputs import INPUTS, SLICES
 from ident.errors import RecordError
-from ident.estimate.filters import FILTER_ORDER, Processing, zero_phase
+from ident.estimate.filters import FILTER_ORDER, SEVEN, Processing, smooth
 from ident.plant import kinematics
 from ident.records.record import Record, Segment
 from ident.vehicle.geometry import Geometry
@@ -53,7 +52,7 @@ class Signals:
     torques: Array
 
     def as_inputs(self) -> Array:
-        """(N, INPUTS), the columns of `rows.SLICES`; couplings are not twisted."""
+        """(N, INPUTS), the columns of `inputs.SLICES`; couplings are not twisted."""
         inputs = np.zeros((len(self.heading), INPUTS))
         inputs[:, SLICES["heading"]] = self.heading[:, None]
         for name in ("alpha", "beta", "alpha_rate", "beta_rate", "alpha_acceleration", "beta_acceleration", "torques"):
@@ -101,18 +100,17 @@ def _refuse_unfilterable(segment: Segment, source: str, processing: Processing) 
 
 def _signals(segment: Segment, source: str, processing: Processing) -> Signals:
     dt = segment.sample_time
-    alpha = zero_phase(segment.steering_angles, processing.signal_cutoff, dt)
-    beta = zero_phase(segment.wheel_angles, processing.signal_cutoff, dt)
+    alpha, beta = (smooth(angles, processing, dt, SEVEN) for angles in (segment.steering_angles, segment.wheel_angles))
     return Signals(
         segment=segment,
         record=source,
         heading=np.zeros(len(segment)),
-        alpha=alpha,
-        alpha_rate=derivative(alpha, dt),
-        alpha_acceleration=second_derivative(alpha, dt),
-        beta=beta,
-        beta_rate=derivative(beta, dt),
-        beta_acceleration=second_derivative(beta, dt),
+        alpha=alpha.angles,
+        alpha_rate=alpha.rates,
+        alpha_acceleration=alpha.accelerations,
+        beta=beta.angles,
+        beta_rate=beta.rates,
+        beta_acceleration=beta.accelerations,
         torques=segment.motor_torques,
     )
 

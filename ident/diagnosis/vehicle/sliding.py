@@ -16,12 +16,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.derivatives import derivative
 from ident.diagnosis.names import EffectName
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.rattling import BAND
-from ident.diagnosis.vehicle.rows import SLICES
 from ident.diagnosis.vehicle.transforms import LOAD_CUTOFF, Setting, contact_force
-from ident.estimate.filters import zero_phase
+from ident.estimate.filters import SEVEN, differentiate, zero_phase
 from ident.plant import kinematics
 from ident.plant.places import CHASSIS, WHEEL_PLACES
 from ident.vehicle.geometry import Geometry
@@ -201,7 +200,10 @@ def rolled_with_others(inputs: Array, wheels: Sequence[int], rolled: Array, samp
     """
     changed = inputs.copy()
     ahead = zero_phase(inputs[:, SLICES["beta_rate"]][:, wheels] - rolled, BAND, sample_time)
-    for name, change in (("beta_rate", ahead), ("beta_acceleration", derivative(ahead, sample_time))):
+    for name, change in (
+        ("beta_rate", ahead),
+        ("beta_acceleration", differentiate(ahead, sample_time, SEVEN)),
+    ):
         changed[:, [SLICES[name].start + wheel for wheel in wheels]] -= change
     return changed
 
@@ -214,7 +216,7 @@ def rolling_rates(inputs: Array, wheels: Sequence[int], geometry: Geometry) -> A
 
 def _roll(inputs: Array, wheel: int, ahead: Array, setting: Setting) -> None:
     """Take `ahead` (N,) [rad/s] off a wheel, and off its drive what it took."""
-    more = derivative(ahead, setting.sample_time)
+    more = differentiate(ahead, setting.sample_time, SEVEN)
     inputs[:, SLICES["beta_rate"].start + wheel] -= ahead
     for name in ("beta_acceleration", "motor_acceleration"):
         inputs[:, SLICES[name].start + wheel] -= more

@@ -12,6 +12,7 @@ from scipy import ndimage
 
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.vehicle import rows
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.loose import as_it_was, near_middle, taken_apart
 from ident.diagnosis.vehicle.resting import WIDE, resting_wheel
 from ident.diagnosis.vehicle.signals import Signals, decimation, signals_of
@@ -151,8 +152,8 @@ def _sources(
     most = max(1, int(np.pi / (OVERSAMPLED * processing.signal_cutoff * segment.sample_time)))
     stride = next(stride for stride in range(min(most, factor), 0, -1) if factor % stride == 0)
     recorded = signals.as_inputs()
-    recorded[:, rows.SLICES["torques"]] = zero_phase(
-        recorded[:, rows.SLICES["torques"]], processing.signal_cutoff, segment.sample_time
+    recorded[:, SLICES["torques"]] = zero_phase(
+        recorded[:, SLICES["torques"]], processing.signal_cutoff, segment.sample_time
     )
     loose = as_it_was(recorded) if as_recorded else taken_apart(recorded, signals, spec, geometry, processing)
     common = {

@@ -14,14 +14,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.derivatives import derivative, second_derivative
 from ident.diagnosis.names import EffectName, places_of
 from ident.diagnosis.vehicle.flights import Shaken, twist_in_flight
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.rattling import above_band, moved_by
 from ident.diagnosis.vehicle.resting import range_of
-from ident.diagnosis.vehicle.rows import SLICES
 from ident.diagnosis.vehicle.signals import shifted
-from ident.estimate.filters import zero_phase
+from ident.estimate.filters import SEVEN, differentiate, second_derivative, zero_phase
 from ident.plant.places import DRIVES, ENCODERS, STEERING
 from ident.plant.springs import MOTOR_SHARE
 from ident.vehicle.geometry import Geometry
@@ -193,7 +192,8 @@ def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> 
     """The wheel instead of the motor; what the motor's own inertia takes more than at the wheel's pace is lost."""
     changed = inputs.copy()
     changed[:, SLICES["rattle"].start + wheel] -= inputs[:, SLICES["hammer"].start + wheel] * twist
-    rate, acceleration = derivative(twist, setting.sample_time), second_derivative(twist, setting.sample_time)
+    rate = differentiate(twist, setting.sample_time, SEVEN)
+    acceleration = second_derivative(twist, setting.sample_time, SEVEN)
     for name, change in zip(_MOTION, (twist, rate, acceleration, acceleration), strict=True):
         changed[:, SLICES[name].start + wheel] -= change
     own = MOTOR_SHARE * setting["B_w"] / setting.geometry.gear_ratio
@@ -204,7 +204,7 @@ def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> 
 def _rear_behind_front(inputs: Array, side: int, twist: Array, setting: Setting) -> Array:
     changed, twist = inputs.copy(), zero_phase(twist, LOAD_CUTOFF, setting.sample_time)
     changed[:, SLICES["twist"].start + side] += twist
-    changed[:, SLICES["twist_rate"].start + side] += derivative(twist, setting.sample_time)
+    changed[:, SLICES["twist_rate"].start + side] += differentiate(twist, setting.sample_time, SEVEN)
     return changed
 
 

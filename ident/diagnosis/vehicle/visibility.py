@@ -133,11 +133,6 @@ class Visibility:
         return _problem(FOUR, (), self.vehicle)
 
 
-def sights_of(experiment: str, vehicle: VehicleDescription) -> Mapping[str, Sight]:
-    """What one experiment shows of a vehicle, see `Visibility`."""
-    return Visibility(vehicle)[experiment]
-
-
 def _problem(drives: Sequence[Drive], given: Sequence[Effect], vehicle: VehicleDescription) -> Problem:
     # At the vehicle file's parameters: an experiment of few steps does not show all of them.
     unseen = (EffectName.PARAMETER_CHANGE, EffectName.SLIP)  # sliding is found in records, not foretold

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ident.diagnosis.linear import least_squares
-from ident.diagnosis.vehicle.rows import SLICES, OwnRows
+from ident.diagnosis.vehicle.inputs import SLICES
+from ident.diagnosis.vehicle.rows import OwnRows
 from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]

@@ -10,10 +10,11 @@ from typing import ClassVar, Final
 
 import casadi as ca
 
-from ident.effects.base import FRICTION, EffectKind, EffectParameter, EffectTerm, parameter_column, sign_of
+from ident.effects.base import FRICTION, EffectKind, EffectParameter, EffectTerm, sign_of
 from ident.plant.places import STEERING, WHEEL_PLACES, rows_of, with_groups
 from ident.plant.symbolic import Expression
 from ident.plant.terms import Masses, State
+from ident.vehicle.parameters import parameter_column
 
 
 class _FrictionWarming(EffectTerm):

@@ -7,11 +7,11 @@ from typing import Final
 
 import casadi as ca
 
-from ident.effects.base import EffectKind, EffectParameter, EffectTerm, parameter_column
+from ident.effects.base import EffectKind, EffectParameter, EffectTerm
 from ident.plant.symbolic import Expression
 from ident.plant.terms import State
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.parameters import PARAMETER_NAMES
+from ident.vehicle.parameters import PARAMETER_NAMES, parameter_column
 
 
 class _ParameterChange(EffectTerm):

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from hil.campaign.reading import read_run
 from ident.estimate.equations import motion_of
 from ident.estimate.filters import Processing, zero_phase
-from ident.estimate.identify import KnownInertia, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import KnownInertia
 from ident.records.record import Record, Segment, Step
 from ident.vehicle.parameters import PARAMETER_NAMES
 

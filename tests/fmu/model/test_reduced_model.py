@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from ident.campaign.lane_change import LaneChange, lane_change_reference
 from ident.campaign.plan import make_plan
-from ident.campaign.reference import LaneChange, lane_change_reference
 from ident.plant import dynamics, kinematics, symbolic
 from ident.plant.modes import Mode
 from ident.records.record import Step

@@ -19,11 +19,12 @@ from hil.campaign.study import TOLERANCES
 from hil.frames.recorder import finished_steps
 from ident.assessment import Assessment
 from ident.campaign.steps import ORDER
-from ident.estimate.identify import Identification, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import Identification
+from ident.parameters_file import Identified, read_model, write_model
 from ident.records.files import write_record
 from ident.records.record import Record, Step
-from ident.report.result_file import write_parameters
-from ident.vehicle.parameters import PARAMETER_NAMES, Parameters, read_parameters
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 INCREMENT = 2 * np.pi / 2**17
 """Of a steering encoder [rad]; they dither by as much."""
@@ -138,8 +139,9 @@ def test_a_plain_record_gives_the_same_estimate(
 
 def test_the_result_file_reads_back_and_states_everything(result: Identification, run: Run, tmp_path: Path) -> None:
     path = tmp_path / "parameters.toml"
-    write_parameters(result, Assessment(), path, {"run": run.folder.path.name})
-    read = read_parameters(path)
+    identified = Identified(result, Assessment())
+    write_model(identified.model, path, {"run": run.folder.path.name}, identified)
+    read = read_model(path).parameters
     np.testing.assert_allclose(read.values, result.values, rtol=1e-8)
     document = tomllib.loads(path.read_text())
     assert tuple(document["parameters"]) == PARAMETER_NAMES

@@ -11,7 +11,8 @@ from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
 from hil.bench.emulation import BenchOperator
 from hil.bench.lockstep import LockstepBench
-from hil.campaign.folder import Run, RunFolder, create_run, network_file_of, open_run
+from hil.campaign.creating import create_run
+from hil.campaign.folder import Run, RunFolder, network_file_of, open_run
 from hil.campaign.reading import PAYLOAD, read_driven
 from hil.campaign.runner import CampaignRunner
 from hil.frames.recorder import Recorder

@@ -14,7 +14,8 @@ from emulator.firmware.flywheels import Flywheels
 from hil.bench import emulation
 from hil.bench.lockstep import LockstepBench
 from hil.bench.truth import truth_of
-from hil.campaign.folder import Run, RunFolder, create_run, network_file_of
+from hil.campaign.creating import create_run
+from hil.campaign.folder import Run, RunFolder, network_file_of
 from hil.campaign.reading import read_driven, read_run
 from hil.campaign.runner import CampaignRunner
 from hil.frames.recorder import Recorder
@@ -24,7 +25,8 @@ from ident.campaign.excitation import FourierSeries
 from ident.campaign.optimise import Excitation
 from ident.campaign.plan import assemble_plan, make_plan
 from ident.campaign.steps import DIAGNOSTIC, EXCITATIONS
-from ident.estimate.identify import KnownInertia, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import KnownInertia
 from ident.records.record import Segment, Step
 from ident.records.repeats import repeats_of
 from ident.vehicle.description import find_data_file, load_vehicle

@@ -9,7 +9,7 @@ import pytest
 
 from hil.campaign.folder import Run
 from hil.frames.recorder import LogFormat, finished_steps
-from ident.estimate.identify import KnownInertia
+from ident.estimate.result import KnownInertia
 from ident.records.record import Step
 
 Steer = Callable[[Path, int], list[str]]

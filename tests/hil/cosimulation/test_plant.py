@@ -16,7 +16,8 @@ from fmu.platforms import host_platform
 from fmu.source import ModelSource
 from fmu.variables import Inputs
 from hil.bench.lockstep import LockstepBench
-from hil.campaign.folder import Run, RunFolder, create_run
+from hil.campaign.creating import create_run
+from hil.campaign.folder import Run, RunFolder
 from hil.campaign.reading import read_run
 from hil.campaign.runner import CampaignRunner
 from hil.cosimulation.instance import FmuError, FmuInstance

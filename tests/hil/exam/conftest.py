@@ -7,15 +7,19 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from hil.exam.answers import Alone, Answer, Said
+from hil.exam.answers import Answer
 from hil.exam.cases import Case, Composition, Kind, draw_cases
 from hil.exam.identity import Identity
+from hil.exam.said import Alone, Said
 from hil.exam.sizes import SizeTable, load_sizes
+from hil.exam.world import world_of
+
+PROTOTYPE = world_of("prototype", None)
 
 
 @pytest.fixture(scope="session")
 def table() -> SizeTable:
-    return load_sizes()
+    return load_sizes(PROTOTYPE.sizes_file)
 
 
 @pytest.fixture(scope="session")

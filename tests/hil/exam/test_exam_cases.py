@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -12,10 +13,13 @@ from emulator.effects import inject
 from emulator.prototype import load_prototype
 from hil.exam.cases import SIZES, Case, Composition, Kind, case_from_json, draw_cases
 from hil.exam.sealing import SealingOrder, effect_of, seal
-from hil.exam.sizes import EffectSize, SizeTable
+from hil.exam.sizes import EffectSize, SizeTable, load_rows, table_text
+from hil.exam.world import stored_model, stored_sizes, world_of
 from ident.diagnosis.names import EffectName, places_of
 from ident.effects import EFFECTS
 from ident.errors import UserError
+
+PROTOTYPE = world_of("prototype", None)
 
 
 def test_there_are_as_many_of_each_kind_as_asked_for(cases: list[Case]) -> None:
@@ -85,6 +89,30 @@ def test_a_size_goes_through_the_points_measured() -> None:
     assert row.physical(0.5) == pytest.approx(0.05)
 
 
+def test_a_table_has_an_effect_a_line_and_is_read_back_as_it_was(tmp_path: Path) -> None:
+    kept = PROTOTYPE.sizes_file
+    rows = load_rows(kept)
+    assert table_text(rows) == kept.read_text()
+    assert len(kept.read_text().splitlines()) == len(rows) + 2
+    again = tmp_path / "sizes.json"
+    again.write_text(table_text(rows))
+    assert load_rows(again) == rows
+
+
+def test_a_world_without_a_table_or_a_model_says_what_writes_them(tmp_path: Path) -> None:
+    assert stored_sizes(PROTOTYPE, None).is_file()
+    assert stored_model(PROTOTYPE, None).is_file()
+    own = world_of(str(tmp_path / "own.toml"), None)
+    for stored, words in (
+        (stored_sizes, "exam calibrate --vehicle .*own.toml --engine .* --out"),
+        (stored_model, "--model"),
+    ):
+        with pytest.raises(UserError) as caught:
+            stored(own, None)
+        assert re.search(words, caught.value.remedy)
+        assert stored(own, tmp_path / "named") == tmp_path / "named"
+
+
 def test_a_kind_without_effects_is_refused(table: SizeTable) -> None:
     with pytest.raises(UserError, match="no effect of a kind"):
         draw_cases(SizeTable((), (), ()), Composition(4, 0, 0, 0, 0), range(9).__getitem__, np.random.default_rng(0))
@@ -113,7 +141,9 @@ def test_an_exam_has_no_more_excitations_than_cases(table: SizeTable) -> None:
 
 
 def test_an_exam_without_cases_is_refused_before_anything_is_planned(table: SizeTable, tmp_path: Path) -> None:
-    order = SealingOrder(tmp_path / "exam", "prototype", Composition(0, 0, 0, 0, 0), None, 1, 1, None)
+    order = SealingOrder(
+        tmp_path / "exam", PROTOTYPE, PROTOTYPE.model_file, Composition(0, 0, 0, 0, 0), None, 1, 1, None
+    )
     with pytest.raises(UserError, match="without cases"):
         seal(order, table, lambda *_: None)
     assert not order.out.exists()

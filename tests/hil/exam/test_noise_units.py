@@ -12,6 +12,7 @@ from emulator.prototype import load_prototype
 from hil.exam.noise_units import Noise, SizeInNoise, size_in_noise
 from hil.exam.plans import plan_exam, plans_from_text, plans_text
 from hil.exam.quiet import drive_quietly
+from hil.exam.world import world_of
 from ident.campaign.plan import Plan
 from ident.effects.text import parse_effect
 from ident.estimate.equations import usable_equations
@@ -22,6 +23,7 @@ from ident.vehicle.description import load_vehicle
 pytestmark = pytest.mark.slow
 
 CYCLE = 0.002
+PROTOTYPE = world_of("prototype", None)
 
 
 @pytest.fixture(scope="module")
@@ -31,13 +33,13 @@ def plan() -> Plan:
 
 @pytest.fixture(scope="module")
 def plain(plan: Plan) -> Record:
-    return drive_quietly(plan, "prototype", ())
+    return drive_quietly(plan, PROTOTYPE, ())
 
 
 def size(plan: Plan, plain: Record, *effects: Wanted) -> SizeInNoise:
     steps = {"steering_left": "alpha_l", "steering_right": "alpha_r", "straight": "x", "rotation": "gamma"}
     noise = Noise({(step, name): 1.0 for step, name in steps.items()}, {step: np.ones(8) for step in steps})
-    changed = drive_quietly(plan, "prototype", effects)
+    changed = drive_quietly(plan, PROTOTYPE, effects)
     return size_in_noise(noise, plain, changed, load_prototype().truth.values, plan.vehicle.geometry)
 
 

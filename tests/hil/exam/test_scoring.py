@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 
 from hil.exam import score_names as names
-from hil.exam.answers import Alone, Answer, Said, chance, permuted, read_answers, said_from
+from hil.exam.answers import Answer, chance, permuted, read_answers
 from hil.exam.cases import Case, Injected, Kind
 from hil.exam.folder import ExamFolder
 from hil.exam.identity import Identities, Identity
+from hil.exam.said import Alone, Said, said_from
 from hil.exam.score_figures import confusion_svg, reliability_svg
 from hil.exam.score_report import ScoreReport, score_json, score_markdown, summary_lines
 from hil.exam.scoring import removal_rates, score
@@ -28,6 +29,8 @@ Truthful = Callable[[Case], Answer]
 
 TWINS = Identity(frozenset({"torque_bias", "asymmetric_coulomb"}), frozenset({"drive_fl"}))
 """What no record on the floor tells apart."""
+
+WORLD = "prototype in pybullet"
 
 
 @pytest.fixture
@@ -296,7 +299,7 @@ def test_an_answer_is_read_as_it_was_written() -> None:
 
 def test_the_score_is_written_for_people_and_programs(answers: list[Answer]) -> None:
     result = score(answers, {"slip@chassis, size 1: not driven": 2})
-    report = ScoreReport(result, result.rates[names.RIGHT], chance(answers), removal_rates(answers[:0]), None)
+    report = ScoreReport(result, result.rates[names.RIGHT], chance(answers), removal_rates(answers[:0]), WORLD, None)
     assert "asked at least 0.90" in "\n".join(summary_lines(report))
     assert "2 without an answer" in summary_lines(report)[0]
     page = score_markdown(report, "Exam")
@@ -311,9 +314,11 @@ def test_the_score_says_whether_the_cases_could_be_known(
     answers: list[Answer], first_seed: int | None, words: str
 ) -> None:
     result = score(answers)
-    report = ScoreReport(result, result.rates[names.RIGHT], chance(answers), {}, first_seed)
+    report = ScoreReport(result, result.rates[names.RIGHT], chance(answers), {}, WORLD, first_seed)
     assert words in summary_lines(report)[1]
     assert words in score_markdown(report, "Exam")
+    assert WORLD in summary_lines(report)[1]
+    assert json.loads(score_json(report))["world"] == WORLD
     assert json.loads(score_json(report))["sealed"] is (first_seed is None)
 
 

@@ -19,12 +19,14 @@ from hil.exam.key import Key, make_key, read_key
 from hil.exam.lots import lots_of_key, lots_of_seed
 from hil.exam.sealing import SealingOrder, seal
 from hil.exam.sizes import SizeTable
+from hil.exam.world import World, world_of
 from ident.errors import UserError
 from ident.writing import write_whole
 
 pytest.importorskip("cryptography")
 
 SALT = bytes(16)
+PROTOTYPE = world_of("prototype", None)
 FEW = Composition(effects=3, pairs=1, none=2, unknown=1, invisible=1, excitations=2)
 
 
@@ -40,7 +42,7 @@ def key(tmp_path: Path, folder: ExamFolder) -> Key:
 
 def manifest(cases: list[Case], key: Key) -> Exam:
     names = tuple(case.identifier for case in cases)
-    return Exam("prototype", 0.002, ("one", "two"), names, None, SALT.hex(), key.fingerprint(SALT))
+    return Exam("prototype", "pybullet", 0.002, ("one", "two"), names, None, SALT.hex(), key.fingerprint(SALT))
 
 
 def written(folder: ExamFolder, cases: list[Case], key: Key) -> Exam:
@@ -111,7 +113,7 @@ def test_an_answer_that_was_changed_is_refused(cases: list[Case], folder: ExamFo
         open_cases(folder, key.path)
 
 
-@pytest.mark.parametrize("change", [{"plans": ["two", "one"]}, {"identifiers": []}, {"cycle": 0.004}])
+@pytest.mark.parametrize("change", [{"plans": ["two", "one"]}, {"identifiers": []}, {"cycle": 0.004}, {"engine": "x"}])
 def test_a_manifest_that_was_changed_is_refused(
     cases: list[Case], folder: ExamFolder, key: Key, change: dict[str, object]
 ) -> None:
@@ -158,7 +160,7 @@ def test_seeds_of_a_secret_are_too_many_to_be_tried_and_share_no_stream(key: Key
 def test_an_unsealed_set_says_so_and_follows_from_its_seed(
     table: SizeTable, folder: ExamFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    exam = sealed_without_driving(SealingOrder(folder.path, "prototype", FEW, None, 901, 1, None), table, monkeypatch)
+    exam = sealed_without_driving(ordered(folder, None, 901), table, monkeypatch)
     assert (exam.sealed, exam.first_seed) == (False, 901)
     assert json.loads(folder.manifest.read_text())["sealed"] is False
     lots = lots_of_seed(901)
@@ -170,15 +172,19 @@ def test_sealing_goes_on_with_the_same_key_alone(
     table: SizeTable, folder: ExamFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "exam.key"
-    order = SealingOrder(folder.path, "prototype", FEW, path, None, 1, None)
+    order = ordered(folder, path, None)
     sealed = sealed_without_driving(order, table, monkeypatch)
     answer = folder.answer.read_bytes()
+    other_model = tmp_path / "model.toml"
+    other_model.write_text(order.model.read_text() + "# Another.\n")
     assert sealed_without_driving(order, table, monkeypatch) == sealed
     for wrong, words in (
         (replace(order, key=None, first_seed=5), "holds a sealed exam"),
         (replace(order, key=make_key(tmp_path / "another.key", folder.path).path), "is not the key of"),
         (replace(order, key=tmp_path / "lost.key"), "cannot be read"),
         (replace(order, composition=replace(FEW, none=1, unknown=2)), "holds another exam"),
+        (replace(order, world=world_of("compact", None)), "of prototype in"),
+        (replace(order, model=other_model), "is not the model.toml"),
     ):
         with pytest.raises(UserError, match=words):
             sealed_without_driving(wrong, table, monkeypatch)
@@ -189,7 +195,11 @@ def test_sealing_goes_on_with_the_same_key_alone(
 def test_neither_and_both_of_key_and_seed_are_refused(table: SizeTable, folder: ExamFolder, tmp_path: Path) -> None:
     for key, seed in ((None, None), (tmp_path / "exam.key", 5)):
         with pytest.raises(UserError, match="either from a secret or from a seed"):
-            seal(SealingOrder(folder.path, "prototype", FEW, key, seed, 1, None), table, lambda *_: None)
+            seal(
+                ordered(folder, key, seed),
+                table,
+                lambda *_: None,
+            )
     assert not folder.path.exists()
     assert not (tmp_path / "exam.key").exists()
 
@@ -198,7 +208,7 @@ def test_records_look_alike_from_outside_however_long_they_took(
     table: SizeTable, folder: ExamFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Made one after the other in the order of the names that everybody sees, whatever order they were driven in."""
-    order = SealingOrder(folder.path, "prototype", FEW, tmp_path / "exam.key", None, 1, None)
+    order = ordered(folder, tmp_path / "exam.key", None)
     written_names: list[str] = []
     write = sealing.write_whole
 
@@ -224,13 +234,17 @@ def test_candidates_are_left_out_once_all_cases_are_diagnosed(folder: ExamFolder
     refuse_undiagnosed(folder, ["a", "b"])
 
 
+def ordered(folder: ExamFolder, key: Path | None, first_seed: int | None) -> SealingOrder:
+    return SealingOrder(folder.path, PROTOTYPE, PROTOTYPE.model_file, FEW, key, first_seed, 1, None)
+
+
 def sealed_without_driving(order: SealingOrder, table: SizeTable, monkeypatch: pytest.MonkeyPatch) -> Exam:
     """Seals with excitations and records that nobody waits for."""
 
     def plans(number: int, *_: object) -> tuple[int, str]:
         return number, f"plan {number}"
 
-    def driven(_plans: str, _prototype: str, _cycle: float, case: Case) -> tuple[str, tuple[bytes, bytes]]:
+    def driven(_plans: str, _world: World, _cycle: float, case: Case) -> tuple[str, tuple[bytes, bytes]]:
         return case.identifier, (b"some", b"more")
 
     monkeypatch.setattr(sealing, "draw_plans", plans)

@@ -17,13 +17,13 @@ from ident.assessment.file import assessment_text, refuse_unusable
 from ident.assessment.fit import drift_share
 from ident.errors import UserError
 from ident.estimate.filters import Processing
-from ident.estimate.identify import Identification, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import Identification
+from ident.parameters_file import Identified, read_model, write_model
 from ident.records.record import Record, Segment, Step
 from ident.report.assessment import assessment_lines
-from ident.report.result_file import write_parameters
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.parameters import PARAMETER_NAMES, Parameters, read_parameters
-from ident.vehicle.quantities import read_toml
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 Array = NDArray[np.float64]
 Change = Callable[[Segment], Segment]
@@ -219,15 +219,15 @@ def test_the_verdict_and_its_reasons_are_in_the_file_beside_the_parameters(
     impossible = with_value(identification, "m_ch", value=-842.0, ci95=(-843.0, -841.0))
     assessment = assess(impossible, record, prototype)
     path = tmp_path / "parameters.toml"
-    write_parameters(impossible, assessment, path, {"run": 'a "quoted" name'})
+    identified = Identified(impossible, assessment)
+    write_model(identified.model, path, {"run": 'a "quoted" name'}, identified)
     table = tomllib.loads(path.read_text())["assessment"]
     assert table["verdict"] == "unusable"
     assert len(table["reasons"]) == len(assessment.reasons)
     assert {"code", "channel", "value", "limit", "text"} <= table["reasons"][0].keys()
-    assert read_parameters(path)["m_ch"] == -842.0
+    assert read_model(path).parameters["m_ch"] == -842.0
     with pytest.raises(UserError, match=r"unusable.*m_ch"):
-        refuse_unusable(read_toml(path), str(path), force=False)
-    refuse_unusable(read_toml(path), str(path), force=True)
+        read_model(path, force=False)
 
 
 def test_a_file_of_no_assessment_or_a_better_one_passes() -> None:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from ident.campaign.plan import make_plan
 from ident.campaign.reference import Reference
 from ident.campaign.steps import EXCITATIONS, ORDER, PERIODS
-from ident.estimate.identify import Identification, KnownInertia, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import Identification, KnownInertia
 from ident.records.record import Record, Segment, Step, make_segment
 from ident.vehicle.description import VehicleDescription
 

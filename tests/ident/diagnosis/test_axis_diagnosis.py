@@ -13,11 +13,12 @@ import pytest
 
 from ident.diagnosis.axis.candidates import in_gap
 from ident.diagnosis.axis.diagnose import diagnose_axis
-from ident.diagnosis.axis.motion import derivative, with_repeats
-from ident.diagnosis.derivatives import delayed
+from ident.diagnosis.axis.motion import with_repeats
+from ident.diagnosis.delays import delayed
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import Findings
 from ident.errors import EstimationError, RecordError
+from ident.estimate.filters import SEVEN, differentiate
 from ident.records.axis_record import AxisRecord, read_axis_record
 
 Make = Callable[..., Any]
@@ -174,7 +175,7 @@ def test_a_delay_by_the_spectrum_is_a_shift_in_time() -> None:
 def test_derivatives_lose_nothing_in_the_band_of_the_rows() -> None:
     """At ω T = 0.5 the gain is right to 2 parts in 10⁴, where plain central differences lose 4 %."""
     time = np.arange(400) * 0.01
-    found = derivative(np.sin(50 * time), 0.01)
+    found = differentiate(np.sin(50 * time), 0.01, SEVEN)
     np.testing.assert_allclose(found[5:-5], 50 * np.cos(50 * time)[5:-5], atol=50 * 2e-4)
 
 

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.judge import judge
 from ident.diagnosis.problem import Block, Candidate, Problem, Variant
-from ident.diagnosis.regression import Regression, Settings
+from ident.diagnosis.regression import Regression
 from ident.diagnosis.remainder import lasting, repeated
 from ident.diagnosis.rows import make_rows
+from ident.diagnosis.settings import Settings
 from ident.diagnosis.whitening import colours_of_repeats, fit_whitener
 from ident.effects import EffectParameter
 

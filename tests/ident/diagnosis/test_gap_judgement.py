@@ -17,7 +17,7 @@ from ident.diagnosis.findings import Findings
 from ident.diagnosis.judge import judge
 from ident.diagnosis.probability import calibration
 from ident.diagnosis.problem import Nominal, Problem, Variant
-from ident.diagnosis.regression import Settings
+from ident.diagnosis.settings import Settings
 from ident.diagnosis.split import split_problem
 from ident.effects import EffectParameter
 from ident.errors import UserError

@@ -13,8 +13,9 @@ from scipy.optimize import least_squares
 
 from ident.diagnosis.problem import Candidate, Problem, Variant
 from ident.diagnosis.refit import MOST_STEPS, Refit, refit
-from ident.diagnosis.regression import Regression, Settings
+from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import make_rows
+from ident.diagnosis.settings import Settings
 from ident.effects import EffectParameter
 
 Array = NDArray[np.float64]

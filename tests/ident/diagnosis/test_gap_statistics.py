@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ident.diagnosis.evidence import White, directions, gather
+from ident.diagnosis.directions import White, directions
+from ident.diagnosis.evidence import gather
 from ident.diagnosis.problem import Candidate, Problem, Variant
 from ident.diagnosis.rows import Column, kept_rows, make_rows
 from ident.diagnosis.whitening import fit_whitener

@@ -11,12 +11,12 @@ from scipy import integrate
 
 from ident.campaign.feed_forward import Course, feed_forward
 from ident.effects import Effect, make_effect
-from ident.effects.extended import ExtendedModel, read_model, simulation_of, write_model
+from ident.effects.extended import ExtendedModel, simulation_of
+from ident.parameters_file import read_model, write_model
 from ident.plant import dynamics, kinematics
 from ident.plant.modes import Mode
 from ident.plant.simulation import Motion
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.parameters import read_parameters
 
 Array = NDArray[np.float64]
 
@@ -130,4 +130,4 @@ def test_a_model_is_read_as_it_was_written(
     assert np.allclose(again.parameters.std, vehicle.prior.std)
     assert [str(effect) for effect in again.effects] == [str(effect) for effect in effects]
     assert all(one.size == pytest.approx(other.size) for one, other in zip(again.effects, effects, strict=True))
-    assert np.allclose(read_parameters(path).values, vehicle.prior.values)
+    assert np.allclose(again.parameters.values, vehicle.prior.values)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ident.estimate.equations import column, equations_of
+from ident.estimate.equations import equations_of
 from ident.estimate.filters import Processing
 from ident.records.record import Segment, Step, make_segment
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.parameters import Parameters
+from ident.vehicle.parameters import Parameters, parameter_column
 
 Array = NDArray[np.float64]
 
@@ -56,6 +56,6 @@ def test_what_friction_holds_at_a_reversal_moves_no_parameter(
     motors, wheels = np.tile(torque[:, None], 4), np.tile(beta[:, None], 4)
     segment = Segment(Step.WHEEL_LIFTED, 0.0, time, motors, wheels, still, once)
     rows = equations_of(make_segment(segment, "stuck"), vehicle.geometry, Processing())[0]
-    columns = [column(name) for name in SOUGHT]
+    columns = [parameter_column(name) for name in SOUGHT]
     found = np.linalg.lstsq(rows.regressor[rows.moving][:, columns], rows.torque[rows.moving], rcond=None)[0]
     np.testing.assert_allclose(found, [truth[name] for name in SOUGHT], rtol=1e-3)

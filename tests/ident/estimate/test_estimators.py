@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from ident.errors import EstimationError
-from ident.estimate.identify import KnownInertia, identify
+from ident.estimate.identify import identify
 from ident.estimate.least_squares import Estimator, LeastSquares, LinearSystem, WeightedLeastSquares
+from ident.estimate.result import KnownInertia
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import Parameters

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from ident.errors import EstimationError
-from ident.estimate.equations import column
-from ident.estimate.identify import Identification, KnownInertia, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import Identification, KnownInertia
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters, parameter_column
 
 RecordOf = Callable[..., Record]
 FOUR_STEPS = (Step.STEERING_LEFT, Step.STEERING_RIGHT, Step.STRAIGHT, Step.ROTATION)
@@ -99,7 +99,7 @@ def test_an_error_of_the_wheel_inertia_moves_the_inertias_as_kappa_says(
     for name in PARAMETER_NAMES[:-1]:
         expected = per_inertia.get(name, 0.0) * 0.5 * b_w
         # m_ch and the frictions share rows, and the smoothing error of 1e-4 does not cancel exactly.
-        assert moved[column(name)] == pytest.approx(expected, rel=2e-3, abs=1e-4 * truth[name]), name
+        assert moved[parameter_column(name)] == pytest.approx(expected, rel=2e-3, abs=1e-4 * truth[name]), name
 
 
 def test_the_uncertainty_of_the_wheel_inertia_is_part_of_the_standard_deviations(
@@ -118,7 +118,7 @@ def test_the_uncertainty_of_the_wheel_inertia_is_part_of_the_standard_deviations
     low, high = unsure["m_ch"].ci95
     assert low < unsure["m_ch"].value - 1.9 * unsure["m_ch"].b_w_std
     assert high > unsure["m_ch"].value + 1.9 * unsure["m_ch"].b_w_std
-    assert unsure.correlation[column("m_ch"), column("B_w")] == pytest.approx(-1.0, abs=1e-3)
+    assert unsure.correlation[parameter_column("m_ch"), parameter_column("B_w")] == pytest.approx(-1.0, abs=1e-3)
     assert unsure["B_w"].std == std
 
 

@@ -60,7 +60,7 @@ def draws(periods: int, count: int, seed: int = 5, grows_with_speed: bool = Fals
     found = []
     for noise in ornstein_uhlenbeck(np.random.default_rng(seed), len(x), count) * np.tile(size, periods):
         error = inverse @ (x[kept].T @ noise[kept])
-        rows = FittedRows.of_least_squares(x, noise - x @ error, kept, numbers, SAMPLE_TIME, inverse)
+        rows = FittedRows(x, x @ inverse, noise - x @ error, kept, numbers, SAMPLE_TIME)
         stated = error_covariance([rows])
         found.append((error, np.sqrt(np.diag(stated.matrix)), stated.degrees_of_freedom))
     return Draws(*(np.array(column) for column in zip(*found, strict=True)))

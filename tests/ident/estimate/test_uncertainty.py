@@ -113,7 +113,7 @@ def part(generator: np.random.Generator, samples: int = 4000) -> FittedRows:
     x = generator.normal(size=(samples, 2))
     residual = generator.normal(size=samples)
     kept, period = np.ones(samples, dtype=bool), np.repeat(np.arange(4), samples // 4)
-    return FittedRows.of_least_squares(x, residual, kept, period, SAMPLE_TIME, np.eye(2))
+    return FittedRows(x, x, residual, kept, period, SAMPLE_TIME)
 
 
 def test_independent_parts_add_their_covariances() -> None:

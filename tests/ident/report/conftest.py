@@ -8,7 +8,8 @@ import pytest
 
 from ident.assessment import assess
 from ident.campaign.plan import Plan
-from ident.estimate.identify import Identification, KnownInertia, identify
+from ident.estimate.identify import identify
+from ident.estimate.result import Identification, KnownInertia
 from ident.records.record import Record
 from ident.report.html import ReportContent
 from ident.vehicle.description import VehicleDescription

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ident.campaign.plan import Plan
-from ident.estimate.identify import Identification
+from ident.estimate.result import Identification
 from ident.records.record import Record, Step
 from ident.report import figures
 from ident.report.comparison import comparisons, folded

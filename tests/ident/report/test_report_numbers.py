@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ident.estimate.identify import Identification
+from ident.estimate.result import Identification
 from ident.records.record import Record
 from ident.report.digits import MISSING, digits, percent, significant, unit_text, with_std
 from ident.report.paper import load_paper_result

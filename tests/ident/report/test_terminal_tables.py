@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console, RenderableType
 
 from ident.campaign.plan import Plan
-from ident.estimate.identify import Identification
+from ident.estimate.result import Identification
 from ident.report.digits import digits, percent, significant
 from ident.report.tables import (
     condition_line,

@@ -105,7 +105,7 @@ def test_identified_parameters_carry_more_than_is_read(tmp_path: Path) -> None:
     )
     path = tmp_path / "parameters.toml"
     path.write_text(entries)
-    parameters = read_parameters(path)
+    parameters = read_parameters(path, "parameters")
     np.testing.assert_array_equal(parameters.values, np.arange(11) + 0.5)
     assert parameters.std_of("m_ch") == 0.1
 

@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ident.diagnosis.derivatives import second_derivative
 from ident.diagnosis.vehicle.flights import Shaken, twist_in_flight
 from ident.diagnosis.vehicle.rattling import above_band
-from ident.estimate.filters import zero_phase
+from ident.estimate.filters import SEVEN, second_derivative, zero_phase
 
 Array = NDArray[np.float64]
 
@@ -113,7 +112,7 @@ def measured(angle: Array, torque: Array, inertia: float) -> Shaken:
     smooth, pushed = (zero_phase(values, 1000.0, DT) for values in (angle, torque))
     moved = above_band(smooth, DT)
     swing = np.sqrt(2 * np.maximum(zero_phase(moved**2, 40.0, DT), 0.0))
-    return Shaken(moved, swing, pushed - inertia * second_derivative(smooth, DT), UNSURE, DT)
+    return Shaken(moved, swing, pushed - inertia * second_derivative(smooth, DT, SEVEN), UNSURE, DT)
 
 
 @pytest.mark.parametrize(("gap", "within"), [(4e-4, 0.06), (8e-4, 0.06), (2e-3, 0.1)])

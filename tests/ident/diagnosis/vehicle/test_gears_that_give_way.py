@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
-from ident.diagnosis.derivatives import derivative, second_derivative
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.vehicle.rows import INPUTS, SLICES
+from ident.diagnosis.vehicle.inputs import INPUTS, SLICES
 from ident.diagnosis.vehicle.transforms import Setting, transform_cause
+from ident.estimate.filters import SEVEN, differentiate, second_derivative
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import PARAMETER_NAMES
 
@@ -71,7 +71,10 @@ def slope(values: Array) -> Array:
 def inputs_of(ride: Ride) -> Array:
     inputs = np.zeros((len(ride.torque), INPUTS))
     inputs[:, SLICES["torques"].start] = ride.torque / GEOMETRY.gear_ratio
-    rate, acceleration = derivative(ride.motor, DT), second_derivative(ride.motor, DT)
+    rate, acceleration = (
+        differentiate(ride.motor, DT, SEVEN),
+        second_derivative(ride.motor, DT, SEVEN),
+    )
     for name, values in zip(
         ("beta", "beta_rate", "beta_acceleration", "motor_acceleration"),
         (ride.motor, rate, acceleration, acceleration),

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.vehicle.ideal import Drive, ideal_record
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.moments import apart_from_moments, giving_way
-from ident.diagnosis.vehicle.rows import SLICES
 from ident.diagnosis.vehicle.sources import Source, sources_of
 from ident.estimate.filters import Processing
 from ident.records.record import Record, Step

@@ -12,18 +12,17 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from ident.diagnosis.derivatives import derivative, second_derivative
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.vehicle.build import build_problem
 from ident.diagnosis.vehicle.ideal import Drive, ideal_record
+from ident.diagnosis.vehicle.inputs import INPUTS, SLICES
 from ident.diagnosis.vehicle.rattling import above_band, hammer, rattle_rows, rattling, rattling_at_standstill, swing
-from ident.diagnosis.vehicle.rows import INPUTS, SLICES
 from ident.diagnosis.vehicle.sliding import rolled_with_others, rolling_rates
 from ident.diagnosis.vehicle.sources import processing_of, sources_of
 from ident.diagnosis.vehicle.transforms import Setting, transform_cause
 from ident.effects import make_effect
-from ident.estimate.filters import Processing, zero_phase
+from ident.estimate.filters import SEVEN, Processing, differentiate, second_derivative, zero_phase
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import PARAMETER_NAMES
@@ -56,9 +55,9 @@ def shaken(
     inputs = np.zeros((len(fast), INPUTS))
     columns = [
         ("beta", fast),
-        ("beta_rate", derivative(fast, DT)),
-        ("beta_acceleration", second_derivative(fast, DT)),
-        ("motor_acceleration", second_derivative(fast, DT)),
+        ("beta_rate", differentiate(fast, DT, SEVEN)),
+        ("beta_acceleration", second_derivative(fast, DT, SEVEN)),
+        ("motor_acceleration", second_derivative(fast, DT, SEVEN)),
     ]
     for name, values in columns:
         inputs[:, SLICES[name].start] = values

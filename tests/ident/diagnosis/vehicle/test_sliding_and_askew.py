@@ -10,7 +10,7 @@ from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate, Channel, Variant
 from ident.diagnosis.vehicle.askew import beside_sliding
 from ident.diagnosis.vehicle.ideal import Drive, ideal_record
-from ident.diagnosis.vehicle.rows import SLICES
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.sliding import adhesion, slides_alone, sliding_cause, sliding_times, traction
 from ident.diagnosis.vehicle.sources import Source, sources_of
 from ident.diagnosis.vehicle.transforms import Setting, transform_cause
