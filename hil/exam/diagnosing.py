@@ -25,7 +25,7 @@ from ident.parameters_file import read_model
 from ident.vehicle.description import load_vehicle
 from ident.writing import write_whole
 
-FORBIDDEN: Final = ("emulator", "pybullet")
+FORBIDDEN: Final = ("emulator", "pybullet", "mujoco")
 """Packages that would know the answers."""
 
 _FAILED: Final[Mapping[str, Any]] = MappingProxyType(
