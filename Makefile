@@ -9,7 +9,7 @@ PYTHON := python3
 endif
 BIN := .venv/bin
 PIP := -m pip --disable-pip-version-check
-ALL := .[emulator,records,dbc,ziglang,cosim,exam,cluster,test]
+ALL := .[emulator,records,dbc,ziglang,cosim,exam,cluster,video,test]
 
 .PHONY: demo test test-all bench check constraints clean
 
