@@ -111,6 +111,9 @@ def vehicle(
     built = load_emulated(prototype, network).prototype
     if fmu is None:
         chosen = engine or default_engine()
+        if gui and video and chosen is EngineName.MUJOCO:
+            # Two kinds of OpenGL in one process end it.
+            raise UserError("MuJoCo shows a window or draws a video, not both.", "Leave out --gui or --video.")
         with (
             EmulatedVehicle(built, seed=seed, gui=gui, make_engine=ENGINES[chosen], effects=effects) as emulated,
             _perhaps_filmed(emulated, chosen, video) as seen,

@@ -30,7 +30,7 @@ def refuse_unwritable(path: Path) -> None:
     """
     if path.suffix.lower() not in _WRITERS:
         raise UserError(
-            f"{path} says by its ending of no kind of video.", f"Let it end in one of: {', '.join(_WRITERS)}."
+            f"{path} has the ending of no video that can be written.", f"Let it end in {' or '.join(_WRITERS)}."
         )
     refuse_folder(path)
     place = next(folder for folder in path.absolute().parents if folder.exists())

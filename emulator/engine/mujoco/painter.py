@@ -36,8 +36,7 @@ class MuJoCoPainter:
     def __init__(self, built: AsBuilt, *, width: int, height: int) -> None:
         self._model: Any = mujoco.MjModel.from_xml_string(generate_mjcf(built, step_size=_STEP, on_stand=False))
         self._data: Any = mujoco.MjData(self._model)
-        self._opengl = open_context(os.environ, width, height)
-        self._context: Any = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        self._opengl, self._context = open_context(os.environ, self._model, width, height)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._scene: Any = mujoco.MjvScene(self._model, maxgeom=_SHAPES)
         self._option: Any = mujoco.MjvOption()
