@@ -65,7 +65,8 @@ class EmulatedVehicle:
     Attributes:
         drives: of the wheels fl, rl, fr, rr.
         encoders: of the steering, left and right.
-        engine: the physics below, for benchmarks and tests.
+        engine: the physics below, for benchmarks, tests and pictures.
+        built: what it is, effects included.
 
     Raises:
         UserError: a window is asked for where there is no display, or the vehicle cannot have these effects.
@@ -86,7 +87,7 @@ class EmulatedVehicle:
         effects: Sequence[Wanted] = (),
     ) -> None:
         injection = inject(prototype, effects, engine_step)
-        self._built = injection.built
+        self.built = injection.built
         prototype = injection.built.prototype
         make_engine = make_engine or ENGINES[default_engine()]
         self.engine = make_engine(injection.built, step_size=engine_step, gui=gui)
@@ -144,7 +145,7 @@ class EmulatedVehicle:
 
         Angles and the state of the drives stay.
         """
-        self.engine.build(replace(self._built, prototype=load_payload(self._built.prototype, mass, 0.0)))
+        self.engine.build(replace(self.built, prototype=load_payload(self.built.prototype, mass, 0.0)))
         self.lower()
 
     def wet(self, wheel: int, coefficient: float) -> None:

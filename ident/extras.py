@@ -22,6 +22,7 @@ class Extra(enum.StrEnum):
     COSIM = "cosim"
     EXAM = "exam"
     CLUSTER = "cluster"
+    VIDEO = "video"
 
 
 MODULES: Final[Mapping[Extra, Sequence[str]]] = MappingProxyType(
@@ -34,6 +35,7 @@ MODULES: Final[Mapping[Extra, Sequence[str]]] = MappingProxyType(
         Extra.COSIM: ("fmpy",),
         Extra.EXAM: ("cryptography", "pyarrow"),
         Extra.CLUSTER: ("distributed",),
+        Extra.VIDEO: ("av", "PIL"),
     }
 )
 """What an extra brings, by the names that are imported."""
@@ -48,6 +50,7 @@ PURPOSES: Final[Mapping[Extra, str]] = MappingProxyType(
         Extra.COSIM: "cosim, and an FMU as --plant",
         Extra.EXAM: "exam",
         Extra.CLUSTER: "exam --scheduler",
+        Extra.VIDEO: "demo, campaign and emulate with --video",
     }
 )
 """What an extra is for, in commands and options."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import can
 import typer
@@ -30,6 +30,7 @@ from ident.records.record import Step, base_step
 from ident.report.tables import loop_table, room_table
 from ident.vehicle.description import find_data_file
 from quasiomni.application import app, console, errors, show_next
+from quasiomni.filming import AT_REST, VIDEO_RATE, VideoOption, VideoRateOption, captioned, drawing, plan_video
 from quasiomni.identification import end_with, known_inertia
 from quasiomni.options import (
     EffectOption,
@@ -51,6 +52,9 @@ from quasiomni.options import (
 )
 from quasiomni.showing import HumanOperator, bar, bars, say, stages
 
+if TYPE_CHECKING:
+    from hil.video.film import Video
+
 LOCKSTEP = "emulator, in lockstep"
 
 
@@ -62,15 +66,18 @@ def demo(
     seed: SeedOption = 1,
     effect: EffectOption = None,
     gui: GuiOption = False,
+    video: VideoOption = None,
+    video_rate: VideoRateOption = VIDEO_RATE,
 ) -> None:
     """The whole story on the emulator: boot, four steps, parameters beside the truth, lane change, report."""
+    film = plan_video(video, video_rate, AT_REST)
     chosen = choose_engine(engine)
     steps = _steps((), False, None)
     order = Order(
         out, vehicle, None, steps, PERIODS, seed, None, LogFormat.BLF, LOCKSTEP, vehicle, demo=True, engine=chosen
     )
     effects = parse_effects(effect)
-    _drive_on_emulator(_planned(order), order, effects, gui)
+    _drive_on_emulator(_planned(order), order, effects, gui, film)
     with stages() as stage:
         result = identify_run(out, out, None, truth_of(vehicle), stage=stage)
     end_with(result, out)
@@ -109,6 +116,8 @@ def campaign(
     plant: PlantOption = None,
     force: ForceOption = False,
     gui: GuiOption = False,
+    video: VideoOption = None,
+    video_rate: VideoRateOption = VIDEO_RATE,
 ) -> None:
     """Drive the identification steps and record every frame; on the emulator, or with --bus on a real vehicle.
 
@@ -122,7 +131,8 @@ def campaign(
         steps = _diagnostic_steps(skip or (), payload)
     inertia = known_inertia(b_w, b_w_std)
     effects, fmu = parse_effects(effect), parse_plant(plant, force=force)
-    _refuse_two_vehicles(bus, fmu, effects, engine)
+    _refuse_two_vehicles(bus, fmu, effects, engine, video)
+    film = plan_video(video, video_rate, AT_REST)
     if log_format is LogFormat.MF4:
         require(Extra.RECORDS, "--format .mf4", ("asammdf",))
     prototype, where = (vehicle, LOCKSTEP) if bus is None and plant is None else ("", bus or plant or "")
@@ -146,7 +156,7 @@ def campaign(
         same = not resume or carries_vehicle(run.folder, find_data_file("ident.vehicle", vehicle))
         _drive_on_fmu(run, order, vehicle if same else str(run.folder.vehicle), fmu)
     elif bus is None:
-        _drive_on_emulator(run, order, effects, gui)
+        _drive_on_emulator(run, order, effects, gui, film)
     else:
         _drive_on_bus(run, order, bus, ask=not yes, lockstep=lockstep)
     show_next(f"quasiomni identify {out}")
@@ -158,15 +168,18 @@ def _on_engine(order: Order) -> Order:
 
 
 def _refuse_two_vehicles(
-    bus: str | None, fmu: Path | None, effects: Sequence[Effect], engine: EngineName | None
+    bus: str | None, fmu: Path | None, effects: Sequence[Effect], engine: EngineName | None, video: Path | None
 ) -> None:
-    if bus is not None and (effects or fmu or engine):
+    if bus is not None and (effects or fmu or engine or video):
         raise UserError(
-            "--effect, --engine and --plant are of the emulator, and --bus names another vehicle.",
+            "--effect, --engine, --plant and --video are of the emulator, and --bus names another vehicle.",
             "Leave one of them out.",
         )
-    if fmu is not None and engine is not None:
-        raise UserError("--plant takes the place of the physics engine.", "Leave --engine or --plant out.")
+    if fmu is not None and (engine or video):
+        raise UserError(
+            "--plant takes the place of the physics engine, which --engine names and --video draws.",
+            "Leave one of them out.",
+        )
 
 
 def _planned(order: Order) -> Run:
@@ -183,7 +196,7 @@ def _resumed(order: Order, context: typer.Context) -> Run:
     return run
 
 
-def _drive_on_emulator(run: Run, order: Order, effects: Sequence[Effect], gui: bool) -> None:
+def _drive_on_emulator(run: Run, order: Order, effects: Sequence[Effect], gui: bool, film: Video | None) -> None:
     if not run.prototype:
         raise UserError(
             f"{order.out} was driven on {run.bus}, not on the emulator.", f"Go on with it there: --bus {run.bus}."
@@ -193,10 +206,11 @@ def _drive_on_emulator(run: Run, order: Order, effects: Sequence[Effect], gui: b
     network = run.network.path
     _say_assumed(emulation.assumed(run.emulated, network))
     with (
-        emulation.bench(run.emulated, run.seed, gui, network, effects, engine=engine) as bench,
+        drawing(film) as video,
+        emulation.bench(run.emulated, run.seed, gui, network, effects, engine=engine, video=video) as bench,
         _stop_is_no_error(order.out),
     ):
-        _drive(run, order, bench.bus, bench.clock, bench.operator)
+        _drive(run, order, bench.bus, bench.clock, bench.operator, film=film)
 
 
 def _drive_on_fmu(run: Run, order: Order, prototype: str, fmu: Path) -> None:
@@ -235,6 +249,7 @@ def _drive(
     may_move: Callable[[], bool] = lambda: True,
     *,
     lockstep: bool = False,
+    film: Video | None = None,
 ) -> None:
     """Check the network, ask, and only then move; exit code 1 where the answer is no."""
     with driving(run.folder.path):
@@ -251,7 +266,8 @@ def _drive(
         if not may_move():
             raise typer.Exit(code=1)
         with bars() as shown:
-            overruns = drive_run(run, order, bus, clock, operator, _bar_per_step(shown), lockstep=lockstep)
+            progress = captioned(film, _bar_per_step(shown))
+            overruns = drive_run(run, order, bus, clock, operator, progress, lockstep=lockstep)
     if overruns:
         console.print(f"{overruns} cycles began late: close other programs on this computer.", style="yellow")
 

@@ -19,6 +19,7 @@ from hil.bus.unix import UnixHub
 from hil.campaign.folder import network_file_of
 from hil.network import load_network
 from quasiomni.application import app, console
+from quasiomni.filming import VIDEO_RATE, VideoOption, VideoRateOption, drawing, plan_video
 from quasiomni.options import (
     DEFAULT_BUS,
     EffectOption,
@@ -74,8 +75,11 @@ def emulate(
     plant: PlantOption = None,
     force: ForceOption = False,
     gui: GuiOption = False,
+    video: VideoOption = None,
+    video_rate: VideoRateOption = VIDEO_RATE,
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
+    film = plan_video(video, video_rate, bus)
     fmu = parse_plant(plant, force=force)
     chosen = choose_engine(engine) if fmu is None else None
     emulation = load_emulation()
@@ -84,7 +88,8 @@ def emulate(
     end = None if duration is None else time.monotonic() + duration
     tell_native(fmu)
     with (
-        emulation.vehicle(prototype, seed, gui, network_file, parse_effects(effect), fmu, chosen) as vehicle,
+        drawing(film) as drawn,
+        emulation.vehicle(prototype, seed, gui, network_file, parse_effects(effect), fmu, chosen, drawn) as vehicle,
         emulation.server_bus(bus, load_network(network_file)) as opened,
     ):
         if stand is Stand.JACK:

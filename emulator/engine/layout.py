@@ -1,4 +1,4 @@
-"""What every engine's description of the vehicle shares: names, corners, order, looks.
+"""What every engine's description of the vehicle shares: names, corners, order.
 
 Frames: x forward, y left, z up. Body `chassis` with its origin over the centre of the four steering axes; joint
 `steering_<wheel>` about z at each corner; joint `rolling_<wheel>` about the wheel's axle (y of the knuckle),
@@ -20,15 +20,6 @@ SIDE_SIGN: Final = {"fl": 1.0, "rl": 1.0, "fr": -1.0, "rr": -1.0}
 """+1 left, -1 right."""
 END_SIGN: Final = {"fl": 1.0, "rl": -1.0, "fr": 1.0, "rr": -1.0}
 """+1 front, -1 rear."""
-
-TYRE_WIDTH_RATIO: Final = 0.5
-"""Width of the tyre that one sees over the wheel radius."""
-
-BODY_COLOUR: Final = (0.85, 0.45, 0.10, 1.0)
-KNUCKLE_COLOUR: Final = (0.20, 0.45, 0.75, 1.0)
-TYRE_COLOUR: Final = (0.12, 0.12, 0.13, 1.0)
-MARK_COLOUR: Final = (0.95, 0.90, 0.25, 1.0)
-"""Of the spoke that shows how a wheel turns."""
 
 Vector = tuple[float, float, float]
 
@@ -69,12 +60,6 @@ def axle(prototype: Prototype, wheel: str, build: WheelBuild) -> Vector:
 def tyre_centre(build: WheelBuild) -> Vector:
     """Centre of the tyre in the frame of the wheel [m]; turned by beta, it is e cos(beta + phase) below the axle."""
     return (-build.eccentricity * math.sin(build.phase), 0.0, -build.eccentricity * math.cos(build.phase))
-
-
-def body_lift(prototype: Prototype) -> float:
-    """How far above its place one sees the body, so that the wheels show; the mass stays where it is [m]."""
-    body = prototype.body
-    return 2 * prototype.geometry.wheel_radius + body.height / 2 - body.centre_height
 
 
 def joint_coulomb(truth: Parameters) -> list[float]:

@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from emulator.as_built import AsBuilt
+from emulator.engine.camera import Camera
 from emulator.rigid_bodies import RigidBody
 
 STAND_CLEARANCE = 0.05
@@ -97,4 +101,38 @@ class MakeEngine(Protocol):
 
         Raises:
             UserError: a window is asked for where there is no display.
+        """
+
+
+class Painter(Protocol):
+    """Draws pictures of a vehicle, without a display.
+
+    It has a world of its own, where it puts a vehicle that looks like the one to be drawn: what is drawn cannot change
+    what happens.
+    """
+
+    def paint(
+        self, position: Sequence[float], orientation: Sequence[float], angles: Sequence[float], camera: Camera
+    ) -> NDArray[np.uint8]:
+        """A picture (height, width, 3): red, green, blue.
+
+        Args:
+            position: of the chassis' centre in the world [m].
+            orientation: its quaternion (x, y, z, w).
+            angles: (8,) of the joints [rad].
+            camera: that sees it.
+        """
+
+    def close(self) -> None:
+        """Release that world."""
+
+
+class MakePainter(Protocol):
+    """What makes a painter of a vehicle."""
+
+    def __call__(self, built: AsBuilt, *, width: int, height: int) -> Painter:
+        """A painter of pictures of a size [pixels].
+
+        Raises:
+            UserError: there is nothing to draw with.
         """

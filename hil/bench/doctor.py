@@ -46,6 +46,7 @@ class CheckName(enum.StrEnum):
     COSIM = "cosim"
     EXAM = "exam"
     CLUSTER = "cluster"
+    VIDEO = "video"
     COMPILER = "compiler"
     SOCKETCAN = "socketcan"
     CAN_UTILS = "can-utils"

@@ -6,10 +6,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
 import can
 
 from emulator.engine.choice import ENGINES
+from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.storage import FolderMemory
 from emulator.vehicle import EmulatedVehicle
 from hil.bench.lockstep import LockstepBench
@@ -19,6 +21,7 @@ from hil.bus.clock import Clock
 from hil.bus.opening import open_served_bus
 from hil.cosimulation.plant import FmuVehicle
 from hil.faults import Fault, parse_fault, parse_script
+from hil.faults.devices import Slippery
 from hil.faults.fault import FaultError
 from hil.network import Network
 from ident.effects import Effect
@@ -26,8 +29,21 @@ from ident.errors import UserError
 from ident.extras import EngineName, default_engine
 from ident.reading import read_bounded
 
-Plant = EmulatedVehicle | FmuVehicle
-"""What the nodes can sit on."""
+if TYPE_CHECKING:
+    from hil.video.film import Video
+
+
+class Plant(VehicleHardware, Slippery, Protocol):
+    """What the nodes can sit on, and what hands do with it."""
+
+    def lift(self) -> None:
+        """Put the vehicle on the jack-stand."""
+
+    def lower(self) -> None:
+        """Take it off."""
+
+    def load(self, mass: float) -> None:
+        """Put a load [kg] on it, over its centre, instead of any load before."""
 
 
 @dataclass(frozen=True)
@@ -80,24 +96,34 @@ def vehicle(
     effects: Sequence[Effect] = (),
     fmu: Path | None = None,
     engine: EngineName | None = None,
+    video: Video | None = None,
 ) -> Iterator[Plant]:
     """The emulated prototype with effects, or an FMU with the prototype's drives and encoders; closed at the end.
 
     Args:
         engine: None for the default one.
+        video: to be written at the end.
 
     Raises:
-        UserError: prototype and network file disagree, an effect or a window is asked of an FMU, or it cannot be run.
+        UserError: prototype and network file disagree, an effect, a window or a video is asked of an FMU, it cannot be
+            run, or there is nothing to draw the video with.
     """
     built = load_emulated(prototype, network).prototype
     if fmu is None:
-        make = ENGINES[engine or default_engine()]
-        with EmulatedVehicle(built, seed=seed, gui=gui, make_engine=make, effects=effects) as emulated:
-            yield emulated
+        chosen = engine or default_engine()
+        if gui and video and chosen is EngineName.MUJOCO:
+            # Two kinds of OpenGL in one process end it.
+            raise UserError("MuJoCo shows a window or draws a video, not both.", "Leave out --gui or --video.")
+        with (
+            EmulatedVehicle(built, seed=seed, gui=gui, make_engine=ENGINES[chosen], effects=effects) as emulated,
+            _perhaps_filmed(emulated, chosen, video) as seen,
+        ):
+            yield seen
         return
-    if effects or gui:
+    if effects or gui or video:
         raise UserError(
-            "An FMU takes no --effect and has no window.", "Tune the effect's parameters in the FMU itself."
+            "An FMU takes no --effect, and has no window and no video.",
+            "Tune the effect's parameters in the FMU itself.",
         )
     with FmuVehicle(fmu, built, seed=seed) as plant:
         yield plant
@@ -112,13 +138,25 @@ def bench(
     effects: Sequence[Effect] = (),
     fmu: Path | None = None,
     engine: EngineName | None = None,
+    video: Video | None = None,
 ) -> Iterator[Bench]:
     """What `vehicle` gives, behind an in-process bus in lockstep."""
     with (
-        vehicle(prototype, seed, gui, network, effects, fmu, engine) as emulated,
+        vehicle(prototype, seed, gui, network, effects, fmu, engine, video) as emulated,
         LockstepBench(emulated, network) as lockstep,
     ):
         yield Bench(lockstep.bus, lockstep.clock, BenchOperator(emulated))
+
+
+@contextmanager
+def _perhaps_filmed(emulated: EmulatedVehicle, engine: EngineName, video: Video | None) -> Iterator[Plant]:
+    if video is None:
+        yield emulated
+        return
+    from hil.video.developing import filmed  # needs libraries that only a video needs
+
+    with filmed(emulated, engine, video) as film:
+        yield film
 
 
 @contextmanager

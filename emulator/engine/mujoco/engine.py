@@ -84,7 +84,7 @@ class MuJoCoEngine:
             self.model.body_pos[self._chassis, 2] = height
         else:
             self.data.qpos[2] = height
-        self._joint_angles[:] = _by_unit(angles)
+        self._joint_angles[:] = by_unit(angles)
         self.set_friction(self.coulomb)
         mujoco.mj_forward(self.model, self.data)
         self._pushed = False
@@ -94,7 +94,7 @@ class MuJoCoEngine:
 
     def step(self, torques: Sequence[float]) -> None:
         """One engine step under the joint torques (8,) [Nm]."""
-        self._joint_torques[:] = _by_unit(torques)
+        self._joint_torques[:] = by_unit(torques)
         mujoco.mj_step(self.model, self.data)
         if self._pushed:
             self.data.xfrc_applied[self._chassis] = 0.0
@@ -106,7 +106,7 @@ class MuJoCoEngine:
 
     def set_friction(self, torques: Sequence[float]) -> None:
         """Largest torque of the dry friction in each joint from now on (8,) [Nm]."""
-        self._joint_friction[:] = _by_unit(torques)
+        self._joint_friction[:] = by_unit(torques)
 
     def set_ground(self, wheel: int, friction: float | None) -> None:
         """Give a wheel (fl, rl, fr, rr: 0 to 3) ground of another friction coefficient [-]; None is that of before."""
@@ -241,7 +241,7 @@ class MuJoCoEngine:
             self._viewer = open_window(self.model, self.data)
 
 
-def _by_unit(values: Sequence[float]) -> Sequence[float]:
+def by_unit(values: Sequence[float]) -> Sequence[float]:
     """Values of the eight joints as MuJoCo has them: steering and rolling of a wheel, then of the next."""
     sfl, srl, sfr, srr, rfl, rrl, rfr, rrr = values
     return sfl, rfl, srl, rrl, sfr, rfr, srr, rrr

@@ -2,7 +2,8 @@
 
 A wheel touches the floor as a sphere: one contact point below the wheel's centre, which is the point contact that the
 constraints (1) assume. MuJoCo puts it halfway into the overlap of tyre and floor; the sphere is larger by half of the
-overlap under a quarter of the weight, so that the wheel rolls on its radius. What one sees is a cylinder with a spoke.
+overlap under a quarter of the weight, so that the wheel rolls on its radius. What one sees is in
+`emulator.engine.looks`.
 """
 
 from __future__ import annotations
@@ -13,24 +14,25 @@ from dataclasses import dataclass
 from typing import Final
 
 from emulator.as_built import AsBuilt, WheelBuild
+from emulator.engine.camera import HEIGHT, VIEW_ANGLE, WIDTH
 from emulator.engine.layout import (
-    BODY_COLOUR,
-    KNUCKLE_COLOUR,
-    MARK_COLOUR,
-    TYRE_COLOUR,
-    TYRE_WIDTH_RATIO,
-    Vector,
     axle,
-    body_lift,
     corner,
     rolling_joint,
     steering_joint,
     tyre_centre,
 )
+from emulator.engine.looks import TYRE_WIDTH_RATIO, Kind, Shape, chassis_shapes, knuckle_shapes, wheel_shapes
 from emulator.prototype import Prototype
 from emulator.rigid_bodies import RigidBody
 from ident.vehicle.geometry import WHEELS
 from ident.vehicle.quantities import GRAVITY
+
+_LIGHT: Final = (
+    '<light mode="trackcom" pos="-0.3 0.3 3" dir="0.1 -0.1 -1" directional="true" ambient="0.1 0.1 0.1" '
+    'diffuse="0.5 0.5 0.5"/>'
+)
+"""It goes with the vehicle, for its shadow is as sharp as the region that it lights is small."""
 
 HARDEST: Final = 0.9999
 """Impedance of what shall not give way; the largest that MuJoCo takes."""
@@ -85,12 +87,12 @@ def generate_mjcf(
         f'<mujoco model="{prototype.name}">',
         '<compiler angle="radian" autolimits="false" inertiafromgeom="false"/>',
         *_option(built, step_size, settings),
-        *_looks(),
+        *_looks(prototype.geometry.wheelbase + prototype.geometry.track_width),
         "<worldbody>",
-        '<light pos="0 0 6" dir="0 0 -1" directional="true" ambient="0.3 0.3 0.3"/>',
         '<geom name="floor" type="plane" size="60 60 1" material="floor" contype="0" conaffinity="0"/>',
         f'<body name="chassis">{base}{_inertial(prototype.rigid_bodies.chassis)}',
-        _seen_body(prototype),
+        _LIGHT,
+        *map(_seen, chassis_shapes(prototype)),
     ]
     for wheel in WHEELS:
         parts += _unit(prototype, wheel, knuckles[wheel], wheels[wheel], step_size, settings)
@@ -118,15 +120,20 @@ def _option(built: AsBuilt, step_size: float, settings: SolverSettings) -> Itera
     )
 
 
-def _looks() -> Iterator[str]:
-    yield "<visual><global offwidth='1280' offheight='720'/><headlight ambient='0.35 0.35 0.35'/></visual>"
+def _looks(extent: float) -> Iterator[str]:
+    """Camera, light and floor for a vehicle of that size [m]."""
+    yield (
+        f'<visual><global offwidth="{WIDTH}" offheight="{HEIGHT}" fovy="{VIEW_ANGLE:g}"/>'
+        '<headlight ambient="0.3 0.3 0.3" diffuse="0.2 0.2 0.2" specular="0 0 0"/><quality shadowsize="2048"/>'
+        f'<map shadowclip="2" zfar="15"/></visual><statistic extent="{extent:g}" center="0 0 0"/>'
+    )
     yield "<asset>"
     yield (
         '<texture name="squares" type="2d" builtin="checker" width="300" height="300" '
         'rgb1="0.82 0.84 0.86" rgb2="0.70 0.73 0.76"/>'
     )
     # One square a metre.
-    yield '<material name="floor" texture="squares" texrepeat="0.5 0.5" texuniform="true" reflectance="0"/>'
+    yield '<material name="floor" texture="squares" texrepeat="1 1" texuniform="true" reflectance="0"/>'
     yield "</asset>"
 
 
@@ -135,17 +142,13 @@ def _inertial(body: RigidBody) -> str:
     return f'<inertial pos="{place}" mass="{_numbers(body.mass)}" diaginertia="{inertia}"/>'
 
 
-def _seen(kind: str, size: str, colour: tuple[float, ...], place: Vector = (0.0, 0.0, 0.0), turned: str = "") -> str:
+def _seen(shape: Shape) -> str:
+    size = shape.half if shape.kind is Kind.BOX else (shape.radius, shape.half_length)
+    lying = f'euler="{_numbers(math.pi / 2, 0, 0)}"' if shape.lying else ""
     return (
-        f'<geom type="{kind}" size="{size}" pos="{_numbers(*place)}" {turned} rgba="{_numbers(*colour)}" '
-        'contype="0" conaffinity="0"/>'
+        f'<geom type="{shape.kind}" size="{_numbers(*size)}" pos="{_numbers(*shape.centre)}" {lying} '
+        f'rgba="{_numbers(*shape.colour, 1)}" contype="0" conaffinity="0"/>'
     )
-
-
-def _seen_body(prototype: Prototype) -> str:
-    body = prototype.body
-    half = _numbers(body.length / 2, body.width / 2, body.height / 2)
-    return _seen("box", half, (*BODY_COLOUR[:3], 0.55), (0.0, 0.0, body_lift(prototype)))
 
 
 def _unit(
@@ -157,15 +160,14 @@ def _unit(
     settings: SolverSettings,
 ) -> Iterator[str]:
     """A steering unit: knuckle, and in it the wheel."""
-    geometry, limit = prototype.geometry, prototype.geometry.steering_limit
+    limit = prototype.geometry.steering_limit
     friction = _hard(step_size, "friction")
-    post = _numbers(geometry.wheel_radius / 4, geometry.wheel_radius)
     yield f'<body name="knuckle_{wheel}" pos="{_numbers(*corner(prototype, wheel))}">{_inertial(knuckle)}'
     yield (
         f'<joint name="{steering_joint(wheel)}" type="hinge" axis="0 0 1" limited="true" '
         f'range="{_numbers(-limit, limit)}" {_hard(step_size, "limit")} {friction}/>'
     )
-    yield _seen("cylinder", post, KNUCKLE_COLOUR)
+    yield from map(_seen, knuckle_shapes(prototype, wheel, build))
     yield f'<body name="wheel_{wheel}" pos="{_numbers(*axle(prototype, wheel, build))}">{_inertial(build.body)}'
     yield f'<joint name="{rolling_joint(wheel)}" type="hinge" axis="0 1 0" {friction}/>'
     yield from _tyre(prototype, wheel, build, settings)
@@ -173,7 +175,7 @@ def _unit(
 
 
 def _tyre(prototype: Prototype, wheel: str, build: WheelBuild, settings: SolverSettings) -> Iterator[str]:
-    """What touches the floor, what one sees of it, and a spoke on both of its sides."""
+    """What touches the floor, and what one sees of it."""
     centre, half_width = tyre_centre(build), TYRE_WIDTH_RATIO * prototype.geometry.wheel_radius / 2
     cylinder, lying = _numbers(build.radius, half_width), f'euler="{_numbers(math.pi / 2, 0, 0)}"'
     touching = (
@@ -182,9 +184,7 @@ def _tyre(prototype: Prototype, wheel: str, build: WheelBuild, settings: SolverS
         else f'type="cylinder" size="{cylinder}" {lying}'
     )
     yield f'<geom name="tyre_{wheel}" {touching} pos="{_numbers(*centre)}" group="3" contype="0" conaffinity="0"/>'
-    yield _seen("cylinder", cylinder, TYRE_COLOUR, centre, lying)
-    spoke = _numbers(build.radius / 10, 1.02 * half_width, 0.48 * build.radius)
-    yield _seen("box", spoke, MARK_COLOUR, (centre[0], 0.0, centre[2] + build.radius / 2))
+    yield from map(_seen, wheel_shapes(prototype, build))
 
 
 def _pair(prototype: Prototype, wheel: str, build: WheelBuild, step_size: float, settings: SolverSettings) -> str:
