@@ -4,6 +4,7 @@
 |---|---|
 | `run.json` | seed, steps, excitations, what was driven and on which bus |
 | `vehicle.toml` | the vehicle file as used |
+| `simulator.toml` | the model that the emulated vehicle was made from, where there was one |
 | `network/` | the network file and its EDS files as used, so that they can be read again (`carried`) |
 | `frames/NNN_step.blf` | every frame, one file a step, in the order driven |
 | `frames/NNN_step.part.blf` | what there is of a step that was not finished |
@@ -23,8 +24,11 @@ import numpy as np
 
 from hil.campaign.carried import (
     NETWORK_FILE,
+    SIMULATOR_FILE,
     VEHICLE_FILE,
+    Files,
     carried_network,
+    carried_simulator,
     carried_vehicle,
     check_readable,
     is_carried,
@@ -80,6 +84,11 @@ class RunFolder:
         return self.path / VEHICLE_FILE
 
     @property
+    def simulator(self) -> Path:
+        """The model that the emulated vehicle was made from, where there was one."""
+        return self.path / SIMULATOR_FILE
+
+    @property
     def network(self) -> Path:
         """The network file as used, its EDS files beside or below it."""
         return self.path / "network" / NETWORK_FILE
@@ -120,6 +129,7 @@ class Run:
         payload: mass of the load of the loaded steps [kg].
         demo: it is a demo's, which the next one may replace.
         engine: physics engine of the emulated prototype, None on a real vehicle.
+        simulator: `parameters.toml` that the emulated vehicle is made from, None for the prototype as it is.
         opened: it was read from its folder, rather than planned.
     """
 
@@ -133,6 +143,7 @@ class Run:
     payload: float = 0.0
     demo: bool = False
     engine: EngineName | None = None
+    simulator: Path | None = None
     opened: bool = False
 
     @property
@@ -152,7 +163,14 @@ def sources_of(path: Path) -> tuple[Path, ...]:
     return (*RunFolder(path).sources, *path.glob("[0-9][0-9][0-9]_*"))
 
 
-def refuse_used(folder: RunFolder, vehicle_file: Path, network_file: Path, *, by_demo: bool = False) -> None:
+def refuse_used(
+    folder: RunFolder,
+    vehicle_file: Path,
+    network_file: Path,
+    *,
+    simulator: Path | None = None,
+    by_demo: bool = False,
+) -> None:
     """Refuse a folder in which a new run would overwrite anything; a demo may replace what a demo has left.
 
     Raises:
@@ -163,8 +181,12 @@ def refuse_used(folder: RunFolder, vehicle_file: Path, network_file: Path, *, by
         return
     if _holds_run(folder):
         raise _used(folder)
-    refuse_others(carried_vehicle(vehicle_file), folder.path)
+    refuse_others(_top_files(vehicle_file, simulator), folder.path)
     refuse_others(carried_network(network_file), folder.network.parent)
+
+
+def _top_files(vehicle_file: Path, simulator: Path | None) -> Files:
+    return {**carried_vehicle(vehicle_file), **(carried_simulator(simulator) if simulator is not None else {})}
 
 
 def _holds_run(folder: RunFolder) -> bool:
@@ -202,7 +224,7 @@ def create_run(run: Run, vehicle_file: Path) -> None:
         _delete_logs(folder)
     elif _holds_run(folder):
         raise _used(folder)
-    write_carried(carried_vehicle(vehicle_file), folder.path, replace=replaced)
+    write_carried(_top_files(vehicle_file, run.simulator), folder.path, replace=replaced)
     write_carried(carried_network(run.network.path), folder.network.parent, replace=replaced)
     check_readable(folder.vehicle, folder.network, run.plan.vehicle, run.network)
     write_whole(json.dumps(_manifest(run), indent=1), folder.manifest)
@@ -222,6 +244,11 @@ def _delete_logs(folder: RunFolder) -> None:
 def carries_vehicle(folder: RunFolder, path: Path) -> bool:
     """Whether a vehicle file is the one that the folder carries."""
     return is_carried(carried_vehicle(path), folder.path)
+
+
+def carries_simulator(folder: RunFolder, path: Path) -> bool:
+    """Whether a model is the one that the folder carries."""
+    return is_carried(carried_simulator(path), folder.path)
 
 
 def carries_network(folder: RunFolder, path: Path) -> bool:
@@ -278,6 +305,7 @@ def _manifest(run: Run) -> dict[str, Any]:
         **({"payload": run.payload} if run.payload else {}),
         **({"demo": True} if run.demo else {}),
         **({"engine": run.engine} if run.engine else {}),
+        **({"simulator": SIMULATOR_FILE} if run.simulator else {}),
         "steps": list(plan.steps),
         "excitations": {step: excitation_entry(excitation) for step, excitation in plan.excitations.items()},
     }
@@ -325,6 +353,7 @@ def _restore(folder: RunFolder, manifest: Mapping[str, Any], vehicle: VehicleDes
         payload=float(manifest.get("payload", 0.0)),
         demo=manifest.get("demo") is True,
         engine=_engine(manifest),
+        simulator=folder.simulator if "simulator" in manifest else None,
         opened=True,
     )
 

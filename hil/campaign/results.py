@@ -117,7 +117,9 @@ def write_result(content: ReportContent, out: Path) -> tuple[Path, Path]:
     parameters, report = (out / name for name in _RESULTS)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        write_parameters(content.identification, content.assessment, parameters, content.provenance)
+        write_parameters(
+            content.identification, content.assessment, parameters, content.provenance, content.vehicle.geometry
+        )
     except OSError as error:
         raise UserError(f"{out} cannot be written to: {error.strerror}.", "Name another folder (--out).") from error
     write_report(content, report)

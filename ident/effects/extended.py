@@ -19,7 +19,7 @@ from ident.plant.places import DRIVES, ENCODERS
 from ident.plant.simulation import Simulation
 from ident.plant.terms import delay_at, steering_errors
 from ident.plant.transmissions import Spring, springs_of
-from ident.vehicle.geometry import Geometry
+from ident.vehicle.geometry import Geometry, geometry_text
 from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters, read_parameters
 from ident.vehicle.quantities import read_toml
 from ident.writing import write_whole
@@ -81,21 +81,24 @@ def read_model(path: Path) -> ExtendedModel:
     return ExtendedModel(read_parameters(path), read_effects(read_toml(path), str(path)))
 
 
-def model_text(model: ExtendedModel, provenance: Mapping[str, str]) -> str:
-    """A `parameters.toml`; `provenance` says where the values come from."""
+def model_text(model: ExtendedModel, provenance: Mapping[str, str], geometry: Geometry | None = None) -> str:
+    """A `parameters.toml`; `provenance` says where the values come from, `geometry` for which lengths they hold."""
     source = json.dumps(provenance.get("run", "record"))
     lines = [f'schema = "{SCHEMA}"', "", "[source]"]
     lines += [f"{key} = {json.dumps(value)}" for key, value in provenance.items()]
     for name, value, std in zip(PARAMETER_NAMES, model.parameters.values, model.parameters.std, strict=True):
         entry = [f"value = {value:.9g}", f'unit = "{PARAMETER_UNITS[name]}"', f"std = {std:.6g}", f"source = {source}"]
         lines += ["", f"[parameters.{name}]", *entry]
-    return "\n".join(lines) + "\n" + effects_text(model.effects)
+    lengths = "" if geometry is None else geometry_text(geometry, provenance.get("vehicle", "vehicle file"))
+    return "\n".join(lines) + "\n" + lengths + effects_text(model.effects)
 
 
-def write_model(model: ExtendedModel, path: Path, provenance: Mapping[str, str]) -> None:
+def write_model(
+    model: ExtendedModel, path: Path, provenance: Mapping[str, str], geometry: Geometry | None = None
+) -> None:
     """Write the file whole or not at all.
 
     Raises:
         UserError: it cannot be written.
     """
-    write_whole(model_text(model, provenance), path)
+    write_whole(model_text(model, provenance, geometry), path)

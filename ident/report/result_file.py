@@ -9,12 +9,18 @@ from pathlib import Path
 from ident.assessment import Assessment
 from ident.assessment.file import assessment_text
 from ident.estimate.identify import Estimate, Identification
+from ident.vehicle.geometry import Geometry, geometry_text
 from ident.vehicle.parameters import PARAMETER_NAMES
 from ident.writing import write_whole
 
 
-def parameters_text(identification: Identification, assessment: Assessment, provenance: Mapping[str, str]) -> str:
-    """The file's text; `provenance` says which run, vehicle and version it comes from."""
+def parameters_text(
+    identification: Identification,
+    assessment: Assessment,
+    provenance: Mapping[str, str],
+    geometry: Geometry | None = None,
+) -> str:
+    """The file's text; `provenance` says which run, vehicle and version it comes from, `geometry` which lengths."""
     source = provenance.get("run", "record")
     lines = ['schema = "quasiomni.parameters/1"', "", "[source]"]
     lines += [f"{key} = {json.dumps(value)}" for key, value in provenance.items()]
@@ -28,18 +34,23 @@ def parameters_text(identification: Identification, assessment: Assessment, prov
         lines += ["", "[[steps]]", f'step = "{floor.step}"', f'coordinate = "{floor.coordinate}"']
         numbers = ("signal", "residual", "noise", "model_error", "nrmse")
         lines += [f"{name} = {getattr(floor, name):.6g}" for name in numbers]
-    return "\n".join(lines) + "\n" + assessment_text(assessment)
+    lengths = "" if geometry is None else geometry_text(geometry, provenance.get("vehicle", source))
+    return "\n".join(lines) + "\n" + lengths + assessment_text(assessment)
 
 
 def write_parameters(
-    identification: Identification, assessment: Assessment, path: Path, provenance: Mapping[str, str]
+    identification: Identification,
+    assessment: Assessment,
+    path: Path,
+    provenance: Mapping[str, str],
+    geometry: Geometry | None = None,
 ) -> None:
     """Write the file whole or not at all.
 
     Raises:
         UserError: it cannot be written.
     """
-    write_whole(parameters_text(identification, assessment, provenance), path)
+    write_whole(parameters_text(identification, assessment, provenance, geometry), path)
 
 
 def _entry(estimate: Estimate, source: str) -> list[str]:
