@@ -23,6 +23,8 @@ from ident.vehicle.quantities import GRAVITY
 _FRONT_OF_SIDE: Final = (0, 2)
 _ROLLING: Final = 4
 _FLOOR: Final = 0
+_OUT_OF_REACH: Final = 1.0
+"""Height at which no wheel touches the floor [m]."""
 _MASS: Final = 0
 _LATERAL_FRICTION: Final = 1
 _INERTIA: Final = 2
@@ -136,6 +138,10 @@ class PyBulletEngine:
             # PyBullet has place and speed of the centre of mass.
             place = [c - a for c, a in zip((0.0, 0.0, height), arm, strict=True)]
             speed = [v - c for v, c in zip(linear, _cross(angular, arm), strict=True)]
+            # Contact points are kept as long as they are near: of a wheel that is turned by hand, old ones would stay.
+            away = [place[0], place[1], place[2] + _OUT_OF_REACH]
+            pybullet.resetBasePositionAndOrientation(self.body, away, turned, physicsClientId=client)
+            pybullet.performCollisionDetection(client)
             pybullet.resetBasePositionAndOrientation(self.body, place, turned, physicsClientId=client)
             pybullet.resetBaseVelocity(self.body, speed, angular, physicsClientId=client)
         for joint, angle, rate in zip(self.joints, angles, rates, strict=True):

@@ -19,9 +19,9 @@ class StepGap:
 
     Attributes:
         step, coordinate, unit: which.
-        gap: rms of simulated minus recorded motion, and of its noise, in that unit; a floor of NaN where nothing of
-            the coordinate repeats in the record.
-        share: of the power of the whole gap above the noise, before [-].
+        gap: rms of simulated minus recorded motion, and of its noise, in that unit; a floor of NaN where the step does
+            not repeat.
+        share: of the power of the whole gap above the noise, before [-]; 0 where no noise is known.
         before, after: differences of its segments.
     """
 
@@ -34,10 +34,21 @@ class StepGap:
     after: Sequence[Difference]
 
     @property
+    def repeats(self) -> bool:
+        """Whether the record says how large its noise is."""
+        return self.gap.floor > 0
+
+    @property
     def in_noise(self) -> Gap:
-        """The gap in units of the noise."""
+        """The gap in units of the noise; NaN where it is not known."""
         floor = self.gap.floor
         return Gap(self.gap.before / floor, self.gap.after / floor, 1.0)
+
+    @property
+    def closed(self) -> float:
+        """Share of what is above the noise that is gone; where no noise is known, as if there were none."""
+        gap = self.gap
+        return (gap if self.repeats else Gap(gap.before, gap.after, 0.0)).closed
 
 
 @dataclass(frozen=True)
@@ -63,6 +74,7 @@ class SimulatorGap:
                     "unit": one.unit,
                     "share": _number(one.share),
                     **_gap_json(one.gap),
+                    "closed": _number(one.closed),
                 }
                 for one in self.steps
             ],
@@ -79,7 +91,7 @@ def simulator_gap(before: Sequence[Difference], after: Sequence[Difference]) -> 
     pairs: dict[tuple[str, str], list[tuple[Difference, Difference]]] = {}
     for first, second in zip(before, after, strict=True):
         pairs.setdefault((first.step, first.coordinate), []).append((first, second))
-    gaps = {key: _gap(own, floors.get(key[1], math.nan)) for key, own in pairs.items()}
+    gaps = {key: _gap(own, floors.get(key, math.nan)) for key, own in pairs.items()}
     powers = {key: _power(gaps[key], own) for key, own in pairs.items()}
     whole = sum(powers.values())
     steps = [
@@ -96,14 +108,19 @@ def simulator_gap(before: Sequence[Difference], after: Sequence[Difference]) -> 
     return SimulatorGap(steps, _total([(gaps[key], _samples(own)) for key, own in pairs.items()]))
 
 
-def _floors(differences: Sequence[Difference]) -> Mapping[str, float]:
-    """Rms of what differs between repeats, by coordinate, pooled over segments that repeat."""
-    pooled: dict[str, list[float]] = {}
+def _floors(differences: Sequence[Difference]) -> Mapping[tuple[str, str], float]:
+    """Rms of what differs between repeats, by step and coordinate, pooled over segments.
+
+    Of a lane change nothing repeats, and other steps do not say: how much an error of the steering adds to the speed
+    that odometry makes of it depends on how fast the vehicle goes.
+    """
+    pooled: dict[tuple[str, str], list[float]] = {}
     for one in differences:
         folded = one.folded
         if len(folded) > 1:
-            pooled.setdefault(one.coordinate, []).append(float(folded.var(axis=0, ddof=1).mean()))
-    return {name: math.sqrt(float(np.mean(variances))) for name, variances in pooled.items()}
+            variance = float(folded.var(axis=0, ddof=1).mean())
+            pooled.setdefault((one.step, one.coordinate), []).append(variance)
+    return {key: math.sqrt(float(np.mean(variances))) for key, variances in pooled.items()}
 
 
 def _gap(pairs: Sequence[tuple[Difference, Difference]], floor: float) -> Gap:
