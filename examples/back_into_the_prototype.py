@@ -1,11 +1,11 @@
-"""What a diagnosis is worth to a simulator: the emulated vehicle before and after, against a record that gave no number.
+"""What a diagnosis is worth to a simulator: the emulated vehicle before and after, against a record not fitted to.
 
     python examples/back_into_the_prototype.py --runs runs/back --engine pybullet
 
-For every effect a vehicle that has it drives two campaigns of different excitation, the second to confirm the first. The
-first alone gives the numbers: identified, they are the simulator before, with the effects that both show, that after.
-Then the torques of the second go through both, on the engine that drove it and on the other one. Prints a Markdown
-table. Everything is kept in the folder given by --runs: an interrupted study goes on where it stopped.
+For every effect a vehicle that has it drives two campaigns of different excitation, the second to confirm the first.
+The first alone gives the numbers: identified, they are the simulator before, with the effects that both show, that
+after. Then the torques of the second go through both, on the engine that drove it and on the other one. Prints a
+Markdown table. Everything is kept in the folder given by --runs: an interrupted study goes on where it stopped.
 """
 
 from __future__ import annotations
