@@ -1,12 +1,11 @@
-"""The emulated vehicle under torques that were recorded: from a state in motion, in the hands of nobody.
+"""The emulated vehicle under torques that were recorded, held to the motion that was recorded with them.
 
 Drives and encoders are ideal here, as what they did is in the record; the load does not fluctuate, as nobody knows how
-it did. What differs from the record is then bodies, friction and effects.
+it did. What it takes to hold the vehicle is then what its bodies, friction and effects lack.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from types import TracebackType
@@ -22,7 +21,7 @@ from emulator.vehicle import viscous_of
 from ident.extras import default_engine
 
 STANDING_TIME: Final = 0.1
-"""Time that tyres get to take the weight before a run [s]; their heave dies out within 0.02 s."""
+"""Time that tyres get to take the weight before the first sample [s]; their heave dies out within 0.02 s."""
 
 
 @dataclass
@@ -65,6 +64,27 @@ class Start:
         return [left, -left, right, -right, *self.wheel_rates]
 
 
+@dataclass(frozen=True)
+class Guide:
+    """What holds a vehicle to a recorded motion, one force a coordinate, and at which joints it acts.
+
+    A coordinate takes part in each of six joints (steering left, right; wheels fl, rl, fr, rr) by a weight: its rate
+    times the weight is the joint's. Its force acts at the joints in these proportions, on wheels by the motors.
+
+    Attributes:
+        readings: (N, 6) recorded angles [rad].
+        rates: (N, 6) recorded rates [rad/s].
+        weights: (N, n, 6) of n coordinates.
+        stiffness, damping: (n,) force per displacement and per speed of each.
+    """
+
+    readings: Sequence[Sequence[float]]
+    rates: Sequence[Sequence[float]]
+    weights: Sequence[Sequence[Sequence[float]]]
+    stiffness: Sequence[float]
+    damping: Sequence[float]
+
+
 class ReplayedVehicle:
     """A vehicle with effects that is set in motion and driven by torques at its motor shafts.
 
@@ -102,25 +122,32 @@ class ReplayedVehicle:
         self.engine.place(on_stand=lifted, angles=[0.0] * 8)
         self._mechanics.settle()
 
-    def run(self, start: Start, torques: Sequence[Sequence[float]], steps: int) -> list[list[float]]:
-        """Encoder readings (N, 6): alpha left, right, beta fl, rl, fr, rr [rad], at the samples of the torques.
+    def follow(self, start: Start, torques: Sequence[Sequence[float]], guide: Guide, steps: int) -> list[list[float]]:
+        """Forces (N, n) beyond the recorded torques that hold the vehicle to the recorded motion [Nm or N].
 
         Args:
             start: the state at the first sample.
             torques: (N, 4) at the motor shafts; between two samples they change linearly [Nm].
+            guide: the motion; linear between two samples as well.
             steps: of the engine between two samples.
         """
         self._give(torques[0])
         self._set_going(start)
-        readings, time = [self._read()], start.time
-        for now, then in itertools.pairwise(torques):
+        forces, time = [], start.time
+        for sample in range(len(torques) - 1):
+            # The forces of one sample: the mean of what acts from half a sample before to half a sample after it.
+            total = [0.0] * len(guide.stiffness)
             for step in range(steps):
                 share = step / steps
-                self._give([(1 - share) * one + share * other for one, other in zip(now, then, strict=True)])
-                self._step(time)
+                now = _between(torques[sample], torques[sample + 1], share)
+                held = self._held(guide, sample, share)
+                added = _at_joints(guide.weights[sample], held)
+                self._give([torque + more / self._gear_ratio for torque, more in zip(now, added[2:], strict=True)])
+                self._step(time, added[:2])
                 time += self.engine.step_size
-            readings.append(self._read())
-        return readings
+                total = [sum_ + force / steps for sum_, force in zip(total, held, strict=True)]
+            forces.append(total)
+        return [*forces, forces[-1]]
 
     def close(self) -> None:
         """Release the physics engine."""
@@ -151,10 +178,23 @@ class ReplayedVehicle:
         for stage, torque in zip(self._stages, torques, strict=True):
             stage.wheel_torque = self._gear_ratio * torque
 
-    def _step(self, time: float) -> None:
+    def _held(self, guide: Guide, sample: int, share: float) -> list[float]:
+        """Force of each coordinate (n,) now."""
+        angles = _between(guide.readings[sample], guide.readings[sample + 1], share)
+        speeds = _between(guide.rates[sample], guide.rates[sample + 1], share)
+        off = [recorded - own for recorded, own in zip(angles, self._read(), strict=True)]
+        late = [recorded - own for recorded, own in zip(speeds, self._read_rates(), strict=True)]
+        return [
+            k * _along(weights, off) + d * _along(weights, late)
+            for weights, k, d in zip(guide.weights[sample], guide.stiffness, guide.damping, strict=True)
+        ]
+
+    def _step(self, time: float, steering: Sequence[float] = (0.0, 0.0)) -> None:
         # As `EmulatedVehicle` has it: the forces of time t act over the step that starts at t.
         rates = self.engine.rates()
         torques = [-d * rate for d, rate in zip(self._viscous, rates, strict=True)]
+        for joint in range(4):
+            torques[joint] += _UNIT_SIGNS[joint] * steering[joint // 2] / 2
         self._mechanics.act(time, rates, torques)
         self.engine.step(torques)
         self._mechanics.after_step()
@@ -162,3 +202,31 @@ class ReplayedVehicle:
     def _read(self) -> list[float]:
         steering, shafts = self._mechanics.steering, self._mechanics.shafts
         return [*map(steering.steering_angle, range(2)), *map(shafts.wheel_angle, range(4))]
+
+    def _read_rates(self) -> list[float]:
+        rates, shafts = self.engine.rates(), self._mechanics.shafts
+        return [rates[0], rates[2], *map(shafts.wheel_rate, range(4))]
+
+
+_UNIT_SIGNS: Final = (1.0, -1.0, 1.0, -1.0)
+"""The rear unit of a side turns against the front one."""
+
+
+def _between(now: Sequence[float], then: Sequence[float], share: float) -> list[float]:
+    return [(1 - share) * one + share * other for one, other in zip(now, then, strict=True)]
+
+
+def _along(weights: Sequence[float], joints: Sequence[float]) -> float:
+    """A coordinate's part in what the joints do: least squares over those in which it takes part."""
+    squared = sum(weight * weight for weight in weights)
+    return sum(weight * joint for weight, joint in zip(weights, joints, strict=True)) / squared
+
+
+def _at_joints(weights: Sequence[Sequence[float]], forces: Sequence[float]) -> list[float]:
+    """Torques (6,) at the joints that do the same work as the forces of the coordinates."""
+    torques = [0.0] * 6
+    for own, force in zip(weights, forces, strict=True):
+        squared = sum(weight * weight for weight in own)
+        for joint, weight in enumerate(own):
+            torques[joint] += weight * force / squared
+    return torques

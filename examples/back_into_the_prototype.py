@@ -22,7 +22,7 @@ import numpy as np
 from hil.bench import emulation
 from hil.campaign.diagnosing import DiagnosisOrder, diagnose_records, write_answer
 from hil.campaign.folder import Run, RunFolder, create_run, network_file_of
-from hil.campaign.results import identify_run
+from hil.campaign.results import identify_run, write_result
 from hil.campaign.runner import CampaignRunner
 from hil.cosimulation.simulator_gap import SimulatorOrder, judge_simulator, write_simulator_gap
 from hil.frames.recorder import Recorder
@@ -102,7 +102,7 @@ def models(case: Case) -> tuple[Path, Path]:
     fit, confirm = driven(case, "fit"), driven(case, "confirm")
     plain, extended, found = fit / "parameters.toml", case.folder / "extended.toml", case.folder / "diagnosis.json"
     if not plain.is_file():
-        identify_run(fit, fit, None, None)
+        write_result(identify_run(fit, fit).content, fit)
     if not found.is_file():
         order = DiagnosisOrder((fit,), (confirm,), None, None, False, 1, found, None)
         answer = diagnose_records(order)

@@ -1,10 +1,9 @@
-"""A record's torques through the emulated vehicle, window by window."""
+"""A record's torques through the emulated vehicle, held to the record's motion."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -12,11 +11,12 @@ from numpy.typing import NDArray
 
 from emulator.engine.choice import ENGINES
 from emulator.prototype import Prototype
-from emulator.replay import ReplayedVehicle, Start
-from ident.diagnosis.vehicle.shooting import Simulate, Windows
+from emulator.replay import Guide, ReplayedVehicle, Start
+from ident.diagnosis.vehicle.following import Following
 from ident.effects import Effect
 from ident.extras import EngineName
 from ident.plant import kinematics
+from ident.stages import Stage, untold
 from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]
@@ -25,50 +25,61 @@ ENGINE_STEP: Final = 1e-3
 """Longest step of the engine [s]."""
 
 
-@contextmanager
-def emulated(
-    prototype: Prototype, effects: tuple[Effect, ...], engine: EngineName, sample_time: float
-) -> Iterator[Simulate]:
-    """A vehicle as a simulator of windows.
+def forces_of(
+    prototype: Prototype,
+    effects: Sequence[Effect],
+    engine: EngineName,
+    followings: Sequence[Following],
+    stage: Stage = untold,
+) -> list[Array]:
+    """Forces (N, n) that hold the vehicle to each segment's motion, beyond the recorded torques [N or Nm].
 
     Args:
-        prototype, effects: what it is.
+        prototype, effects: what the vehicle is.
         engine: of its physics.
-        sample_time: of the record [s].
+        followings: segments, all sampled alike.
+        stage: told which step is driven.
 
     Raises:
         UserError: the vehicle cannot have these effects.
     """
+    sample_time = followings[0].segment.sample_time
     steps = math.ceil(sample_time / ENGINE_STEP - 1e-6)
-    vehicle = ReplayedVehicle(prototype, effects=effects, make_engine=ENGINES[engine], engine_step=sample_time / steps)
+    step, forces = sample_time / steps, []
+    vehicle = ReplayedVehicle(prototype, effects=effects, make_engine=ENGINES[engine], engine_step=step)
     with vehicle:
-        yield lambda windows: _simulate(vehicle, windows, prototype.geometry, steps)
+        for following in followings:
+            segment = following.segment
+            stage(segment.step)
+            vehicle.stand(lifted=following.lifted, load=segment.payload)
+            start = _start(following, prototype.geometry, step)
+            forces.append(np.array(vehicle.follow(start, segment.motor_torques.tolist(), _guide(following), steps)))
+    return forces
 
 
-def _simulate(vehicle: ReplayedVehicle, windows: Windows, geometry: Geometry, steps: int) -> Array:
-    segment = windows.segment
-    vehicle.stand(lifted=windows.lifted, load=segment.payload)
-    starts = _starts(windows, geometry, segment.sample_time / steps)
-    torques = segment.motor_torques[windows.samples]
-    runs = [vehicle.run(start, own.tolist(), steps) for start, own in zip(starts, torques, strict=True)]
-    return np.array(runs)
+def _guide(following: Following) -> Guide:
+    return Guide(
+        following.readings.tolist(),
+        following.signals.joint_rates.tolist(),
+        following.weights.tolist(),
+        following.stiffness.tolist(),
+        following.damping.tolist(),
+    )
 
 
-def _starts(windows: Windows, geometry: Geometry, engine_step: float) -> Iterator[Start]:
-    signals = windows.signals
-    ago = engine_step / 2
-    steering = signals.alpha_rate - ago * signals.alpha_acceleration
-    wheels = signals.beta_rate - ago * signals.beta_acceleration
-    twist = kinematics.odometry(signals.alpha, steering, wheels, geometry)
-    if windows.lifted:
-        twist = np.zeros_like(twist)
-    for sample in windows.starts.tolist():
-        yield Start(
-            time=float(signals.segment.time[sample]),
-            heading=float(signals.heading[sample]),
-            twist=tuple(twist[sample].tolist()),
-            steering=tuple(signals.alpha[sample].tolist()),
-            wheels=tuple(signals.beta[sample].tolist()),
-            steering_rates=tuple(steering[sample].tolist()),
-            wheel_rates=tuple(wheels[sample].tolist()),
-        )
+def _start(following: Following, geometry: Geometry, engine_step: float) -> Start:
+    """The recorded state at the first sample, rates of half an engine step before it."""
+    signals, ago = following.signals, engine_step / 2
+    alpha, beta = signals.alpha[:1], signals.beta[:1]
+    steering = signals.alpha_rate[:1] - ago * signals.alpha_acceleration[:1]
+    wheels = signals.beta_rate[:1] - ago * signals.beta_acceleration[:1]
+    twist = kinematics.odometry(alpha, steering, wheels, geometry)
+    return Start(
+        time=float(signals.segment.time[0]),
+        heading=float(signals.heading[0]),
+        twist=(0.0, 0.0, 0.0) if following.lifted else tuple(twist[0].tolist()),
+        steering=tuple(alpha[0].tolist()),
+        wheels=tuple(beta[0].tolist()),
+        steering_rates=tuple(steering[0].tolist()),
+        wheel_rates=tuple(wheels[0].tolist()),
+    )

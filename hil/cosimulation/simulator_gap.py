@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from hil.bench.simulators import Simulator, load_simulated, naming, read_simulator
 from hil.campaign.folder import RunFolder, network_file_of, open_run, sources_of
 from hil.campaign.reading import read_as
-from hil.cosimulation.emulated import emulated
+from hil.cosimulation.emulated import forces_of
 from hil.network.described import Described
-from ident.diagnosis.vehicle.shooting import Difference, Windows, shoot, windows_of
-from ident.diagnosis.vehicle.simulator_gap import SimulatorGap, simulator_gap
+from ident.diagnosis.vehicle.following import Difference, Following, all_differences, followings_of
+from ident.diagnosis.vehicle.simulator_gap import simulator_gap
 from ident.effects.extended import ExtendedModel
 from ident.errors import RecordError
 from ident.estimate.filters import Processing
@@ -88,13 +89,15 @@ def judge_simulator(order: SimulatorOrder, stage: Stage = untold) -> SimulatorRe
     stage("reading the record")
     scene = _scene(order)
     before = _before(order, scene)
-    processing, geometry = Processing(), scene.described.vehicle.geometry
-    windows = windows_of(scene.record, geometry, processing)
+    processing = Processing()
+    followings = followings_of(
+        scene.record, scene.described.vehicle.geometry, scene.described.vehicle.prior, processing
+    )
     off = []
     for name, simulator in (("before", before), ("after", after)):
-        stage(f"simulating {name}")
-        off.append(_differences(simulator, scene, windows, order.engine, processing))
-    gap: SimulatorGap = simulator_gap(*off)
+        told = partial(_told, stage, name)
+        off.append(_differences(simulator, scene, followings, order.engine, processing, told))
+    gap = simulator_gap(*off)
     effects = tuple(str(effect) for effect in after.model.effects)
     return SimulatorReport(gap, str(order.record), str(before.path), str(after.path), effects, str(order.engine))
 
@@ -141,8 +144,17 @@ def _before(order: SimulatorOrder, scene: _Scene) -> Simulator:
     return Simulator(guessed, ExtendedModel(vehicle.prior))
 
 
+def _told(stage: Stage, name: str, step: str) -> None:
+    stage(f"{name}, {step}")
+
+
 def _differences(
-    simulator: Simulator, scene: _Scene, windows: Sequence[Windows], engine: EngineName, processing: Processing
+    simulator: Simulator,
+    scene: _Scene,
+    followings: Sequence[Following],
+    engine: EngineName,
+    processing: Processing,
+    stage: Stage,
 ) -> list[Difference]:
     network = scene.described.network.path or network_file_of(scene.prototype)
     prototype = load_simulated(scene.prototype, network, simulator).prototype
@@ -151,6 +163,5 @@ def _differences(
             f"{scene.record.source} is of another vehicle than {scene.prototype}.", "Say which one it is (--vehicle)."
         )
     with naming(simulator):
-        vehicle = emulated(prototype, simulator.model.effects, engine, scene.record.sample_time)
-        with vehicle as simulate:
-            return shoot(windows, simulate, prototype.geometry, processing)
+        forces = forces_of(prototype, simulator.model.effects, engine, followings, stage)
+    return all_differences(followings, forces, processing)

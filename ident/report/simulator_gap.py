@@ -15,7 +15,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from plotly import offline
 
-from ident.diagnosis.vehicle.shooting import WINDOW, Difference
+from ident.diagnosis.vehicle.following import Difference
 from ident.diagnosis.vehicle.simulator_gap import SimulatorGap, StepGap
 from ident.report import digits
 from ident.report.digits import percent, significant, unit_text
@@ -102,7 +102,6 @@ def write_simulator_json(report: SimulatorReport, path: Path) -> None:
         "after": report.after,
         "effects": list(report.effects),
         "engine": report.engine,
-        "window": WINDOW,
     }
     write_whole(json.dumps(head | report.gap.as_json(), indent=2, allow_nan=False) + "\n", path)
 
@@ -134,7 +133,6 @@ def render_simulator_report(report: SimulatorReport) -> str:
         total=report.gap.total,
         steps=by_size(report.gap),
         seen=SEEN,
-        window=WINDOW,
         traces=list(zip(figures, shown, strict=True)),
         figures=Markup(json.dumps(figures, separators=(",", ":")).replace("<", "\\u003c")),
         plotly=Markup(offline.get_plotlyjs()),
@@ -142,24 +140,22 @@ def render_simulator_report(report: SimulatorReport) -> str:
 
 
 def trace_figure(one: StepGap) -> Figure:
-    """Recorded and simulated motion of the first repeat, and below how far apart they are, repeats averaged.
+    """Torque as recorded and as each simulator needs it, first repeat; below what they lack, repeats averaged.
 
-    The band is twice the noise of a mean of the repeats.
+    The band is twice the noise of a mean of the repeats. Stiction is left out.
     """
     before, after = one.before[0], one.after[0]
-    time, keep = _once(before, before.time), _kept(before)
     unit = unit_text(one.unit)
     tracks = (
-        (before.recorded, "recorded", MEASURED, 2.4),
-        (before.simulated, "before", RESIDUAL, 1.2),
-        (after.simulated, "after", MODELLED, 1.2),
+        (before.recorded[0], "recorded", MEASURED, 2.4),
+        (before.needed[0], "before", RESIDUAL, 1.2),
+        (after.needed[0], "after", MODELLED, 1.2),
     )
-    data = [_line_of(time, _once(before, values), keep, name, colour, width) for values, name, colour, width in tracks]
+    data = [_line_of(before, values, name, colour, width) for values, name, colour, width in tracks]
     for off, colour in ((before, RESIDUAL), (after, MODELLED)):
-        line = _line_of(time, off.folded.mean(axis=0).reshape(time.shape), keep, "", colour, 1.4)
+        line = _line_of(off, off.off.mean(axis=0), "", colour, 1.4)
         data.append(line | {"yaxis": "y2", "showlegend": False})
-    repeats = len(before.folded)
-    band = 2 * one.gap.floor / math.sqrt(repeats) if one.repeats else 0.0
+    band = 2 * one.gap.floor / math.sqrt(len(before.off)) if one.repeats else 0.0
     edges = {"x0": 0, "x1": 1, "xref": "paper", "y0": -band, "y1": band, "yref": "y2"}
     layout = {
         "height": 380,
@@ -167,26 +163,16 @@ def trace_figure(one: StepGap) -> Figure:
         "hovermode": "x unified",
         "xaxis": {"title": {"text": "time in the step [s]"}, "anchor": "y2"},
         "yaxis": {"title": {"text": unit}, "domain": [0.48, 1.0], "zeroline": True},
-        "yaxis2": {"title": {"text": f"simulated - recorded [{unit}]"}, "domain": [0.0, 0.4], "zeroline": True},
+        "yaxis2": {"title": {"text": f"lacking [{unit}]"}, "domain": [0.0, 0.4], "zeroline": True},
         "shapes": [{"type": "rect", "layer": "below", "fillcolor": STUCK, "line": {"width": 0}, **edges}],
     }
     return {"data": data, "layout": layout}
 
 
-def _once(difference: Difference, values: Array) -> Array:
-    """Values (W, T) of the first repeat, those windows that all repeats have."""
-    first: Array = difference.by_repeats(values)[0]
-    return first.reshape(-1, values.shape[1])
-
-
-def _kept(difference: Difference) -> slice:
-    windows, samples = _once(difference, difference.time).shape
-    return slice(None, None, max(1, math.ceil(windows * samples / MOST_SAMPLES)))
-
-
-def _line_of(time: Array, values: Array, keep: slice, name: str, colour: str, width: float) -> Figure:
-    """A line with a break where the simulator is set back."""
-    broken = np.full((len(time), 1), np.nan)
-    x, y = (np.hstack([rows[:, keep], broken]).ravel() for rows in (time, values))
+def _line_of(difference: Difference, values: Array, name: str, colour: str, width: float) -> Figure:
+    """A line (N,) over the time of the first repeat, with a break at every stretch that is left out."""
+    step = max(1, math.ceil(len(values) / MOST_SAMPLES))
+    breaks = np.flatnonzero(np.diff(difference.runs[::step])) + 1
+    x, y = (np.insert(rows[::step], breaks, np.nan) for rows in (difference.time[0], values))
     style = {"color": colour, "width": width}
     return {"type": "scatter", "mode": "lines", "name": name, "x": packed(x), "y": packed(y), "line": style}

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ident.diagnosis.diagnosis import Gap
-from ident.diagnosis.vehicle.shooting import Difference
+from ident.diagnosis.vehicle.following import Difference
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +19,7 @@ class StepGap:
 
     Attributes:
         step, coordinate, unit: which.
-        gap: rms of simulated minus recorded motion, and of its noise, in that unit; a floor of NaN where the step does
+        gap: rms of what the simulators lack of the recorded torque, and of the noise, in that unit; a floor of NaN where the step does
             not repeat.
         share: of the power of the whole gap above the noise, before [-]; 0 where no noise is known.
         before, after: differences of its segments.
@@ -82,10 +82,10 @@ class SimulatorGap:
 
 
 def simulator_gap(before: Sequence[Difference], after: Sequence[Difference]) -> SimulatorGap:
-    """The gap of two simulators on the same windows.
+    """The gap of two simulators on the same record.
 
     Args:
-        before, after: what they are off by, in the same order.
+        before, after: what they lack, in the same order.
     """
     floors = _floors(after)
     pairs: dict[tuple[str, str], list[tuple[Difference, Difference]]] = {}
@@ -109,24 +109,20 @@ def simulator_gap(before: Sequence[Difference], after: Sequence[Difference]) -> 
 
 
 def _floors(differences: Sequence[Difference]) -> Mapping[tuple[str, str], float]:
-    """Rms of what differs between repeats, by step and coordinate, pooled over segments.
+    """Rms of what differs between repeats, by step and coordinate, pooled over segments; none of what does not repeat.
 
-    Of a lane change nothing repeats, and other steps do not say: how much an error of the steering adds to the speed
-    that odometry makes of it depends on how fast the vehicle goes.
+    Another step does not say it: the load of a lane change's wheels is not that of driving straight.
     """
     pooled: dict[tuple[str, str], list[float]] = {}
     for one in differences:
-        folded = one.folded
-        if len(folded) > 1:
-            variance = float(folded.var(axis=0, ddof=1).mean())
+        if len(one.off) > 1:
+            variance = float(one.off.var(axis=0, ddof=1).mean())
             pooled.setdefault((one.step, one.coordinate), []).append(variance)
     return {key: math.sqrt(float(np.mean(variances))) for key, variances in pooled.items()}
 
 
 def _gap(pairs: Sequence[tuple[Difference, Difference]], floor: float) -> Gap:
-    first, second = (
-        np.concatenate([(one.simulated - one.recorded).ravel() for one in own]) for own in zip(*pairs, strict=True)
-    )
+    first, second = (np.concatenate([one.off.ravel() for one in own]) for own in zip(*pairs, strict=True))
     return Gap(_rms(first), _rms(second), floor)
 
 
