@@ -8,8 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import mul, sub
 from types import TracebackType
 from typing import Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from emulator.effects import Wanted, inject
 from emulator.effects.assembly import Mechanics
@@ -18,10 +22,15 @@ from emulator.engine.choice import ENGINES
 from emulator.engine.protocol import MakeEngine
 from emulator.prototype import Prototype
 from emulator.vehicle import viscous_of
+from ident.errors import UserError
 from ident.extras import default_engine
 
 STANDING_TIME: Final = 0.1
 """Time that tyres get to take the weight before the first sample [s]; their heave dies out within 0.02 s."""
+
+
+_ASTRAY: Final = 1e9
+"""Force that no vehicle has [N]."""
 
 
 @dataclass
@@ -130,22 +139,34 @@ class ReplayedVehicle:
             torques: (N, 4) at the motor shafts; between two samples they change linearly [Nm].
             guide: the motion; linear between two samples as well.
             steps: of the engine between two samples.
+
+        Raises:
+            UserError: the vehicle cannot be held to that motion.
         """
         self._give(torques[0])
         self._set_going(start)
+        path = _Path.of(torques, guide, steps, self._mechanics.rigid)
         forces, time = [], start.time
-        for sample in range(len(torques) - 1):
-            # The forces of one sample: the mean of what acts from half a sample before to half a sample after it.
+        for sample, unit in enumerate(path.units[:-1]):
+            # The force of a sample is the mean of those that act from it to the next one.
             total = [0.0] * len(guide.stiffness)
-            for step in range(steps):
-                share = step / steps
-                now = _between(torques[sample], torques[sample + 1], share)
-                held = self._held(guide, sample, share)
-                added = _at_joints(guide.weights[sample], held)
-                self._give([torque + more / self._gear_ratio for torque, more in zip(now, added[2:], strict=True)])
+            for step in range(sample * steps, (sample + 1) * steps):
+                held = self._held(path.angles[step], path.rates[step], unit, guide)
+                added = [sum(map(mul, held, column)) for column in zip(*unit, strict=True)]
+                self._give(
+                    [
+                        torque + more / self._gear_ratio
+                        for torque, more in zip(path.torques[step], added[2:], strict=True)
+                    ]
+                )
                 self._step(time, added[:2])
                 time += self.engine.step_size
                 total = [sum_ + force / steps for sum_, force in zip(total, held, strict=True)]
+            if not all(abs(force) < _ASTRAY for force in total):
+                raise UserError(
+                    "The vehicle cannot be held to the recorded motion: what holds it swings up.",
+                    "Gears of all drives that give way are too soft for that; leave the elasticity of some out.",
+                )
             forces.append(total)
         return [*forces, forces[-1]]
 
@@ -178,15 +199,14 @@ class ReplayedVehicle:
         for stage, torque in zip(self._stages, torques, strict=True):
             stage.wheel_torque = self._gear_ratio * torque
 
-    def _held(self, guide: Guide, sample: int, share: float) -> list[float]:
+    def _held(
+        self, angles: Sequence[float], rates: Sequence[float], units: Sequence[Sequence[float]], guide: Guide
+    ) -> list[float]:
         """Force of each coordinate (n,) now."""
-        angles = _between(guide.readings[sample], guide.readings[sample + 1], share)
-        speeds = _between(guide.rates[sample], guide.rates[sample + 1], share)
-        off = [recorded - own for recorded, own in zip(angles, self._read(), strict=True)]
-        late = [recorded - own for recorded, own in zip(speeds, self._read_rates(), strict=True)]
+        off, late = list(map(sub, angles, self._read())), list(map(sub, rates, self._read_rates()))
         return [
-            k * _along(weights, off) + d * _along(weights, late)
-            for weights, k, d in zip(guide.weights[sample], guide.stiffness, guide.damping, strict=True)
+            k * sum(map(mul, unit, off)) + d * sum(map(mul, unit, late))
+            for unit, k, d in zip(units, guide.stiffness, guide.damping, strict=True)
         ]
 
     def _step(self, time: float, steering: Sequence[float] = (0.0, 0.0)) -> None:
@@ -212,21 +232,37 @@ _UNIT_SIGNS: Final = (1.0, -1.0, 1.0, -1.0)
 """The rear unit of a side turns against the front one."""
 
 
-def _between(now: Sequence[float], then: Sequence[float], share: float) -> list[float]:
-    return [(1 - share) * one + share * other for one, other in zip(now, then, strict=True)]
+@dataclass(frozen=True)
+class _Path:
+    """A guide and torques at every engine step.
+
+    Attributes:
+        angles, rates, torques: by steps, as of the guide; linear between samples.
+        units: (N, n, 6) weights over the sum of their squares: a coordinate's part in what the joints do is their
+            product with it, by least squares, and torques that do the work of its force are its product with them.
+    """
+
+    angles: Sequence[Sequence[float]]
+    rates: Sequence[Sequence[float]]
+    torques: Sequence[Sequence[float]]
+    units: Sequence[Sequence[Sequence[float]]]
+
+    @classmethod
+    def of(cls, torques: Sequence[Sequence[float]], guide: Guide, steps: int, rigid: Sequence[bool]) -> Self:
+        """From what is known at the samples.
+
+        A motor that turns on its own is too light to be held with the vehicle, unless there is nothing else to hold.
+        """
+        weights = np.asarray(guide.weights)
+        firm = weights * np.array([1.0, 1.0, *rigid])
+        weights = np.where(np.any(firm, axis=2, keepdims=True), firm, weights)
+        units = weights / np.sum(weights**2, axis=2, keepdims=True)
+        angles, rates, given = (_finer(np.asarray(each), steps) for each in (guide.readings, guide.rates, torques))
+        return cls(angles.tolist(), rates.tolist(), given.tolist(), units.tolist())
 
 
-def _along(weights: Sequence[float], joints: Sequence[float]) -> float:
-    """A coordinate's part in what the joints do: least squares over those in which it takes part."""
-    squared = sum(weight * weight for weight in weights)
-    return sum(weight * joint for weight, joint in zip(weights, joints, strict=True)) / squared
-
-
-def _at_joints(weights: Sequence[Sequence[float]], forces: Sequence[float]) -> list[float]:
-    """Torques (6,) at the joints that do the same work as the forces of the coordinates."""
-    torques = [0.0] * 6
-    for own, force in zip(weights, forces, strict=True):
-        squared = sum(weight * weight for weight in own)
-        for joint, weight in enumerate(own):
-            torques[joint] += weight * force / squared
-    return torques
+def _finer(values: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
+    """Values (N, n) at every engine step, linear between the samples."""
+    times = np.arange((len(values) - 1) * steps) / steps
+    samples = np.arange(len(values))
+    return np.stack([np.interp(times, samples, column) for column in values.T], axis=1)

@@ -67,6 +67,11 @@ class Mechanics:
         self._laws: tuple[Law, ...] = (*injection.laws, *couplings)
         self._coulomb = list(engine.coulomb)
 
+    @property
+    def rigid(self) -> list[bool]:
+        """Whether motor and wheel of each drive move alike (4,)."""
+        return [gear is None for gear in self._gears]
+
     def connect(self, stages: Sequence[TorqueSource]) -> None:
         """Take the torque of these power stages (4,)."""
         gear_ratio = self._injection.built.prototype.geometry.gear_ratio
