@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from emulator.prototype import load_prototype
-from emulator.replay import ReplayedVehicle, Start
+from emulator.vehicle import EmulatedVehicle
 from hil.bench.truth import truth_of
 from hil.campaign.folder import open_run
 from ident.effects import Effect
@@ -55,17 +56,22 @@ def extended(tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def record() -> Record:
-    """Two seconds of driving to and fro, four times, of a vehicle that has the bias; its sensors with noise."""
-    generator = np.random.default_rng(2)
-    time = np.arange(PERIODS * PERIOD) * DT
-    torques = np.tile(0.8 * np.sin(np.pi * time)[:, None], 4)
-    with ReplayedVehicle(load_prototype(), effects=(parse_effect(BIAS),)) as vehicle:
-        still = Start(0.0, 0.0, (0.0,) * 3, (0.0,) * 2, (0.0,) * 4, (0.0,) * 2, (0.0,) * 4)
-        readings = np.array(vehicle.run(still, torques.tolist(), 2))
-    readings += generator.normal(0.0, 2e-5, readings.shape)
-    torques = torques + generator.normal(0.0, 0.006, torques.shape)
+    """Two seconds of driving to and fro, four times, of a vehicle that has the bias; load and sensors with noise."""
+    prototype, rows = load_prototype(), []
+    gear, directions = prototype.geometry.gear_ratio, prototype.drive.directions
+    with EmulatedVehicle(prototype, seed=3, effects=(parse_effect(BIAS),)) as vehicle:
+        for drive in vehicle.drives:
+            drive.enable()
+        for cycle in range(PERIODS * PERIOD):
+            for drive, direction in zip(vehicle.drives, directions, strict=True):
+                drive.command(direction * 0.8 * math.sin(math.pi * cycle * DT))
+            torques = [drive.wheel_torque / gear for drive in vehicle.drives]
+            rows.append([*torques, *vehicle.ground_truth().wheel_angles, *vehicle.ground_truth().steering_angles])
+            vehicle.advance(DT)
+    table = np.array(rows) + np.random.default_rng(2).normal(0.0, [6e-3] * 4 + [2e-5] * 6, (len(rows), 10))
     period = np.repeat(np.arange(PERIODS), PERIOD)
-    segment = Segment(Step.STRAIGHT, 0.0, time, torques, readings[:, 2:], readings[:, :2], period)
+    time = np.arange(len(rows)) * DT
+    segment = Segment(Step.STRAIGHT, 0.0, time, table[:, :4], table[:, 4:8], table[:, 8:], period)
     return Record([make_segment(segment, "test")])
 
 

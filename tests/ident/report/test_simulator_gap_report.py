@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ident.diagnosis.vehicle.shooting import Difference
+from ident.diagnosis.vehicle.following import Difference
 from ident.diagnosis.vehicle.simulator_gap import simulator_gap
 from ident.report.simulator_gap import (
     SimulatorReport,
@@ -21,13 +21,11 @@ from ident.report.simulator_gap import (
 
 
 def difference(step: str, off: float, repeats: int) -> Difference:
-    generator = np.random.default_rng(3)
-    windows, samples = max(repeats, 1) * 2, 60
-    recorded = generator.normal(size=(windows, samples))
-    noise = np.random.default_rng(4).normal(size=(windows, samples))
-    repeat = np.repeat(np.arange(repeats), 2) if repeats else np.full(windows, -1)
-    time = np.arange(windows * samples).reshape(windows, samples) * 2e-3
-    return Difference(step, "x", "m/s", time, recorded, recorded + off + noise, repeat, np.arange(windows) % 2)
+    rows, samples = max(repeats, 1), 120
+    recorded = np.random.default_rng(3).normal(size=(rows, samples))
+    noise = np.random.default_rng(4).normal(size=(rows, samples))
+    time = np.tile(np.arange(samples) * 2e-3, (rows, 1))
+    return Difference(step, "x", "N", time, recorded, recorded + off + noise, np.arange(samples) // 60)
 
 
 @pytest.fixture
