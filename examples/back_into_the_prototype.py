@@ -42,7 +42,7 @@ EFFECTS: Final = (
     "quadratic_drag@chassis=40N s^2/m^2",
     "torque_bias@drive_fl=0.05Nm",
     "slope@chassis=0.3deg",
-    "elasticity@drive_rr=0.0027rad/Nm",
+    "asymmetric_viscous@steering_left=1Nm s/rad",
 )
 """At sizes that one meets."""
 
@@ -133,7 +133,7 @@ def row(case: Case, engine: EngineName) -> str:
     total = answer["total"]
     largest = max(answer["steps"], key=lambda step: step["share"] or 0.0)
     free = [step for step in answer["steps"] if step["floor"] is None]
-    lane = ", ".join(f"{step['coordinate']} {step['closed']:.0%}" for step in free)
+    lane = ", ".join(f"{step['coordinate']} {max(step['closed'], 0.0):.0%}" for step in free)
     named = ", ".join(answer["effects"])
     where = f"{largest['step']}, {largest['coordinate']}"
     numbers = f"{total['before']:.2f} | {total['after']:.2f} | {total['closed']:.1%}"
