@@ -18,6 +18,7 @@ from emulator.engine.protocol import MakeEngine
 from emulator.noise import Disturbances
 from emulator.prototype import Prototype
 from ident.extras import default_engine
+from ident.vehicle.parameters import Parameters
 
 SETTLING_TIME: Final = 0.5
 """Time that the vehicle gets to come to rest on the floor [s]; it does not count as simulated time."""
@@ -48,6 +49,11 @@ class GroundTruth:
     steering_rates: tuple[float, float]
     wheel_rates: tuple[float, float, float, float]
     coupling_error: tuple[float, float]
+
+
+def viscous_of(truth: Parameters) -> list[float]:
+    """Viscous friction of the eight joints (8,) [Nm s/rad]: a side's is shared by its two units."""
+    return [truth[symbol] / 2 for symbol in ("d_vl", "d_vl", "d_vr", "d_vr")] + [truth["d_vw"]] * 4
 
 
 class EmulatedVehicle:
@@ -102,9 +108,7 @@ class EmulatedVehicle:
         left, right = (Encoder(prototype.encoder, side, self._mechanics.steering, self._noise) for side in range(2))
         self.encoders = (left, right)
         self._mechanics.connect(self.drives)
-        truth = prototype.truth
-        self._viscous = [truth[symbol] / 2 for symbol in ("d_vl", "d_vl", "d_vr", "d_vr")]
-        self._viscous += [truth["d_vw"]] * 4
+        self._viscous = viscous_of(prototype.truth)
         self._steps = 0
         self._owed = 0.0
         self._settle()

@@ -4,6 +4,7 @@
 |---|---|---|
 | `[source]` | where the values come from | all |
 | `[parameters.NAME]` | value, unit, standard deviation, source; more where it was identified | all |
+| `[geometry]` | lengths that the values hold for | all, where known |
 | `[correlation]`, `[fit]`, `[[steps]]`, `[assessment]` | how well the values are known | identification |
 | `[[effects]]` | what the model has beyond (1)-(21) | diagnosis |
 """
@@ -21,6 +22,7 @@ from ident.assessment.file import assessment_text, refuse_unusable
 from ident.effects.extended import ExtendedModel
 from ident.effects.text import effects_text, read_effects
 from ident.estimate.result import Estimate, Identification
+from ident.vehicle.geometry import Geometry, geometry_text
 from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters, read_parameters
 from ident.vehicle.quantities import read_toml
 from ident.writing import write_whole
@@ -59,23 +61,35 @@ def read_model(path: Path, *, force: bool = True) -> ExtendedModel:
 
 
 def write_model(
-    model: ExtendedModel, path: Path, provenance: Mapping[str, str], identified: Identified | None = None
+    model: ExtendedModel,
+    path: Path,
+    provenance: Mapping[str, str],
+    *,
+    identified: Identified | None = None,
+    geometry: Geometry | None = None,
 ) -> None:
     """Write the file whole or not at all; arguments as of `model_text`.
 
     Raises:
         UserError: it cannot be written.
     """
-    write_whole(model_text(model, provenance, identified), path)
+    write_whole(model_text(model, provenance, identified=identified, geometry=geometry), path)
 
 
-def model_text(model: ExtendedModel, provenance: Mapping[str, str], identified: Identified | None = None) -> str:
+def model_text(
+    model: ExtendedModel,
+    provenance: Mapping[str, str],
+    *,
+    identified: Identified | None = None,
+    geometry: Geometry | None = None,
+) -> str:
     """The file's text.
 
     Args:
         model: parameters and effects.
         provenance: which run, vehicle and version it comes from.
         identified: what else is known of the parameters; None: they come from a diagnosis.
+        geometry: lengths that the parameters hold for; None: not said.
     """
     lines = [f'schema = "{SCHEMA}"', "", "[source]"]
     lines += [f"{key} = {json.dumps(value)}" for key, value in provenance.items()]
@@ -84,7 +98,8 @@ def model_text(model: ExtendedModel, provenance: Mapping[str, str], identified: 
         lines += ["", f"[{TABLE}.{name}]", *_entry(name, model.parameters, estimate, provenance.get("run", "record"))]
     lines += [] if identified is None else _quality(identified.identification)
     assessed = "" if identified is None else assessment_text(identified.assessment)
-    return "\n".join(lines) + "\n" + effects_text(model.effects) + assessed
+    lengths = "" if geometry is None else geometry_text(geometry, provenance.get("vehicle", "vehicle file"))
+    return "\n".join(lines) + "\n" + lengths + effects_text(model.effects) + assessed
 
 
 def _entry(name: str, parameters: Parameters, estimate: Estimate | None, source: str) -> Iterator[str]:

@@ -82,6 +82,7 @@ COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
     "gap": {
         "diagnose": "Say why model and machine disagree: which effect, where, how sure, how much it closes, what to do "
         "next.",
+        "gap": "Drive recorded torques through the emulated vehicle before and after, and say how far its gap shrinks.",
     },
     "fmu": {
         "fmu": "Package the identified model, with its confirmed effects, as an FMU for co-simulation and model "

@@ -36,6 +36,7 @@ from quasiomni.options import (
     EffectOption,
     EngineOption,
     ForceOption,
+    FromOption,
     GuiOption,
     InertiaOption,
     InertiaStdOption,
@@ -47,6 +48,7 @@ from quasiomni.options import (
     load_emulation,
     parse_effects,
     parse_plant,
+    read_simulator,
     tell_native,
     truth_of,
 )
@@ -114,6 +116,7 @@ def campaign(
     engine: EngineOption = None,
     effect: EffectOption = None,
     plant: PlantOption = None,
+    simulator: FromOption = None,
     force: ForceOption = False,
     gui: GuiOption = False,
     video: VideoOption = None,
@@ -131,8 +134,9 @@ def campaign(
         steps = _diagnostic_steps(skip or (), payload)
     inertia = known_inertia(b_w, b_w_std)
     effects, fmu = parse_effects(effect), parse_plant(plant, force=force)
-    _refuse_two_vehicles(bus, fmu, effects, engine, video)
+    _refuse_two_vehicles(bus, fmu, effects, engine, video, simulator)
     film = plan_video(video, video_rate, AT_REST)
+    read_simulator(simulator, force=force)
     if log_format is LogFormat.MF4:
         require(Extra.RECORDS, "--format .mf4", ("asammdf",))
     prototype, where = (vehicle, LOCKSTEP) if bus is None and plant is None else ("", bus or plant or "")
@@ -150,13 +154,14 @@ def campaign(
         payload,
         resume,
         engine=engine,
+        simulator=simulator,
     )
     run = _resumed(order, context) if resume else _planned(_on_engine(order))
     if fmu is not None:
         same = not resume or carries_vehicle(run.folder, find_data_file("ident.vehicle", vehicle))
         _drive_on_fmu(run, order, vehicle if same else str(run.folder.vehicle), fmu)
     elif bus is None:
-        _drive_on_emulator(run, order, effects, gui, film)
+        _drive_on_emulator(run, order, effects, gui, film, force=force)
     else:
         _drive_on_bus(run, order, bus, ask=not yes, lockstep=lockstep)
     show_next(f"quasiomni identify {out}")
@@ -168,16 +173,21 @@ def _on_engine(order: Order) -> Order:
 
 
 def _refuse_two_vehicles(
-    bus: str | None, fmu: Path | None, effects: Sequence[Effect], engine: EngineName | None, video: Path | None
+    bus: str | None,
+    fmu: Path | None,
+    effects: Sequence[Effect],
+    engine: EngineName | None,
+    video: Path | None,
+    simulator: Path | None,
 ) -> None:
-    if bus is not None and (effects or fmu or engine or video):
+    if bus is not None and (effects or fmu or engine or video or simulator):
         raise UserError(
-            "--effect, --engine, --plant and --video are of the emulator, and --bus names another vehicle.",
+            "--effect, --engine, --from, --plant and --video are of the emulator, and --bus names another vehicle.",
             "Leave one of them out.",
         )
-    if fmu is not None and (engine or video):
+    if fmu is not None and (engine or video or simulator):
         raise UserError(
-            "--plant takes the place of the physics engine, which --engine names and --video draws.",
+            "--plant takes the place of the emulated vehicle that --engine, --from and --video are of.",
             "Leave one of them out.",
         )
 
@@ -196,18 +206,22 @@ def _resumed(order: Order, context: typer.Context) -> Run:
     return run
 
 
-def _drive_on_emulator(run: Run, order: Order, effects: Sequence[Effect], gui: bool, film: Video | None) -> None:
+def _drive_on_emulator(
+    run: Run, order: Order, effects: Sequence[Effect], gui: bool, film: Video | None, *, force: bool = False
+) -> None:
     if not run.prototype:
         raise UserError(
             f"{order.out} was driven on {run.bus}, not on the emulator.", f"Go on with it there: --bus {run.bus}."
         )
     emulation = load_emulation()
     engine = choose_engine(run.engine) if order.resume else run.engine
-    network = run.network.path
-    _say_assumed(emulation.assumed(run.emulated, network))
+    network, simulator = run.network.path, read_simulator(run.simulator, force=force)
+    _say_assumed(emulation.assumed(run.emulated, network, simulator))
     with (
         drawing(film) as video,
-        emulation.bench(run.emulated, run.seed, gui, network, effects, engine=engine, video=video) as bench,
+        emulation.bench(
+            run.emulated, run.seed, gui, network, effects, engine=engine, video=video, simulator=simulator
+        ) as bench,
         _stop_is_no_error(order.out),
     ):
         _drive(run, order, bench.bus, bench.clock, bench.operator, film=film)

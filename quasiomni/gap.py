@@ -1,4 +1,4 @@
-"""The command that says why model and machine disagree."""
+"""The commands that say why model and machine disagree, and how much nearer a simulator has come."""
 
 from __future__ import annotations
 
@@ -9,7 +9,14 @@ import typer
 
 from hil.campaign.diagnosing import DiagnosisOrder, diagnose_records, write_answer
 from quasiomni.application import app
-from quasiomni.options import ForceOption, NetworkOption, require_readers
+from quasiomni.options import (
+    EngineOption,
+    ForceOption,
+    GivenVehicleOption,
+    NetworkOption,
+    choose_engine,
+    require_readers,
+)
 from quasiomni.showing import say, stages
 
 
@@ -51,4 +58,34 @@ def diagnose(
     if extended is not None and extended not in written:
         say([f"{extended} is not written: no effect is named."])
     if written:
+        say([f"Written: {', '.join(map(str, written))}"])
+
+
+@app.command()
+def gap(
+    run: Annotated[Path, typer.Argument(help="Run folder, log, or CSV, Parquet or MF4 record.")],
+    simulator: Annotated[
+        Path, typer.Option(help="parameters.toml of the simulator as it is now: what `diagnose --extended` wrote.")
+    ],
+    before: Annotated[
+        Path | None,
+        typer.Option(help="parameters.toml of the simulator as it was. Default: that of RUN, else the vehicle file's."),
+    ] = None,
+    vehicle: GivenVehicleOption = None,
+    network: NetworkOption = None,
+    engine: EngineOption = None,
+    json: Annotated[Path | None, typer.Option(help="Write the numbers here.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write an HTML report here.")] = None,
+    force: ForceOption = False,
+) -> None:
+    """Drive recorded torques through the emulated vehicle before and after, and say how far its gap shrinks."""
+    require_readers([run])
+    chosen = choose_engine(engine)
+    from hil.cosimulation import simulator_gap  # needs the emulator, which a diagnosis does without
+
+    order = simulator_gap.SimulatorOrder(run, simulator, before, vehicle, network, chosen, json, report, force)
+    with stages("judging the simulator") as stage:
+        answer = simulator_gap.judge_simulator(order, stage)
+    say(simulator_gap.summary_lines(answer))
+    if written := simulator_gap.write_simulator_gap(order, answer):
         say([f"Written: {', '.join(map(str, written))}"])

@@ -14,6 +14,7 @@ from ident.vehicle.parameters import Parameters
 from quasiomni.application import console, errors
 
 if TYPE_CHECKING:
+    from hil.bench.simulators import Simulator
     from ident.effects import Effect  # loads CasADi, which few commands need
 
 READERS: Final[Mapping[str, str]] = MappingProxyType({".parquet": "pyarrow", ".mf4": "asammdf"})
@@ -57,6 +58,14 @@ EngineOption = Annotated[
     EngineName | None,
     typer.Option("--engine", help="Physics engine of the emulated vehicle. Default: PyBullet where it is installed."),
 ]
+FromOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--from",
+        help="parameters.toml whose parameters and effects the emulated vehicle has, e.g. what `diagnose --extended` "
+        "wrote. --effect adds to them.",
+    ),
+]
 GuiOption = Annotated[bool, typer.Option("--gui", help="Show the emulated vehicle in a window.")]
 
 
@@ -87,6 +96,20 @@ def parse_plant(text: str | None, *, force: bool) -> Path | None:
     path = plant_path(text)
     refuse_unusable_fmu(path, force=force)
     return path
+
+
+def read_simulator(path: Path | None, *, force: bool) -> Simulator | None:
+    """The model that the emulated vehicle is to be made from.
+
+    Raises:
+        UserError: the file cannot be used, or was assessed as unusable and is not taken by force.
+    """
+    if path is None:
+        return None
+    require_engine(None, "--from")
+    from hil.bench import simulators  # needs mathematics, and the emulator
+
+    return simulators.read_simulator(path, force=force)
 
 
 def load_emulation() -> ModuleType:

@@ -18,6 +18,7 @@ from hil.bus.clock import WallClock
 from hil.bus.unix import UnixHub
 from hil.campaign.folder import network_file_of
 from hil.network import load_network
+from ident.errors import UserError
 from quasiomni.application import app, console
 from quasiomni.filming import VIDEO_RATE, VideoOption, VideoRateOption, drawing, plan_video
 from quasiomni.options import (
@@ -25,6 +26,7 @@ from quasiomni.options import (
     EffectOption,
     EngineOption,
     ForceOption,
+    FromOption,
     GuiOption,
     NetworkOption,
     PlantOption,
@@ -33,6 +35,7 @@ from quasiomni.options import (
     load_emulation,
     parse_effects,
     parse_plant,
+    read_simulator,
     tell_native,
 )
 
@@ -73,6 +76,7 @@ def emulate(
     effect: EffectOption = None,
     engine: EngineOption = None,
     plant: PlantOption = None,
+    simulator: FromOption = None,
     force: ForceOption = False,
     gui: GuiOption = False,
     video: VideoOption = None,
@@ -80,7 +84,9 @@ def emulate(
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
     film = plan_video(video, video_rate, bus)
-    fmu = parse_plant(plant, force=force)
+    if plant is not None and simulator is not None:
+        raise UserError("--from makes an emulated vehicle, --plant takes its place.", "Leave one of them out.")
+    fmu, model = parse_plant(plant, force=force), read_simulator(simulator, force=force)
     chosen = choose_engine(engine) if fmu is None else None
     emulation = load_emulation()
     network_file = network or network_file_of(prototype)
@@ -89,17 +95,18 @@ def emulate(
     tell_native(fmu)
     with (
         drawing(film) as drawn,
-        emulation.vehicle(prototype, seed, gui, network_file, parse_effects(effect), fmu, chosen, drawn) as vehicle,
+        emulation.vehicle(
+            prototype, seed, gui, network_file, parse_effects(effect), fmu, chosen, drawn, model
+        ) as vehicle,
         emulation.server_bus(bus, load_network(network_file)) as opened,
     ):
         if stand is Stand.JACK:
             vehicle.lift()
-        if assumed := emulation.assumed(prototype, network_file):
+        if assumed := emulation.assumed(prototype, network_file, model):
             command = f"quasiomni check {prototype}"
             console.print(Text.assemble(f"{len(assumed)} numbers of it are in no file: ", (command, "bold"), "."))
-        console.print(
-            f"{plant or prototype} is up on {bus}, {'in lockstep' if lockstep else 'in real time'}. Ctrl-C ends it."
-        )
+        served_as, pace = plant or simulator or prototype, "in lockstep" if lockstep else "in real time"
+        console.print(f"{served_as} is up on {bus}, {pace}. Ctrl-C ends it.")
         server = emulation.server(
             vehicle, opened, WallClock(), network_file, lockstep, seed=seed, delays=bit_times, storage=storage
         )

@@ -67,6 +67,11 @@ class Mechanics:
         self._laws: tuple[Law, ...] = (*injection.laws, *couplings)
         self._coulomb = list(engine.coulomb)
 
+    @property
+    def rigid(self) -> list[bool]:
+        """Whether motor and wheel of each drive move alike (4,)."""
+        return [gear is None for gear in self._gears]
+
     def connect(self, stages: Sequence[TorqueSource]) -> None:
         """Take the torque of these power stages (4,)."""
         gear_ratio = self._injection.built.prototype.geometry.gear_ratio
@@ -84,6 +89,42 @@ class Mechanics:
         if self._sensed is not None:
             self._sensed.settle()
         self._coulomb = list(self._engine.coulomb)
+
+    def angles_read_as(
+        self, steering: tuple[float, float], wheels: Sequence[float], rates: Sequence[float]
+    ) -> list[float]:
+        """Angles of the joints (8,) [rad] whose encoders read these, while the stages give the torque that they have.
+
+        Args:
+            steering: angles of left and right as sensed [rad].
+            wheels: (4,) angles of the motors, at the wheel [rad].
+            rates: (8,) of the joints [rad/s].
+        """
+        left, right = (
+            angle if self._sensed is None else self._sensed.true_angle(side, angle, rates[2 * side])
+            for side, angle in enumerate(steering)
+        )
+        behind = [
+            angle if gear is None else gear.wheel_angle_under(angle, stage.wheel_torque)
+            for gear, angle, stage in zip(self._gears, wheels, self._stages, strict=True)
+        ]
+        return [left, -left, right, -right, *behind]
+
+    def move_on(self, wheels: Sequence[float], rates: Sequence[float]) -> None:
+        """The vehicle has been set in motion, and what remembers has known nothing else.
+
+        Args:
+            wheels: (4,) angles of the motors, at the wheel [rad].
+            rates: (8,) of the joints, of half a step ago [rad/s].
+        """
+        for gear, angle, rate in zip(self._gears, wheels, rates[_ROLLING:], strict=True):
+            if gear is not None:
+                gear.move_on(angle, rate)
+        for motor in self._motors:
+            if motor is not None:
+                motor.settle()
+        if self._sensed is not None:
+            self._sensed.move_on((rates[0], rates[2]))
 
     def act(self, time: float, rates: Sequence[float], torques: list[float]) -> None:
         """Add to the joint torques (8,) of a step what the drives and the effects do in it."""

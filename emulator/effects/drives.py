@@ -108,6 +108,11 @@ class MotorTorque:
         self._gear = gear_ratio
         self._line = DelayLine(flaws.delay, step) if flaws.delay else None
 
+    def settle(self) -> None:
+        """The stage has asked for its present torque for longer than any delay."""
+        if self._line is not None:
+            self._line.fill(self._stage.wheel_torque)
+
     def __call__(self, angle: float) -> float:
         """Torque at the wheel [Nm]; call once a step.
 

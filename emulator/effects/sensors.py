@@ -41,6 +41,19 @@ class SensedSteering:
             if line is not None:
                 line.fill(self._engine.steering_angle(side))
 
+    def true_angle(self, side: int, sensed: float, rate: float) -> float:
+        """Angle of a side [rad] that is sensed as `sensed` while it turns at `rate` [rad/s]."""
+        return sensed - self._flaws[side].offset + rate * self._flaws[side].delay
+
+    def move_on(self, rates: tuple[float, float]) -> None:
+        """Both sides have turned at these rates [rad/s] for longer than any delay."""
+        step = self._engine.step_size
+        for side, (line, rate) in enumerate(zip(self._lines, rates, strict=True)):
+            if line is not None:
+                now, entries = self._engine.steering_angle(side), round(line.delay / step) + 2
+                for back in range(entries, -1, -1):
+                    line.push(now - back * step * rate)
+
     def advance(self) -> None:
         """Take note of the angles at the end of an engine step."""
         for side, line in enumerate(self._lines):

@@ -93,6 +93,15 @@ class FlexibleGear:
         """At rest, in the middle of the play."""
         self.angle, self.rate, self._previous_rate = angle, 0.0, 0.0
 
+    def wheel_angle_under(self, angle: float, torque: float) -> float:
+        """Where the wheel is while the motor at `angle` [rad] presses on it with `torque` [Nm], both moving alike."""
+        play = math.copysign(self._spring.gap / 2, torque) if torque else 0.0
+        return angle - torque / self._spring.stiffness - play
+
+    def move_on(self, angle: float, rate: float) -> None:
+        """The motor moves at this rate [rad/s], as it has done over the last step."""
+        self.angle, self.rate, self._previous_rate = angle, rate, rate
+
     @property
     def rate_now(self) -> float:
         """Rate at the end of the last step [rad/s], extrapolated to second order."""

@@ -78,3 +78,18 @@ def planar_twist(velocity: Sequence[float], yaw_rate: float, orientation: Sequen
     heading = 2 * math.atan2(orientation[2], orientation[3])
     cosine, sine = math.cos(heading), math.sin(heading)
     return cosine * velocity[0] + sine * velocity[1], cosine * velocity[1] - sine * velocity[0], yaw_rate
+
+
+def turned_to(heading: float, orientation: Sequence[float]) -> tuple[float, float, float, float]:
+    """A chassis with another heading [rad] and the tilt that it has, quaternions (x, y, z, w)."""
+    x, y, z, w = orientation
+    turn = (heading - 2 * math.atan2(z, w)) / 2
+    sine, cosine = math.sin(turn), math.cos(turn)
+    return cosine * x - sine * y, cosine * y + sine * x, cosine * z + sine * w, cosine * w - sine * z
+
+
+def in_world(twist: Vector, heading: float) -> tuple[Vector, Vector]:
+    """Linear and angular velocity in the world of a twist (x', y', gamma') in the chassis frame."""
+    ahead, left, yaw_rate = twist
+    cosine, sine = math.cos(heading), math.sin(heading)
+    return (cosine * ahead - sine * left, sine * ahead + cosine * left, 0.0), (0.0, 0.0, yaw_rate)

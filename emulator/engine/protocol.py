@@ -41,6 +41,20 @@ class Engine(Protocol):
             angles: (8,) of the joints [rad].
         """
 
+    def set_motion(
+        self, *, heading: float, twist: tuple[float, float, float], angles: Sequence[float], rates: Sequence[float]
+    ) -> None:
+        """Let the vehicle, where it was placed, move as if it had done so over the last step; at the origin.
+
+        The chassis keeps height and tilt; on the jack-stand it is held, and only the joints move.
+
+        Args:
+            heading: of the chassis in the world [rad].
+            twist: (x', y', gamma') in its own frame, of half a step ago [m/s, m/s, rad/s].
+            angles: (8,) of the joints now [rad].
+            rates: (8,) of the joints, of half a step ago [rad/s]; those of twist and rolling wheels agree.
+        """
+
     def step(self, torques: Sequence[float]) -> None:
         """One step under the joint torques (8,) [Nm]."""
 

@@ -15,8 +15,8 @@ from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.storage import FolderMemory
 from emulator.vehicle import EmulatedVehicle
 from hil.bench.lockstep import LockstepBench
-from hil.bench.prototypes import load_emulated
 from hil.bench.serving import VehicleServer
+from hil.bench.simulators import Simulator, load_simulated, naming
 from hil.bus.clock import Clock
 from hil.bus.opening import open_served_bus
 from hil.cosimulation.plant import FmuVehicle
@@ -78,13 +78,13 @@ class Bench:
     operator: BenchOperator
 
 
-def assumed(prototype: str, network: Path) -> tuple[str, ...]:
+def assumed(prototype: str, network: Path, simulator: Simulator | None = None) -> tuple[str, ...]:
     """What no file says of an emulated vehicle, a line each; none for one with a prototype file.
 
     Raises:
         DataFileError: a file is missing or malformed, or two places disagree.
     """
-    return load_emulated(prototype, network).assumed
+    return load_simulated(prototype, network, simulator).assumed
 
 
 @contextmanager
@@ -97,27 +97,35 @@ def vehicle(
     fmu: Path | None = None,
     engine: EngineName | None = None,
     video: Video | None = None,
+    simulator: Simulator | None = None,
 ) -> Iterator[Plant]:
     """The emulated prototype with effects, or an FMU with the prototype's drives and encoders; closed at the end.
 
     Args:
+        prototype: shipped prototype by name, or a path.
+        seed: of all noise.
+        gui: with a window.
+        network: network file.
+        effects: that it has; beside those of `simulator`, to which they add up.
+        fmu: in place of the physics engine.
         engine: None for the default one.
         video: to be written at the end.
+        simulator: model whose parameters and effects it has in place of the prototype's; None: the prototype's own.
 
     Raises:
         UserError: prototype and network file disagree, an effect, a window or a video is asked of an FMU, it cannot be
-            run, or there is nothing to draw the video with.
+            run, no vehicle can be as the simulator says, or there is nothing to draw the video with.
     """
-    built = load_emulated(prototype, network).prototype
+    built = load_simulated(prototype, network, simulator).prototype
     if fmu is None:
         chosen = engine or default_engine()
         if gui and video and chosen is EngineName.MUJOCO:
             # Two kinds of OpenGL in one process end it.
             raise UserError("MuJoCo shows a window or draws a video, not both.", "Leave out --gui or --video.")
-        with (
-            EmulatedVehicle(built, seed=seed, gui=gui, make_engine=ENGINES[chosen], effects=effects) as emulated,
-            _perhaps_filmed(emulated, chosen, video) as seen,
-        ):
+        wanted = effects if simulator is None else simulator.with_more(effects)
+        with naming(simulator):
+            emulated = EmulatedVehicle(built, seed=seed, gui=gui, make_engine=ENGINES[chosen], effects=wanted)
+        with emulated, _perhaps_filmed(emulated, chosen, video) as seen:
             yield seen
         return
     if effects or gui or video:
@@ -139,10 +147,11 @@ def bench(
     fmu: Path | None = None,
     engine: EngineName | None = None,
     video: Video | None = None,
+    simulator: Simulator | None = None,
 ) -> Iterator[Bench]:
     """What `vehicle` gives, behind an in-process bus in lockstep."""
     with (
-        vehicle(prototype, seed, gui, network, effects, fmu, engine, video) as emulated,
+        vehicle(prototype, seed, gui, network, effects, fmu, engine, video, simulator) as emulated,
         LockstepBench(emulated, network) as lockstep,
     ):
         yield Bench(lockstep.bus, lockstep.clock, BenchOperator(emulated))

@@ -24,6 +24,7 @@ from ident.vehicle.quantities import Quantity, read_toml
 from ident.writing import write_whole
 
 VEHICLE_FILE: Final = "vehicle.toml"
+SIMULATOR_FILE: Final = "simulator.toml"
 NETWORK_FILE: Final = "network.toml"
 _EDS_FOLDER: Final = "eds"
 _NONE: Final = canopen.import_od(None)
@@ -55,6 +56,15 @@ def carried_vehicle(path: Path) -> Files:
         DataFileError: it cannot be read.
     """
     return {VEHICLE_FILE: _read(path)}
+
+
+def carried_simulator(path: Path) -> Files:
+    """The model that an emulated vehicle is made from, as it is put into a run folder.
+
+    Raises:
+        DataFileError: it cannot be read.
+    """
+    return {SIMULATOR_FILE: _read(path)}
 
 
 def write_carried(files: Files, folder: Path, *, replace: bool = False) -> None:

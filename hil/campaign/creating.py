@@ -6,7 +6,9 @@ import json
 from pathlib import Path
 
 from hil.campaign.carried import (
+    Files,
     carried_network,
+    carried_simulator,
     carried_vehicle,
     check_readable,
     refuse_others,
@@ -20,7 +22,14 @@ from ident.reading import read_json
 from ident.writing import write_whole
 
 
-def refuse_used(folder: RunFolder, vehicle_file: Path, network_file: Path, *, by_demo: bool = False) -> None:
+def refuse_used(
+    folder: RunFolder,
+    vehicle_file: Path,
+    network_file: Path,
+    *,
+    simulator: Path | None = None,
+    by_demo: bool = False,
+) -> None:
     """Refuse a folder in which a new run would overwrite anything; a demo may replace what a demo has left.
 
     Raises:
@@ -31,8 +40,12 @@ def refuse_used(folder: RunFolder, vehicle_file: Path, network_file: Path, *, by
         return
     if _holds_run(folder):
         raise _used(folder)
-    refuse_others(carried_vehicle(vehicle_file), folder.path)
+    refuse_others(_top_files(vehicle_file, simulator), folder.path)
     refuse_others(carried_network(network_file), folder.network.parent)
+
+
+def _top_files(vehicle_file: Path, simulator: Path | None) -> Files:
+    return {**carried_vehicle(vehicle_file), **(carried_simulator(simulator) if simulator is not None else {})}
 
 
 def _holds_run(folder: RunFolder) -> bool:
@@ -70,7 +83,7 @@ def create_run(run: Run, vehicle_file: Path) -> None:
         _delete_logs(folder)
     elif _holds_run(folder):
         raise _used(folder)
-    write_carried(carried_vehicle(vehicle_file), folder.path, replace=replaced)
+    write_carried(_top_files(vehicle_file, run.simulator), folder.path, replace=replaced)
     write_carried(carried_network(run.network.path), folder.network.parent, replace=replaced)
     check_readable(folder.vehicle, folder.network, run.plan.vehicle, run.network)
     write_whole(json.dumps(manifest_of(run), indent=1), folder.manifest)

@@ -30,6 +30,7 @@ from ident.report.gap import GapReport, write_gap_report
 from ident.report.gap_summary import summary_lines
 from ident.stages import Stage, untold
 from ident.vehicle.description import VehicleDescription, find_data_file
+from ident.vehicle.geometry import Geometry
 from ident.writing import refuse_folder, refuse_inputs
 
 Array = NDArray[np.float64]
@@ -89,12 +90,14 @@ class Answer:
         diagnosis: as it goes into `diagnosis.json`.
         model: with the effects that are named; None where none is.
         notes: what the reader must know, a line each.
+        geometry: of the vehicle that was diagnosed; None for axes.
     """
 
     findings: Findings | None
     diagnosis: Diagnosis
     model: ExtendedModel | None = None
     notes: tuple[str, ...] = ()
+    geometry: Geometry | None = None
 
     @property
     def summary(self) -> list[str]:
@@ -156,7 +159,7 @@ def write_answer(order: DiagnosisOrder, answer: Answer) -> list[Path]:
             write_gap_report(GapReport(answer.findings, answer.diagnosis, fitted, confirmed, judged), order.report)
         written.append(order.report)
     if order.extended is not None and answer.model is not None:
-        write_model(answer.model, order.extended, _provenance(order))
+        write_model(answer.model, order.extended, _provenance(order), geometry=answer.geometry)
         written.append(order.extended)
     return written
 
@@ -235,7 +238,7 @@ def _vehicle_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
     diagnosis = replace(found.diagnosis, unseen=unseen_gaps(found.findings, records, confirming, vehicle, given))
     named = diagnosis.verdict is Verdict.EFFECT
     extended = extended_model(found.findings, vehicle.prior, given=given) if named else None
-    return Answer(found.findings, diagnosis, extended, notes)
+    return Answer(found.findings, diagnosis, extended, notes, vehicle.geometry)
 
 
 def _faults(records: Sequence[Record], vehicle: VehicleDescription) -> list[Fault]:

@@ -4,6 +4,7 @@
 |---|---|
 | `run.json` | seed, steps, excitations, what was driven and on which bus |
 | `vehicle.toml` | the vehicle file as used |
+| `simulator.toml` | the model that the emulated vehicle was made from, where there was one |
 | `network/` | the network file and its EDS files as used, so that they can be read again (`carried`) |
 | `frames/NNN_step.blf` | every frame, one file a step, in the order driven |
 | `frames/NNN_step.part.blf` | what there is of a step that was not finished |
@@ -22,8 +23,10 @@ import numpy as np
 
 from hil.campaign.carried import (
     NETWORK_FILE,
+    SIMULATOR_FILE,
     VEHICLE_FILE,
     carried_network,
+    carried_simulator,
     carried_vehicle,
     is_carried,
 )
@@ -73,6 +76,11 @@ class RunFolder:
         return self.path / VEHICLE_FILE
 
     @property
+    def simulator(self) -> Path:
+        """The model that the emulated vehicle was made from, where there was one."""
+        return self.path / SIMULATOR_FILE
+
+    @property
     def network(self) -> Path:
         """The network file as used, its EDS files beside or below it."""
         return self.path / "network" / NETWORK_FILE
@@ -113,6 +121,7 @@ class Run:
         payload: mass of the load of the loaded steps [kg].
         demo: it is a demo's, which the next one may replace.
         engine: physics engine of the emulated prototype, None on a real vehicle.
+        simulator: `parameters.toml` that the emulated vehicle is made from, None for the prototype as it is.
         opened: it was read from its folder, rather than planned.
     """
 
@@ -126,6 +135,7 @@ class Run:
     payload: float = 0.0
     demo: bool = False
     engine: EngineName | None = None
+    simulator: Path | None = None
     opened: bool = False
 
     @property
@@ -148,6 +158,11 @@ def sources_of(path: Path) -> tuple[Path, ...]:
 def carries_vehicle(folder: RunFolder, path: Path) -> bool:
     """Whether a vehicle file is the one that the folder carries."""
     return is_carried(carried_vehicle(path), folder.path)
+
+
+def carries_simulator(folder: RunFolder, path: Path) -> bool:
+    """Whether a model is the one that the folder carries."""
+    return is_carried(carried_simulator(path), folder.path)
 
 
 def carries_network(folder: RunFolder, path: Path) -> bool:
@@ -205,6 +220,7 @@ def manifest_of(run: Run) -> dict[str, Any]:
         **({"payload": run.payload} if run.payload else {}),
         **({"demo": True} if run.demo else {}),
         **({"engine": run.engine} if run.engine else {}),
+        **({"simulator": SIMULATOR_FILE} if run.simulator else {}),
         "steps": list(plan.steps),
         "excitations": {step: excitation_entry(excitation) for step, excitation in plan.excitations.items()},
     }
@@ -252,6 +268,7 @@ def _restore(folder: RunFolder, manifest: Mapping[str, Any], vehicle: VehicleDes
         payload=float(manifest.get("payload", 0.0)),
         demo=manifest.get("demo") is True,
         engine=_engine(manifest),
+        simulator=folder.simulator if "simulator" in manifest else None,
         opened=True,
     )
 

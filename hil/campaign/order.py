@@ -6,11 +6,19 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from hil.campaign.creating import refuse_used
-from hil.campaign.folder import Run, RunFolder, carries_network, carries_vehicle, network_file_of
+from hil.campaign.folder import (
+    Run,
+    RunFolder,
+    carries_network,
+    carries_simulator,
+    carries_vehicle,
+    network_file_of,
+)
 from hil.frames.recorder import LogFormat
 from hil.network.described import load_described
 from ident.campaign.plan import make_plan
@@ -38,6 +46,7 @@ class Order:
         resume: go on with the run that is there.
         demo: what an earlier demo has left in the folder goes.
         engine: physics engine of the emulated prototype, None on a real vehicle.
+        simulator: `parameters.toml` that the emulated vehicle is made from, None for the prototype as it is.
     """
 
     out: Path
@@ -54,6 +63,7 @@ class Order:
     resume: bool = False
     demo: bool = False
     engine: EngineName | None = None
+    simulator: Path | None = None
 
 
 Planned = Callable[[int, int], None]
@@ -72,7 +82,13 @@ def plan_run(order: Order, planned: Planned = _unheard) -> Run:
     """
     described = load_described(order.vehicle, order.network or network_file_of(order.vehicle))
     vehicle, network = described.vehicle, described.network
-    refuse_used(RunFolder(order.out), find_data_file("ident.vehicle", order.vehicle), network.path, by_demo=order.demo)
+    refuse_used(
+        RunFolder(order.out),
+        find_data_file("ident.vehicle", order.vehicle),
+        network.path,
+        simulator=order.simulator,
+        by_demo=order.demo,
+    )
     total = sum(step in DIAGNOSTIC and DIAGNOSTIC[step].optimised for step in order.steps)
     done = count(1)
     planned(0, total)
@@ -95,7 +111,12 @@ def plan_run(order: Order, planned: Planned = _unheard) -> Run:
         order.payload,
         order.demo,
         order.engine,
+        order.simulator,
     )
+
+
+_OPTIONS: Final = {"simulator": "--from"}
+"""Options that are not called what they are in Python, where `from` is a word of the language."""
 
 
 def refuse_changed(run: Run, order: Order, given: Collection[str]) -> None:
@@ -121,11 +142,16 @@ def refuse_changed(run: Run, order: Order, given: Collection[str]) -> None:
         "periods": lambda: order.periods != run.plan.periods,
         "seed": lambda: order.seed != run.seed,
         "engine": lambda: order.engine != run.engine,
+        "simulator": lambda: order.simulator is None or not _same_simulator(run, order.simulator),
     }
     different = [name for name, differs in changed.items() if name in given and differs()]
     if different:
-        options = ", ".join(f"--{name.replace('_', '-')}" for name in different)
+        options = ", ".join(_OPTIONS.get(name, f"--{name.replace('_', '-')}") for name in different)
         raise CampaignError(
             f"{run.folder.path} was planned with another {options}.",
             "A run goes on as it was planned: leave that out, or start another run (--out).",
         )
+
+
+def _same_simulator(run: Run, path: Path) -> bool:
+    return run.simulator is not None and carries_simulator(run.folder, path)

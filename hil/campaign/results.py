@@ -119,7 +119,8 @@ def write_result(content: ReportContent, out: Path) -> tuple[Path, Path]:
     try:
         out.mkdir(parents=True, exist_ok=True)
         identified = Identified(content.identification, content.assessment)
-        write_model(identified.model, parameters, content.provenance, identified)
+        geometry = content.vehicle.geometry
+        write_model(identified.model, parameters, content.provenance, identified=identified, geometry=geometry)
     except OSError as error:
         raise UserError(f"{out} cannot be written to: {error.strerror}.", "Name another folder (--out).") from error
     write_report(content, report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -83,6 +84,15 @@ def read_geometry(table: Mapping[str, Any], path: Path) -> Geometry:
     geometry = Geometry(**{name: quantity.value for name, quantity in quantities.items()})
     check_geometry(geometry, path)
     return geometry
+
+
+def geometry_text(geometry: Geometry, source: str) -> str:
+    """TOML: the table that `read_geometry` reads."""
+    lines = ["", "[geometry]"]
+    for name, unit in GEOMETRY_UNITS.items():
+        value = float(getattr(geometry, name))
+        lines.append(f'{name} = {{ value = {value!r}, unit = "{unit}", source = {json.dumps(source)} }}')
+    return "\n".join(lines) + "\n"
 
 
 def check_geometry(geometry: Geometry, path: Path) -> None:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from emulator.effects.base import Injector, Placed
 from emulator.effects.injection import Injection
 from emulator.prototype import Prototype
-from emulator.rigid_bodies import derive_rigid_bodies
+from emulator.reparametrised import with_truth
 from ident.errors import UserError
-from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+from ident.vehicle.parameters import PARAMETER_NAMES
 
 
 def change_parameter(prototype: Prototype, symbol: str, change: float) -> Prototype:
@@ -24,22 +22,7 @@ def change_parameter(prototype: Prototype, symbol: str, change: float) -> Protot
     truth = prototype.truth.replaced(**{symbol: prototype.truth[symbol] * (1 + change)})
     if min(truth.values) < 0:
         raise UserError(f"parameter_change@{symbol}: {symbol} would be negative.", "Give a change above -1.")
-    bodies, body = prototype.rigid_bodies, prototype.body
-    # Roll and pitch inertia follow the yaw inertia, or the chassis would be no body; the plane motion sees neither.
-    spread = math.sqrt(_radius_squared(truth) / _radius_squared(prototype.truth))
-    derived = derive_rigid_bodies(
-        prototype.geometry,
-        truth,
-        (body.length * spread, body.width * spread, body.height),
-        Path(f"parameter_change@{symbol}"),
-        wheel_mass=bodies.wheel.mass,
-        knuckle_mass=bodies.knuckles[0].mass,
-    )
-    return replace(prototype, truth=truth, rigid_bodies=derived)
-
-
-def _radius_squared(truth: Parameters) -> float:
-    return truth["C_ch"] / truth["m_ch"]
+    return with_truth(prototype, truth, Path(f"parameter_change@{symbol}"))
 
 
 def _inject(injection: Injection, effect: Placed) -> Injection:

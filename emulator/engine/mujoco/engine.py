@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from emulator.as_built import AsBuilt
-from emulator.engine.layout import JOINTS, joint_coulomb, planar_twist
+from emulator.engine.layout import JOINTS, in_world, joint_coulomb, planar_twist, turned_to
 from emulator.engine.mujoco.mjcf import DEFAULT_SOLVER, SolverSettings, generate_mjcf, overlap
 from emulator.engine.protocol import STAND_CLEARANCE
 from emulator.rigid_bodies import RigidBody
@@ -91,6 +91,28 @@ class MuJoCoEngine:
         self._read()
         self._previous = self._rates
         self._show()
+
+    def set_motion(
+        self, *, heading: float, twist: tuple[float, float, float], angles: Sequence[float], rates: Sequence[float]
+    ) -> None:
+        """Let the vehicle move as if it had done so over the last step; `Engine.set_motion` says how."""
+        if self._base is None:
+            qx, qy, qz, qw = turned_to(heading, self.base_pose()[1])
+            self.data.qpos[:2] = 0.0
+            self.data.qpos[3:7] = qw, qx, qy, qz
+            linear, angular = in_world(twist, heading)
+            self.data.qvel[:3] = linear
+            # MuJoCo has the linear velocity in the world, the angular one in the body's frame.
+            backwards = np.array([qw, -qx, -qy, -qz])
+            turned = np.zeros(3)
+            mujoco.mju_rotVecQuat(turned, np.array(angular), backwards)
+            self.data.qvel[3:6] = turned
+        self._joint_angles[:] = by_unit(angles)
+        self._joint_rates[:] = by_unit(rates)
+        self.data.qacc_warmstart[:] = 0.0
+        mujoco.mj_forward(self.model, self.data)
+        self._read()
+        self._previous = self._rates
 
     def step(self, torques: Sequence[float]) -> None:
         """One engine step under the joint torques (8,) [Nm]."""

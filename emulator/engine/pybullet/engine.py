@@ -12,7 +12,7 @@ from typing import Any, Final
 import pybullet
 
 from emulator.as_built import AsBuilt
-from emulator.engine.layout import JOINTS, joint_coulomb, planar_twist
+from emulator.engine.layout import JOINTS, in_world, joint_coulomb, planar_twist, turned_to
 from emulator.engine.protocol import STAND_CLEARANCE
 from emulator.engine.pybullet.urdf import generate_urdf
 from emulator.engine.pybullet.window import open_window
@@ -23,6 +23,8 @@ from ident.vehicle.quantities import GRAVITY
 _FRONT_OF_SIDE: Final = (0, 2)
 _ROLLING: Final = 4
 _FLOOR: Final = 0
+_OUT_OF_REACH: Final = 1.0
+"""Height at which no wheel touches the floor [m]."""
 _MASS: Final = 0
 _LATERAL_FRICTION: Final = 1
 _INERTIA: Final = 2
@@ -108,6 +110,7 @@ class PyBulletEngine:
             angles: (8,) joint angles [rad].
         """
         self._prepare_world()
+        self._on_stand = on_stand
         self._dry: dict[int, float] = {}
         lift = STAND_CLEARANCE if on_stand else -self._deflection()
         self.body = self._load(self._prototype.body.centre_height + lift, on_stand)
@@ -120,6 +123,29 @@ class PyBulletEngine:
         for joint, angle in zip(self.joints, angles, strict=True):
             pybullet.resetJointState(self.body, joint, angle, 0.0, physicsClientId=self.client)
         self.set_friction(self.coulomb)
+        self._states = self._previous = self._read()
+
+    def set_motion(
+        self, *, heading: float, twist: tuple[float, float, float], angles: Sequence[float], rates: Sequence[float]
+    ) -> None:
+        """Let the vehicle move as if it had done so over the last step; `Engine.set_motion` says how."""
+        client = self.client
+        if not self._on_stand:
+            (_, _, height), orientation = self.base_pose()
+            turned = turned_to(heading, orientation)
+            arm = pybullet.rotateVector(turned, self._arm() or (0.0, 0.0, 0.0))
+            linear, angular = in_world(twist, heading)
+            # PyBullet has place and speed of the centre of mass.
+            place = [c - a for c, a in zip((0.0, 0.0, height), arm, strict=True)]
+            speed = [v - c for v, c in zip(linear, _cross(angular, arm), strict=True)]
+            # Contact points are kept as long as they are near: of a wheel that is turned by hand, old ones would stay.
+            away = [place[0], place[1], place[2] + _OUT_OF_REACH]
+            pybullet.resetBasePositionAndOrientation(self.body, away, turned, physicsClientId=client)
+            pybullet.performCollisionDetection(client)
+            pybullet.resetBasePositionAndOrientation(self.body, place, turned, physicsClientId=client)
+            pybullet.resetBaseVelocity(self.body, speed, angular, physicsClientId=client)
+        for joint, angle, rate in zip(self.joints, angles, rates, strict=True):
+            pybullet.resetJointState(self.body, joint, angle, rate, physicsClientId=client)
         self._states = self._previous = self._read()
 
     def step(self, torques: Sequence[float]) -> None:

@@ -209,3 +209,68 @@ def test_equal_calls_give_equal_bits(prototype: Prototype, make_engine: MakeEngi
         return result
 
     assert drive() == drive()
+
+
+def moved_on(source: Engine, target: Engine, heading: float) -> None:
+    """The second vehicle in the state of the first."""
+    target.set_motion(heading=heading, twist=source.twist(), angles=source.angles(), rates=source.mean_rates())
+
+
+def test_a_vehicle_that_is_set_in_motion_goes_on_as_the_one_that_drove(
+    prototype: Prototype, make_engine: MakeEngine
+) -> None:
+    """On a curve, into another heading: speeds and angles a third of a second later are the same."""
+    g, rolling = prototype.geometry, [3 * prototype.truth["d_cw"]] * 4
+    left, right = (math.atan(0.2 * g.wheelbase / (1 - s * 0.2 * g.track_width)) for s in (1, -1))
+    first, second = (make_engine(AsBuilt.of(prototype), step_size=STEP, gui=False) for _ in range(2))
+    first.place(on_stand=False, angles=[left, -left, right, -right, 0, 0, 0, 0])
+    run(first, [0.0] * 4 + rolling, 0.6)
+    run(second, [0.0] * 8, 0.1)
+    moved_on(first, second, 2.0)
+    assert second.twist() == pytest.approx(first.twist(), abs=1e-9)
+    assert second.base_pose()[0][:2] == pytest.approx((0.0, 0.0), abs=1e-9)
+    for engine in (first, second):
+        run(engine, [0.0] * 4 + rolling, 0.3)
+    assert second.twist() == pytest.approx(first.twist(), rel=2e-3, abs=2e-4)
+    assert second.angles() == pytest.approx(first.angles(), abs=1e-3)
+    first.close()
+    second.close()
+
+
+def test_the_centre_is_set_in_motion_wherever_the_mass_is(prototype: Prototype, make_engine: MakeEngine) -> None:
+    built = AsBuilt.of(shifted(prototype, 0.1, 0.05))
+    engine = make_engine(built, step_size=STEP, gui=False)
+    height = engine.base_pose()[0][2]
+    twist = (0.4, -0.1, 0.3)
+    engine.set_motion(heading=-1.2, twist=twist, angles=[0.0] * 8, rates=[0.0] * 8)
+    (x, y, z), (_, _, qz, qw) = engine.base_pose()
+    assert (x, y, z) == pytest.approx((0.0, 0.0, height), abs=1e-9)
+    assert 2 * math.atan2(qz, qw) == pytest.approx(-1.2, abs=1e-9)
+    assert engine.twist() == pytest.approx(twist, abs=1e-9)
+    engine.close()
+
+
+def shifted(prototype: Prototype, x: float, y: float) -> Prototype:
+    bodies = prototype.rigid_bodies
+    return replace(prototype, rigid_bodies=replace(bodies, chassis=replace(bodies.chassis, centre=(x, y, 0.0))))
+
+
+def test_wheels_that_are_turned_by_hand_bear_the_weight_as_before(engine: Engine, prototype: Prototype) -> None:
+    """A contact of where the wheel stood before would bear some of it."""
+    quarter = prototype.truth["m_ch"] * GRAVITY / 4
+    for angle in (0.02, -0.31, 1.1, 7.0):
+        engine.set_motion(heading=0.1, twist=(0.0,) * 3, angles=[0.0] * 4 + [angle] * 4, rates=[0.0] * 8)
+        run(engine, [0.0] * 8, 0.1)
+        assert loads(engine) == pytest.approx([quarter] * 4, rel=1e-3)
+        assert engine.angles()[ROLLING] == pytest.approx([angle] * 4, abs=1e-6)
+
+
+def test_on_the_stand_only_joints_are_set_in_motion(engine: Engine, prototype: Prototype) -> None:
+    """A wheel coasts down as its friction says."""
+    p = prototype.truth
+    engine.place(on_stand=True, angles=[0.0] * 8)
+    engine.set_motion(heading=0.5, twist=(1.0, 0.0, 0.0), angles=[0.0] * 8, rates=[0.0] * 4 + [8.0] * 4)
+    assert engine.base_velocity() == ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    run(engine, [0.0] * 8, 0.05)
+    lost = p["d_cw"] / p["B_w"] * 0.05
+    assert engine.mean_rates()[ROLLING] == pytest.approx([8.0 - lost] * 4, rel=1e-6)

@@ -140,7 +140,7 @@ def test_a_plain_record_gives_the_same_estimate(
 def test_the_result_file_reads_back_and_states_everything(result: Identification, run: Run, tmp_path: Path) -> None:
     path = tmp_path / "parameters.toml"
     identified = Identified(result, Assessment())
-    write_model(identified.model, path, {"run": run.folder.path.name}, identified)
+    write_model(identified.model, path, {"run": run.folder.path.name}, identified=identified)
     read = read_model(path).parameters
     np.testing.assert_allclose(read.values, result.values, rtol=1e-8)
     document = tomllib.loads(path.read_text())

@@ -220,7 +220,7 @@ def test_the_verdict_and_its_reasons_are_in_the_file_beside_the_parameters(
     assessment = assess(impossible, record, prototype)
     path = tmp_path / "parameters.toml"
     identified = Identified(impossible, assessment)
-    write_model(identified.model, path, {"run": 'a "quoted" name'}, identified)
+    write_model(identified.model, path, {"run": 'a "quoted" name'}, identified=identified)
     table = tomllib.loads(path.read_text())["assessment"]
     assert table["verdict"] == "unusable"
     assert len(table["reasons"]) == len(assessment.reasons)
