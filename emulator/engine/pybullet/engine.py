@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import pybullet
@@ -16,6 +13,18 @@ from emulator.engine.layout import JOINTS, in_world, joint_coulomb, planar_twist
 from emulator.engine.protocol import STAND_CLEARANCE
 from emulator.engine.pybullet.urdf import generate_urdf
 from emulator.engine.pybullet.window import open_window
+from emulator.engine.pybullet.world import (
+    DEFAULT_SOLVER as DEFAULT_SOLVER,
+)
+from emulator.engine.pybullet.world import (
+    SolverSettings as SolverSettings,
+)
+from emulator.engine.pybullet.world import (
+    couple,
+    load_vehicle,
+    prepare_world,
+    set_surfaces,
+)
 from emulator.rigid_bodies import RigidBody
 from ident.vehicle.geometry import WHEELS
 from ident.vehicle.quantities import GRAVITY
@@ -37,26 +46,6 @@ _NORMAL_FORCE: Final = 9
 _ONE_FRICTION: Final = 10
 _OTHER_FRICTION: Final = 12
 """Where `getContactPoints` has them."""
-
-
-@dataclass(frozen=True)
-class SolverSettings:
-    """Settings of the engine's constraint solver; the defaults are the ones measured in docs/emulator.md.
-
-    Attributes:
-        iterations: sweeps of the solver a step.
-        coupling_erp: share of the front/rear coupling error that a step takes back [-].
-        coupling_force: largest torque in that coupling [Nm].
-        residual_threshold: the solver stops early below it; 0 does all sweeps.
-    """
-
-    iterations: int = 50
-    coupling_erp: float = 0.2
-    coupling_force: float = 1e5
-    residual_threshold: float = 0.0
-
-
-DEFAULT_SOLVER: Final = SolverSettings()
 
 
 class PyBulletEngine:
@@ -109,17 +98,17 @@ class PyBulletEngine:
             on_stand: chassis held, wheels in the air.
             angles: (8,) joint angles [rad].
         """
-        self._prepare_world()
+        prepare_world(self.client, self._built, self.step_size, self._settings)
         self._on_stand = on_stand
         self._dry: dict[int, float] = {}
         lift = STAND_CLEARANCE if on_stand else -self._deflection()
-        self.body = self._load(self._prototype.body.centre_height + lift, on_stand)
+        self.body = load_vehicle(self.client, self._urdf, self._prototype.body.centre_height + lift, fixed=on_stand)
         by_name = self._joint_indices()
         self.joints = [by_name[name] for name in JOINTS]
-        self._set_surfaces()
+        set_surfaces(self.client, self.body, self.joints[_ROLLING:], self._built)
         for side, front in enumerate((0, 2)):
             if self._built.couplings[side] is None:
-                self._couple(front, front + 1)
+                couple(self.client, self.body, self.joints[front], self.joints[front + 1], self._settings)
         for joint, angle in zip(self.joints, angles, strict=True):
             pybullet.resetJointState(self.body, joint, angle, 0.0, physicsClientId=self.client)
         self.set_friction(self.coulomb)
@@ -277,44 +266,6 @@ class PyBulletEngine:
     def _read(self) -> Any:
         return pybullet.getJointStates(self.body, self.joints, self.client)
 
-    def _prepare_world(self) -> None:
-        client = self.client
-        pybullet.resetSimulation(physicsClientId=client)
-        pybullet.setGravity(*self._built.gravity, physicsClientId=client)
-        pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=self.step_size,
-            numSolverIterations=self._settings.iterations,
-            solverResidualThreshold=self._settings.residual_threshold,
-            deterministicOverlappingPairs=1,
-            physicsClientId=client,
-        )
-        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-        floor = pybullet.createMultiBody(baseMass=0, baseCollisionShapeIndex=plane, physicsClientId=client)
-        # The engine multiplies the coefficients of the two surfaces; the wheels have 1.
-        pybullet.changeDynamics(
-            floor,
-            -1,
-            lateralFriction=self._prototype.floor_friction,
-            spinningFriction=0.0,
-            rollingFriction=0.0,
-            restitution=0.0,
-            physicsClientId=client,
-        )
-
-    def _load(self, height: float, fixed: bool) -> int:
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "vehicle.urdf"
-            path.write_text(self._urdf, encoding="utf-8")
-            return int(
-                pybullet.loadURDF(
-                    str(path),
-                    basePosition=[0.0, 0.0, height],
-                    useFixedBase=fixed,
-                    flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
-                    physicsClientId=self.client,
-                )
-            )
-
     def _joint_indices(self) -> Mapping[str, int]:
         count = pybullet.getNumJoints(self.body, self.client)
         infos = (pybullet.getJointInfo(self.body, index, self.client) for index in range(count))
@@ -323,65 +274,6 @@ class PyBulletEngine:
     def _deflection(self) -> float:
         """What a tyre gives way under a quarter of the weight [m]."""
         return self._prototype.truth["m_ch"] * GRAVITY / 4 / self._prototype.tyre.stiffness
-
-    def _set_surfaces(self) -> None:
-        """Make the bodies free of damping and the tyres radially elastic.
-
-        On rigid wheels the four loads are indeterminate: the solver then puts most of the weight on one
-        diagonal, and the wheels of the other slip at moderate acceleration.
-        """
-        quarter_mass, tyre = self._prototype.truth["m_ch"] / 4, self._prototype.tyre
-        for wheel in self.joints[_ROLLING:]:
-            pybullet.changeDynamics(
-                self.body,
-                wheel,
-                contactStiffness=tyre.stiffness,
-                contactDamping=2 * tyre.damping_ratio * math.sqrt(tyre.stiffness * quarter_mass),
-                physicsClientId=self.client,
-            )
-        for link in range(-1, pybullet.getNumJoints(self.body, self.client)):
-            pybullet.changeDynamics(
-                self.body,
-                link,
-                lateralFriction=1.0,
-                spinningFriction=0.0,
-                rollingFriction=0.0,
-                restitution=0.0,
-                linearDamping=0.0,
-                angularDamping=0.0,
-                jointDamping=0.0,
-                physicsClientId=self.client,
-            )
-        grip_of_weight = quarter_mass * GRAVITY * self._prototype.floor_friction
-        for joint, build in zip(self.joints[_ROLLING:], self._built.wheels, strict=True):
-            pybullet.changeDynamics(
-                self.body,
-                joint,
-                lateralFriction=build.grip,
-                spinningFriction=build.patch_torque / grip_of_weight,
-                physicsClientId=self.client,
-            )
-
-    def _couple(self, front: int, rear: int) -> None:
-        """Couple the steering of two units of a side: the rear turns against the front."""
-        constraint = pybullet.createConstraint(
-            self.body,
-            self.joints[front],
-            self.body,
-            self.joints[rear],
-            pybullet.JOINT_GEAR,
-            [0.0, 0.0, 1.0],
-            [0.0, 0.0, 0.0],
-            [0.0, 0.0, 0.0],
-            physicsClientId=self.client,
-        )
-        pybullet.changeConstraint(
-            constraint,
-            gearRatio=1.0,
-            erp=self._settings.coupling_erp,
-            maxForce=self._settings.coupling_force,
-            physicsClientId=self.client,
-        )
 
 
 def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
