@@ -36,19 +36,17 @@ from ident.extras import EngineName, default_engine, named_engine
 from ident.records.record import Step
 from ident.vehicle.description import find_data_file, load_vehicle
 
-EFFECTS: Final = (
-    "stribeck@steering_left=4Nm",
-    "asymmetric_coulomb@steering_right=3Nm",
-    "quadratic_drag@chassis=40N s^2/m^2",
-    "torque_bias@drive_fl=0.05Nm",
-    "slope@chassis=0.3deg",
-    "elasticity@drive_rr=0.0027rad/Nm",
-    "asymmetric_viscous@steering_left=1Nm s/rad",
-)
-"""At sizes that one meets."""
+EFFECTS: Final = {
+    "stribeck@steering_left=4Nm": 7001,
+    "asymmetric_coulomb@steering_right=3Nm": 7011,
+    "quadratic_drag@chassis=40N s^2/m^2": 7021,
+    "torque_bias@drive_fl=0.05Nm": 7031,
+    "slope@chassis=0.3deg": 7041,
+    "asymmetric_viscous@steering_left=1Nm s/rad": 7061,
+}
+"""At sizes that one meets, with the seed of the first campaign; the second has the next one."""
 
 ROLES: Final = ("fit", "confirm")
-FIRST_SEED: Final = 7001
 
 
 @dataclass(frozen=True)
@@ -151,16 +149,17 @@ def main() -> None:
     parser.add_argument("--vehicle", default="prototype")
     parser.add_argument("--engine", type=named_engine, default=default_engine(), help="that drives the records")
     parser.add_argument("--effect", action="append", help="in place of these; repeat for more")
-    parser.add_argument("--first", type=int, default=0, help="number of the first effect, by which seeds are counted")
+    parser.add_argument("--seed", type=int, help="of the first campaign of the first effect, and 10 more of each next")
     parser.add_argument("--runs", type=Path, default=Path("runs/back"), help="where everything is kept")
     arguments = parser.parse_args()
     print(
         "| effect | diagnosed | driven on | simulated on | mostly in | before | after | closed | lane change, least |"
     )
     print("|---|---|---|---|---|---|---|---|---|", flush=True)
-    for number, effect in enumerate(arguments.effect or EFFECTS, start=arguments.first):
-        name = f"{number}_{arguments.vehicle}_{arguments.engine}_{effect.partition('=')[0].replace('@', '_')}"
-        case = Case(arguments.runs / name, arguments.vehicle, effect, arguments.engine, FIRST_SEED + 10 * number)
+    for number, effect in enumerate(arguments.effect or EFFECTS):
+        seed = EFFECTS.get(effect, 7101 + 10 * number) if arguments.seed is None else arguments.seed + 10 * number
+        name = f"{arguments.vehicle}_{arguments.engine}_{effect.partition('=')[0].replace('@', '_')}_{seed}"
+        case = Case(arguments.runs / name, arguments.vehicle, effect, arguments.engine, seed)
         for engine in sorted(EngineName, key=lambda one: one is not arguments.engine):
             print(row(case, engine), flush=True)
 
