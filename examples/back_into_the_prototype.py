@@ -37,18 +37,17 @@ from ident.parameters_file import write_model
 from ident.records.record import Step
 from ident.vehicle.description import find_data_file, load_vehicle
 
-EFFECTS: Final = (
-    "stribeck@steering_left=4Nm",
-    "asymmetric_coulomb@steering_right=3Nm",
-    "quadratic_drag@chassis=40N s^2/m^2",
-    "torque_bias@drive_fl=0.05Nm",
-    "slope@chassis=0.3deg",
-    "asymmetric_viscous@steering_left=1Nm s/rad",
-)
-"""At sizes that one meets."""
+EFFECTS: Final = {
+    "stribeck@steering_left=4Nm": 7001,
+    "asymmetric_coulomb@steering_right=3Nm": 7011,
+    "quadratic_drag@chassis=40N s^2/m^2": 7021,
+    "torque_bias@drive_fl=0.05Nm": 7031,
+    "slope@chassis=0.3deg": 7041,
+    "asymmetric_viscous@steering_left=1Nm s/rad": 7061,
+}
+"""At sizes that one meets, with the seed of the first campaign; the second has the next one."""
 
 ROLES: Final = ("fit", "confirm")
-FIRST_SEED: Final = 7001
 
 
 @dataclass(frozen=True)
@@ -114,15 +113,16 @@ def models(case: Case) -> tuple[Path, Path]:
     return plain, extended
 
 
-def judged(case: Case, engine: EngineName) -> dict[str, Any]:
-    """Numbers of the gap on an engine; nothing is closed where nothing was named."""
+def judged(case: Case, engine: EngineName) -> dict[str, Any] | None:
+    """Numbers of the gap on an engine; None where the diagnosis named nothing, so that nothing can be put back."""
     before, after = models(case)
+    if not after.is_file():
+        return None
     result = case.folder / f"gap_{engine}.json"
     if not result.is_file():
         record = driven(case, "confirm")
         report = result.with_suffix(".html")
-        chosen = after if after.is_file() else before
-        order = SimulatorOrder(record, chosen, before, None, None, engine, result, report, force=True)
+        order = SimulatorOrder(record, after, before, None, None, engine, result, report, force=True)
         write_simulator_gap(order, judge_simulator(order))
     answer: dict[str, Any] = json.loads(result.read_text())
     return answer
@@ -131,6 +131,9 @@ def judged(case: Case, engine: EngineName) -> dict[str, Any]:
 def row(case: Case, engine: EngineName) -> str:
     """A line of the table."""
     answer = judged(case, engine)
+    if answer is None:
+        verdict = json.loads((case.folder / "diagnosis.json").read_text())["verdict"]
+        return f"| `{case.effect}` | {verdict} | {case.engine} | {engine} | | | | | |"
     total = answer["total"]
     largest = max(answer["steps"], key=lambda step: step["share"] or 0.0)
     free = [step for step in answer["steps"] if step["floor"] is None]
@@ -146,7 +149,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--vehicle", default="prototype")
     parser.add_argument("--engine", type=named_engine, default=default_engine(), help="that drives the records")
-    parser.add_argument("--effect", action="append", help="in place of the six; repeat for more")
+    parser.add_argument("--effect", action="append", help="in place of these; repeat for more")
+    parser.add_argument("--seed", type=int, help="of the first campaign of the first effect, and 10 more of each next")
     parser.add_argument("--runs", type=Path, default=Path("runs/back"), help="where everything is kept")
     arguments = parser.parse_args()
     print(
@@ -154,8 +158,9 @@ def main() -> None:
     )
     print("|---|---|---|---|---|---|---|---|---|", flush=True)
     for number, effect in enumerate(arguments.effect or EFFECTS):
-        name = f"{arguments.vehicle}_{arguments.engine}_{effect.partition('=')[0].replace('@', '_')}"
-        case = Case(arguments.runs / name, arguments.vehicle, effect, arguments.engine, FIRST_SEED + 10 * number)
+        seed = EFFECTS.get(effect, 7101 + 10 * number) if arguments.seed is None else arguments.seed + 10 * number
+        name = f"{arguments.vehicle}_{arguments.engine}_{effect.partition('=')[0].replace('@', '_')}_{seed}"
+        case = Case(arguments.runs / name, arguments.vehicle, effect, arguments.engine, seed)
         for engine in sorted(EngineName, key=lambda one: one is not arguments.engine):
             print(row(case, engine), flush=True)
 
