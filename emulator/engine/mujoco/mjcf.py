@@ -58,7 +58,7 @@ class SolverSettings:
     iterations: int = 100
     tolerance: float = 1e-12
     noslip_iterations: int = 0
-    impratio: float = 1e4
+    impratio: float = 100.0
     contact_impedance: float = 0.9
     wheel_shape: str = "sphere"
 

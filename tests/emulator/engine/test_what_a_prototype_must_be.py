@@ -274,3 +274,22 @@ def test_on_the_stand_only_joints_are_set_in_motion(engine: Engine, prototype: P
     run(engine, [0.0] * 8, 0.05)
     lost = p["d_cw"] / p["B_w"] * 0.05
     assert engine.mean_rates()[ROLLING] == pytest.approx([8.0 - lost] * 4, rel=1e-6)
+
+
+@pytest.mark.parametrize(("toe_in", "most"), [(1e-5, 2e-3), (1e-4, 0.2)])
+def test_wheels_that_are_parallel_but_for_what_encoders_resolve_do_not_drag(
+    prototype: Prototype, make_engine: MakeEngine, toe_in: float, most: float
+) -> None:
+    """Contacts harder than a tyre slide sideways with their whole grip, mu N toe_in each, at any slip [N]."""
+    p, r = prototype.truth, prototype.geometry.wheel_radius
+    engine = make_engine(AsBuilt.of(prototype), step_size=STEP, gui=False)
+    engine.place(on_stand=False, angles=[toe_in, -toe_in, -toe_in, toe_in, 0, 0, 0, 0])
+    run(engine, [0.0] * 8, 0.5)
+    torques = [0.0] * 4 + [p["d_cw"] + 2.0] * 4
+    run(engine, torques, 0.5)
+    speed = engine.twist()[0]
+    run(engine, torques, 0.5)
+    acceleration = (engine.twist()[0] - speed) / 0.5
+    drag = 4 * 2.0 / r - (p["m_ch"] + 4 * p["B_w"] / r**2) * acceleration
+    assert abs(drag) < most
+    engine.close()
