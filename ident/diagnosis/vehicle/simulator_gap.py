@@ -19,8 +19,8 @@ class StepGap:
 
     Attributes:
         step, coordinate, unit: which.
-        gap: rms of what the simulators lack of the recorded torque, and of the noise, in that unit; a floor of NaN where the step does
-            not repeat.
+        gap: rms of what the simulators lack of the recorded torque, and of the noise, in that unit; a floor of NaN
+            where the step does not repeat.
         share: of the power of the whole gap above the noise, before [-]; 0 where no noise is known.
         before, after: differences of its segments.
     """
