@@ -29,7 +29,7 @@ from ident.vehicle.parameters import Parameters
 Array = NDArray[np.float64]
 
 STIFFNESS: Final = 60.0
-"""Corner frequency of what holds the simulator [rad/s], above what is compared and below a late drive's limit."""
+"""Corner frequency of what holds the simulator [rad/s]: above what is compared, below what a late drive can follow."""
 
 _SIDES: Final = ("alpha_l", "alpha_r")
 _BETA: Final = slice(5, 9)
