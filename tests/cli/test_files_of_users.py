@@ -212,6 +212,8 @@ def test_a_limit_of_the_file_size_leaves_no_half_file_either(tmp_path: Path, lin
         capture_output=True,
         text=True,
         check=False,
+        # Modules that are compiled under the limit would be kept cut off, for every process after this one.
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)),
     )
     assert done.returncode == 2, done.stderr
