@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Final
 
 from fmu.variables import DEGREES, Block, Causality, Inputs, Variability, Variable
-from ident.effects import EFFECTS, Effect, terms_of
+from ident.effects import Effect, kind_of, terms_of
 from ident.effects.base import Sign
 from ident.plant.contact import CREEP_STIFFNESS
 from ident.plant.drives import DRIVE_GAIN, DRIVE_INTEGRAL_GAIN, DRIVE_UNWIND_TIME
@@ -90,7 +90,7 @@ def _regularisation() -> list[Variable]:
 def _friction_limits(vehicle: VehicleDescription, effects: Sequence[Effect]) -> list[Variable]:
     limits = {f"friction_limit_{wheel}": vehicle.limits.floor_friction for wheel in WHEELS}
     for effect in effects:
-        replaced = EFFECTS[effect.name].stands_for.get(effect.where, ())
+        replaced = kind_of(effect.name).stands_for.get(effect.where, ())
         limits.update({name: effect.size for name in replaced if name in limits})
     text = "Largest contact force of wheel {} over its load"
     return [_positive(name, text.format(name.rpartition("_")[2]), "1", limit) for name, limit in limits.items()]
@@ -130,11 +130,11 @@ def effect_parameter(effect: Effect, parameter: str) -> str:
 
 def parameters_of(effect: Effect, parameter: str) -> tuple[str, ...]:
     """Names in the table that a parameter of an effect has: its own, or those that it stands for."""
-    return EFFECTS[effect.name].stands_for.get(effect.where) or (effect_parameter(effect, parameter),)
+    return kind_of(effect.name).stands_for.get(effect.where) or (effect_parameter(effect, parameter),)
 
 
 def _effect_parameters(effect: Effect) -> list[Variable]:
-    kind = EFFECTS[effect.name]
+    kind = kind_of(effect.name)
     if kind.stands_for:
         return []
     return [

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from fmu.parameter_rows import effect_parameter
 from fmu.variables import Block, Inputs, VariableTable
-from ident.effects import EFFECTS, Effect, effect_term
+from ident.effects import Effect, effect_term, kind_of
 from ident.plant import creeping
 from ident.plant.creeping import Equations
 from ident.plant.symbols import Symbols
@@ -24,6 +24,6 @@ def equations(table: VariableTable, effects: Sequence[Effect], inputs: Inputs) -
     terms = [
         effect_term(effect.name, effect.where, {name: p[effect_parameter(effect, name)] for name in effect.parameters})
         for effect in effects
-        if not EFFECTS[effect.name].stands_for
+        if not kind_of(effect.name).stands_for
     ]
     return creeping.equations(x, u, p, terms, inputs)

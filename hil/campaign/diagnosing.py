@@ -14,7 +14,7 @@ from hil.campaign.folder import describe, sources_of
 from hil.campaign.reading import first_run, read_of, whole_records
 from hil.network.described import told_differences
 from ident.diagnosis.axis.diagnose import diagnose_axis
-from ident.diagnosis.diagnosis import Diagnosis, Verdict, faulty, write_diagnosis
+from ident.diagnosis.diagnosis import Diagnosis, faulty, write_diagnosis
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.vehicle.closing import extended_model
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
@@ -236,7 +236,7 @@ def _vehicle_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
     given = model.effects if model is not None else ()
     stage("what the steps left out show")
     diagnosis = replace(found.diagnosis, unseen=unseen_gaps(found.findings, records, confirming, vehicle, given))
-    named = diagnosis.verdict is Verdict.EFFECT
+    named = diagnosis.verdict.explains
     extended = extended_model(found.findings, vehicle.prior, given=given) if named else None
     return Answer(found.findings, diagnosis, extended, notes, vehicle.geometry)
 

@@ -10,18 +10,25 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ident.diagnosis.law.answer import Alternative, LawAnswer
 from ident.faults import Fault
 from ident.vehicle.quantities import Quantity
 from ident.writing import json_number, write_whole
 
 
 class Verdict(enum.StrEnum):
-    """A named effect, no gap above the noise, a gap without a name, or a record that is at fault."""
+    """A named effect, a law without a name, no gap above the noise, a gap without either, or a record at fault."""
 
     EFFECT = "effect"
+    LAW = "law"
     NONE = "none"
     UNKNOWN = "unknown"
     FAULT = "fault"
+
+    @property
+    def explains(self) -> bool:
+        """Whether causes are part of the answer."""
+        return self in (Verdict.EFFECT, Verdict.LAW)
 
 
 @dataclass(frozen=True)
@@ -35,6 +42,8 @@ class NamedEffect:
         ambiguity_set: names that these records do not tell apart from it, itself first.
         gap_closed_held_out: share of the removable gap that this effect closes on records that took no part in the
             fit, given the other effects.
+        alternatives: what adds the same to these records, the cause itself left out.
+        law: of a law, which has no name but `law`.
     """
 
     name: str
@@ -43,6 +52,8 @@ class NamedEffect:
     probability: float
     ambiguity_set: tuple[str, ...]
     gap_closed_held_out: float
+    alternatives: tuple[Alternative, ...] = ()
+    law: LawAnswer | None = None
 
 
 @dataclass(frozen=True)
@@ -100,11 +111,11 @@ class Unseen:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The content of `diagnosis.json`, which other programs read and which therefore stays as it is; and `unseen`.
+    """The content of `diagnosis.json`, which other programs read and which therefore stays as it is.
 
     Attributes:
         verdict: what kind of answer it is.
-        effects: by probability, most probable first; empty unless the verdict is `effect`.
+        effects: by probability, most probable first; empty unless the verdict is `effect` or `law`.
         where: shares of the gap, largest first.
         gap: on held-out rows.
         invisible: names of effects that these records cannot show anywhere.
@@ -134,6 +145,7 @@ class Diagnosis:
             "invisible": list(self.invisible),
             "next_experiment": self.next_experiment,
             "faults": [fault.as_json() for fault in self.faults],
+            "unseen": [_unseen(one) for one in self.unseen],
         }
 
 
@@ -152,6 +164,11 @@ def write_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
     write_whole(json.dumps(diagnosis.as_json(), indent=2, allow_nan=False) + "\n", path)
 
 
+def _unseen(one: Unseen) -> dict[str, Any]:
+    gap = {name: json_number(getattr(one.gap, name)) for name in ("before", "after", "floor")}
+    return {"step": one.steps, "channel": one.channel, **gap}
+
+
 def _effect(effect: NamedEffect) -> dict[str, Any]:
     return {
         "name": effect.name,
@@ -163,4 +180,6 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
         "probability": json_number(effect.probability),
         "ambiguity_set": list(effect.ambiguity_set),
         "gap_closed_held_out": json_number(effect.gap_closed_held_out),
+        "alternatives": [other.as_json() for other in effect.alternatives],
+        "law": None if effect.law is None else effect.law.as_json(),
     }

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.diagnosis import Diagnosis, Gap, NamedEffect, Share, Verdict
 from ident.diagnosis.generic import Generic
+from ident.diagnosis.law.answer import Alternative, LawAnswer
+from ident.diagnosis.law.stage import Law
 from ident.diagnosis.probability import Ranked, calibration
 from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.refit import Part, Refit
 from ident.vehicle.quantities import Quantity
 
 Array = NDArray[np.float64]
+
+LAW: Final = "law"
+"""Name of a cause that has none."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,9 @@ class Cause:
         biased: how much each parameter of the model shifts when the effect is left out, by name, in standard
             deviations.
         sizeless: it may be of no size itself, and what comes along with it is the explanation.
+        law: as it was learnt, of a law without a name.
+        law_answer: as it is written down.
+        alternatives: what adds the same to these records.
     """
 
     candidate: Candidate
@@ -45,6 +54,9 @@ class Cause:
     needed: float
     biased: Mapping[str, float]
     sizeless: bool
+    law: Law | None = None
+    law_answer: LawAnswer | None = None
+    alternatives: tuple[Alternative, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -107,7 +119,7 @@ class Findings:
         coverage = calibration().coverage
         return Diagnosis(
             verdict=self.verdict,
-            effects=tuple(_named(cause, coverage) for cause in self.causes) if self.verdict is Verdict.EFFECT else (),
+            effects=tuple(_named(cause, coverage) for cause in self.causes) if self.verdict.explains else (),
             where=self.where,
             gap=self.gap,
             invisible=self.invisible,
@@ -117,12 +129,14 @@ class Findings:
 
 def _named(cause: Cause, coverage: float) -> NamedEffect:
     values = zip(cause.candidate.parameters, cause.part.values, cause.part.std, strict=True)
-    name = str(cause.candidate.effect)
+    name = LAW if cause.law is not None else str(cause.candidate.effect)
     return NamedEffect(
         name=name,
         where=cause.candidate.where,
         parameters={p.name: Quantity(float(value), p.unit, "diagnosis", float(std)) for p, value, std in values},
         probability=round(cause.probability, 2),
-        ambiguity_set=cause.ranked.ambiguity_set(name, coverage),
+        ambiguity_set=(LAW,) if cause.law is not None else cause.ranked.ambiguity_set(name, coverage),
         gap_closed_held_out=cause.closed,
+        alternatives=cause.alternatives,
+        law=cause.law_answer,
     )

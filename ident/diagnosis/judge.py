@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
+from typing import Final
 
 from threadpoolctl import threadpool_limits
 
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judgement import Judgement
+from ident.diagnosis.law.learning import Designs
+from ident.diagnosis.law.stage import Law, next_law, with_law
 from ident.diagnosis.limits import Limits
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import make_rows
 from ident.diagnosis.search import concluded
 from ident.diagnosis.settings import Settings
-from ident.diagnosis.shapes import search
+from ident.diagnosis.shapes import Shaped, search
 from ident.stages import Stage, untold
+
+MOST_LAWS: Final = 2
+"""Of which an answer consists; more would be a black box."""
 
 
 def judge(
@@ -53,14 +59,49 @@ def _judged_once(
     problems: tuple[Problem, Problem], seed: int, settings: Settings, limits: Limits, stage: Stage
 ) -> Judgement:
     stage(f"searching {len(problems[0].candidates)} candidates")
-    searched = search(problems, Regression(problems[0], make_rows(*problems), settings, seed))
+    regression = Regression(problems[0], make_rows(*problems), settings, seed)
+    searched = search(problems, regression)
     stage(f"fitting {len(searched.taken)} causes")
+
+    def concluded_from(found: Shaped, laws: tuple[Law, ...] = ()) -> Judgement:
+        return _judged(found, laws, limits, seed)
+
+    judgement = concluded_from(searched)
+    if not judgement.incomplete() or not problems[0].dependences:
+        return judgement
+    stage(f"on what the remainder depends: {len(problems[0].dependences)} possibilities")
+    designs = Designs(problems, regression.rows)
+    starts = [searched, *([Shaped(problems, regression, ())] if searched.taken else [])]
+    found = [judgement, *(_with_laws(start, designs, concluded_from) for start in starts)]
+    return min((one for one in found if one is not None), key=Judgement.left_and_causes)
+
+
+def _judged(searched: Shaped, laws: tuple[Law, ...], limits: Limits, seed: int) -> Judgement:
+    """Of causes that were found, without those that the confirming records speak against."""
     found = concluded(searched.regression, searched.taken)
-    judgement = Judgement(searched.problems, searched.regression, found, limits, seed)
-    stage("trying them on the confirming records")
+    judgement = Judgement(searched.problems, searched.regression, found, limits, seed, laws)
     while (kept := judgement.worthwhile()) != found.variants:
         found = concluded(searched.regression, kept)
-        judgement = Judgement(searched.problems, searched.regression, found, limits, seed)
+        judgement = Judgement(searched.problems, searched.regression, found, limits, seed, laws)
+    return judgement
+
+
+def _with_laws(
+    start: Shaped, designs: Designs, judged: Callable[[Shaped, tuple[Law, ...]], Judgement]
+) -> Judgement | None:
+    """Laws beside what is taken, one after the other, and names beside those; None where none is found."""
+    found, judgement = start, None
+    laws: tuple[Law, ...] = ()
+    for _ in range(MOST_LAWS):
+        law = next_law(found.problems, found.regression, designs, found.taken)
+        if law is None:
+            break
+        laws = (*laws, law)
+        problems, regression, variant = with_law(found.problems, found.regression, law)
+        found = search(problems, regression, (*found.taken, variant))
+        judgement = judged(found, laws)
+        if not judgement.incomplete():
+            break
     return judgement
 
 

@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.chance import chances
 from ident.diagnosis.diagnosis import Verdict
+from ident.diagnosis.evidence import cosines
 from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.fitted import Fitted
+from ident.diagnosis.law.answer import alternatives, law_answer
+from ident.diagnosis.law.stage import Law
 from ident.diagnosis.limits import Limits
 from ident.diagnosis.probability import calibration, rank
 from ident.diagnosis.problem import Problem
@@ -29,15 +32,24 @@ class Judgement:
     """What is computed once the search has ended."""
 
     def __init__(
-        self, problems: Sequence[Problem], regression: Regression, found: Found, limits: Limits, seed: int
+        self,
+        problems: Sequence[Problem],
+        regression: Regression,
+        found: Found,
+        limits: Limits,
+        seed: int,
+        laws: Sequence[Law] = (),
     ) -> None:
         self.problems, self.regression, self.found, self.limits = problems, regression, found, limits
+        self.laws = laws
         self.rows = regression.rows
         self.fitted = Fitted(problems, regression, found, seed)
 
     def findings(self) -> Findings:
         """The answer, with all that reports show of it."""
         causes, verdict = self._causes(), self._verdict()
+        if verdict is Verdict.EFFECT and any(cause.law is not None for cause in causes):
+            verdict = Verdict.LAW
         return Findings(
             verdict=verdict,
             causes=causes,
@@ -56,6 +68,15 @@ class Judgement:
             problem=self.problems[0],
             held_out=self.fitted.held_out(),
         )
+
+    def incomplete(self) -> bool:
+        """Whether something is left beside the effects that a law may explain."""
+        return self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeating() > 1
+
+    def left_and_causes(self) -> tuple[float, int]:
+        """Part of the held-out gap that is left, to a fiftieth, and the number of causes; the less, the better."""
+        gap = self.fitted.exactly
+        return round(50 * gap.after / gap.before) / 50 if gap.before > 0 else 1.0, self.fitted.count
 
     def refuted(self) -> frozenset[str]:
         """Effects of no size of which another candidate is what comes along with them, not refuted before."""
@@ -217,18 +238,40 @@ class Judgement:
     def _cause(self, index: int, variant: int) -> Cause:
         settings = calibration()
         ranked = rank(self.regression, self.found.slots[index], variant, settings)
+        law = next((law for law in self.laws if law.number == self.regression.owners[variant]), None)
+        probability = ranked.probability if law is None else law.probability(settings.temperature)
         return Cause(
             candidate=self.fitted.candidate(index),
             part=self.fitted.after.parts[index],
             ranked=ranked,
-            probability=min(ranked.probability, settings.ceiling, self._surest()),
+            probability=min(probability, settings.ceiling, self._surest()),
             log_evidence=self._log_evidence(index),
             log_predictive=self._log_predictive(index),
             closed=self.fitted.lacking[index],
             needed=self.fitted.closed[index],
             biased=self.fitted.biased(index),
             sizeless=self._sizeless(index),
+            law=law,
+            law_answer=None if law is None else law_answer(law, self._channel(variant), self._nearest(index, variant)),
+            alternatives=() if law is None else alternatives(law, self.problems[0].dependences),
         )
+
+    def _channel(self, variant: int) -> str:
+        """Of the rows in which a variant acts."""
+        column = self.rows.layout[variant]
+        series = self.problems[0].candidates[column.candidate].variants[column.variant].columns
+        blocks = zip(self.problems[0].blocks, series, strict=True)
+        return str(next(block.channel for block, acting in blocks if acting is not None))
+
+    def _nearest(self, index: int, variant: int) -> tuple[str, float] | None:
+        """The effect of the library that can add most of what a law adds, and the cosine; None where none can."""
+        slot = self.found.slots[index]
+        cosine = cosines(slot.evidence, variant)
+        laws = {law.number for law in self.laws}
+        owners = self.regression.owners
+        named = [other for other in range(len(owners)) if owners[other] not in laws and cosine[other] > 0]
+        best = max(named, key=lambda other: float(cosine[other]), default=None)
+        return None if best is None else (self.regression.key(best), float(cosine[best]))
 
 
 def _ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.law.dependence import Dependence
 from ident.effects import EffectParameter
 
 Array = NDArray[np.float64]
@@ -181,6 +182,7 @@ class Problem:
         candidates: possible causes; the same ones, in the same order, in a problem to fit and one to confirm.
         nominal: model that is judged; None: the baseline is refitted freely.
         spreads: standard deviations, about zero, of parameters by name that no model states, judged or not.
+        dependences: on what a remainder may depend; the same ones, in the same order, in a problem to confirm.
     """
 
     names: tuple[str, ...]
@@ -189,6 +191,7 @@ class Problem:
     candidates: tuple[Candidate, ...]
     nominal: Nominal | None = None
     spreads: Mapping[str, float] = field(default_factory=dict)
+    dependences: tuple[Dependence, ...] = ()
 
     @property
     def known(self) -> Known:

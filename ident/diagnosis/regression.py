@@ -139,8 +139,11 @@ class Regression:
         return self._colour((*variants, *_one_each([*large[:most], *best[:most]], self.owners)))
 
     def _colour(self, variants: Sequence[int], order: int = ORDER) -> Whitener:
-        """Colour of what the baseline and these variants leave, fitted by turns with them."""
-        design = np.hstack([self.rows.baseline, self.columns_of(variants)])
+        return self.colour_beside(self.columns_of(variants), order)
+
+    def colour_beside(self, columns: Array, order: int = ORDER) -> Whitener:
+        """Colour of what the baseline and columns (n, k) leave, fitted by turns with them; of order 0 only levels."""
+        design = np.hstack([self.rows.baseline, columns])
         residual = self.rows.target - design @ self._level(design)
         whitener = fit_whitener(self.rows, residual, design.shape[1], order, self.repeats)
         white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))

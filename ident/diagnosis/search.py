@@ -40,8 +40,8 @@ def extended(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     grown = _grown(regression, taken)
     if grown == taken:
         return taken
-    settled = _settled(regression, grown)
-    return taken if set(settled) <= set(taken) else settled
+    revised = settled(regression, grown)
+    return taken if set(revised) <= set(taken) else revised
 
 
 def concluded(regression: Regression, taken: tuple[int, ...]) -> Found:
@@ -74,7 +74,7 @@ def _believed(slot: Slot, variant: int, settings: Settings, *, alone: bool) -> b
     return bool(large and in_both(evidence, settings)[variant])
 
 
-def _settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
+def settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     """Replace what another candidate explains better, drop what the others make superfluous, until nothing changes."""
     for _ in range(2 * len(taken)):
         changed = _revised(regression, joined(regression, taken, regression.wholes))

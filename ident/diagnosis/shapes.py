@@ -19,7 +19,7 @@ from ident.diagnosis.problem import Problem, Variant
 from ident.diagnosis.refit import Part, refit
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Column
-from ident.diagnosis.search import extended, joined
+from ident.diagnosis.search import extended, joined, settled
 from ident.diagnosis.whitening import Whitener
 
 Array = NDArray[np.float64]
@@ -46,12 +46,13 @@ class Shaped:
     taken: tuple[int, ...]
 
 
-def search(problems: Sequence[Problem], regression: Regression) -> Shaped:
+def search(problems: Sequence[Problem], regression: Regression, taken: tuple[int, ...] = ()) -> Shaped:
     """Forward in singles and pairs; every effect by its shape before the next one is looked for.
 
-    Two effects can each take the other's place once they have their shapes: the one found first stands then.
+    Two effects can each take the other's place once they have their shapes: the one found first stands then. What is
+    `taken` beforehand is given up where the others make it superfluous.
     """
-    found, seen = Shaped(tuple(problems), regression, ()), dict[frozenset[int], Shaped]()
+    found, seen = Shaped(tuple(problems), regression, settled(regression, taken)), dict[frozenset[int], Shaped]()
     for _ in range(ROUNDS):
         grown = extended(found.regression, found.taken)
         if grown == found.taken:

@@ -16,17 +16,20 @@ import casadi as ca
 
 from ident.effects import library
 from ident.effects.base import Effect, EffectKind, EffectParameter, EffectTerm, effect_of
+from ident.effects.laws import LAWS
 from ident.plant.places import members
 from ident.plant.symbolic import Expression
 
 __all__ = [
     "EFFECTS",
+    "LAWS",
     "Effect",
     "EffectKind",
     "EffectParameter",
     "EffectTerm",
     "at_single_places",
     "effect_term",
+    "kind_of",
     "make_effect",
     "symbolic_term",
     "terms_of",
@@ -43,13 +46,22 @@ EFFECTS: Final[Mapping[str, EffectKind]] = MappingProxyType(_found())
 """Every effect by its name: one for each module of `ident.effects.library`, in the order of their ranks."""
 
 
+def kind_of(name: str) -> EffectKind:
+    """What there is to know about an effect of the library, or a law without a name.
+
+    Raises:
+        KeyError: there is neither.
+    """
+    return EFFECTS[name] if name in EFFECTS else LAWS[name]
+
+
 def make_effect(name: str, where: str, values: Mapping[str, float], std: Mapping[str, float] | None = None) -> Effect:
     """An effect from SI values; parameters that are left out take their defaults.
 
     Raises:
         DataFileError: the effect cannot be there, or a parameter is unknown, missing or not finite.
     """
-    return effect_of(EFFECTS[name], where, values, std)
+    return effect_of(kind_of(name), where, values, std)
 
 
 def at_single_places(effects: Sequence[Effect]) -> list[Effect]:
@@ -59,7 +71,7 @@ def at_single_places(effects: Sequence[Effect]) -> list[Effect]:
 
 def effect_term(name: str, where: str, values: Mapping[str, Expression]) -> EffectTerm:
     """What an effect adds to the equations, from numbers or symbols."""
-    return EFFECTS[name].term(name, where, values)
+    return kind_of(name).term(name, where, values)
 
 
 def terms_of(effects: Sequence[Effect]) -> list[EffectTerm]:
@@ -72,5 +84,5 @@ def terms_of(effects: Sequence[Effect]) -> list[EffectTerm]:
 
 def symbolic_term(name: str, where: str) -> EffectTerm:
     """The same with symbols for its parameters, named `<effect>.<place>.<parameter>`."""
-    entries = EFFECTS[name].parameters
+    entries = kind_of(name).parameters
     return effect_term(name, where, {entry.name: ca.SX.sym(f"{name}.{where}.{entry.name}") for entry in entries})

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.effects import EFFECTS, Effect, make_effect
+from ident.effects import Effect, kind_of, make_effect
 
 Array = NDArray[np.float64]
 Numbers = tuple[dict[str, float], dict[str, float]]
@@ -39,7 +39,7 @@ def combined(known: Sequence[Effect], found: Sequence[Effect]) -> tuple[Effect, 
 def _are_one(known: Effect, found: Effect) -> bool:
     if (known.name, known.where) != (found.name, found.where):
         return False
-    adding = EFFECTS[known.name].sums
+    adding = kind_of(known.name).sums
     return bool(adding) and all(_agree(known, found, name) for name in known.parameters if name not in adding)
 
 
@@ -49,7 +49,7 @@ def _agree(known: Effect, found: Effect, parameter: str) -> bool:
 
 
 def _sum(known: Effect, found: Effect) -> Effect:
-    polar = EFFECTS[known.name].polar
+    polar = kind_of(known.name).polar
     values, std = _plain_sum(known, found) if polar is None else _vector_sum(known, found, *polar)
     kept = {name: known[name] for name in known.parameters}
     spread = {name: quantity.std for name, quantity in known.parameters.items()}
@@ -57,7 +57,7 @@ def _sum(known: Effect, found: Effect) -> Effect:
 
 
 def _plain_sum(known: Effect, found: Effect) -> Numbers:
-    names = EFFECTS[known.name].sums
+    names = kind_of(known.name).sums
     return {name: known[name] + found[name] for name in names}, {name: found.parameters[name].std for name in names}
 
 

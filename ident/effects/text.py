@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final
 
-from ident.effects import EFFECTS, Effect, EffectKind, make_effect
+from ident.effects import EFFECTS, LAWS, Effect, EffectKind, make_effect
 from ident.errors import DataFileError
 
 _FACTORS: Final[Mapping[str, tuple[float, str]]] = MappingProxyType(
@@ -85,7 +85,7 @@ def read_effects(document: Mapping[str, Any], source: str) -> tuple[Effect, ...]
 def _read_effect(entry: Any, source: str) -> Effect:
     table = entry if isinstance(entry, Mapping) else {}
     name, where, parameters = table.get("name"), table.get("where"), table.get("parameters")
-    kind = EFFECTS.get(name) if isinstance(name, str) else None
+    kind = (EFFECTS.get(name) or LAWS.get(name)) if isinstance(name, str) else None
     if kind is None or not isinstance(where, str) or not isinstance(parameters, Mapping):
         raise DataFileError(f"{source} has no known name, no where or no parameters.", f"Names: {', '.join(EFFECTS)}.")
     values, std = {}, {}

@@ -40,6 +40,10 @@ _OPERATIONS: Final[Mapping[int, Callable[..., Any]]] = MappingProxyType(
         ca.OP_TANH: np.tanh,
         ca.OP_FABS: np.abs,
         ca.OP_SIGN: np.sign,
+        ca.OP_FLOOR: np.floor,
+        ca.OP_LT: np.less,
+        ca.OP_NOT: np.logical_not,
+        ca.OP_IF_ELSE_ZERO: lambda condition, x: np.where(condition, x, 0.0),
         ca.OP_FMIN: np.minimum,
         ca.OP_FMAX: np.maximum,
     }

@@ -10,7 +10,7 @@ from typing import Final
 from markupsafe import Markup
 from plotly import offline
 
-from ident.diagnosis.diagnosis import Diagnosis, Verdict
+from ident.diagnosis.diagnosis import Diagnosis
 from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.vehicle.outcome import HORIZON
 from ident.report import digits
@@ -87,7 +87,7 @@ def render_gap_report(content: GapReport) -> str:
         gap_text=gap_line(findings, diagnosis),
         next=next_text(diagnosis),
         rows=[_row(cause, content) for cause in findings.causes],
-        believed=diagnosis.verdict is Verdict.EFFECT,
+        believed=diagnosis.verdict.explains,
         sizeless=[cause.candidate.key for cause in findings.causes if cause.sizeless],
         doubtful=_doubtful(findings),
         events=findings.events,

@@ -8,12 +8,14 @@ from typing import Final
 from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Share, Verdict
 from ident.diagnosis.findings import Cause, Findings
 from ident.report.digits import percent, plain, significant, unit_text, with_std
+from ident.report.law_text import law_line, law_name
 
 MOST_LINES: Final = 10
 MOST_EVENTS: Final = 3
 
 _VERDICTS: Final = {
     Verdict.EFFECT: "The model lacks {names}.",
+    Verdict.LAW: "The model lacks {names}.",
     Verdict.NONE: "Nothing is missing: what is left is noise, as far as these records can tell.",
     Verdict.UNKNOWN: "Something is missing that the library has no name for.",
 }
@@ -51,12 +53,17 @@ def verdict_line(diagnosis: Diagnosis, findings: Findings) -> str:
     """The verdict in one sentence."""
     if diagnosis.verdict is Verdict.NONE and findings.events:
         return "Nothing is missing that both drives show."
-    names = " and ".join(f"{plain(effect.name)} ({effect.where})" for effect in diagnosis.effects)
+    names = " and ".join(
+        f"{plain(effect.name)} ({effect.where})" if effect.law is None else law_name(effect.law, effect.where)
+        for effect in diagnosis.effects
+    )
     return _VERDICTS[diagnosis.verdict].format(names=names)
 
 
 def cause_line(effect: NamedEffect) -> str:
     """A cause with its probability, its numbers and its rivals."""
+    if effect.law is not None:
+        return law_line(effect, effect.law)
     numbers = ", ".join(
         f"{name} {with_std(quantity.value, quantity.std)} {unit_text(quantity.unit)}".removesuffix(" 1")
         for name, quantity in effect.parameters.items()
@@ -73,13 +80,13 @@ def gap_line(findings: Findings, diagnosis: Diagnosis) -> str:
     before = f"Gap on held-out data: {significant(gap.before)} times the noise"
     if diagnosis.verdict is Verdict.NONE:
         return f"{before}."
-    rest = "; the rest repeats, and has no name" if findings.lasting and diagnosis.verdict is Verdict.EFFECT else ""
+    rest = "; the rest repeats, and has no name" if findings.lasting and diagnosis.verdict.explains else ""
     return f"{before}, {significant(gap.after)} with the causes in the model: {percent(gap.closed)} of it closed{rest}."
 
 
 def unseen_lines(diagnosis: Diagnosis) -> list[str]:
     """The gap of whole steps that took no part, by channel: a line for those that repeat, one for a lane change."""
-    named = diagnosis.verdict is Verdict.EFFECT
+    named = diagnosis.verdict.explains
     lines = []
     for steps, title in _UNSEEN.items():
         texts = [
@@ -111,7 +118,7 @@ def next_text(diagnosis: Diagnosis) -> str:
     """What to do now."""
     if diagnosis.next_experiment:
         return diagnosis.next_experiment
-    if diagnosis.verdict is Verdict.EFFECT:
+    if diagnosis.verdict.explains:
         model = "put the causes into the model"
         written = f"{model} (--extended FILE writes it)" if diagnosis.unseen else model
         return f"{written}, and check it on another record."

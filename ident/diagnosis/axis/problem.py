@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.candidates import LONGEST_HOLD, AxisModel, axis_candidates
+from ident.diagnosis.axis.dependences import axis_dependences
 from ident.diagnosis.axis.motion import AxisMotion, with_repeats
 from ident.diagnosis.axis.reference import Reference, Scale, Signals, axis_signals, own_columns, refuse_other_axes
+from ident.diagnosis.law.dependence import Dependence, across
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant
 from ident.diagnosis.refit import Refit
@@ -44,18 +46,20 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
     refuse_other_axes(records)
     signals = [axis_signals(record, reference.cutoff, reference.bandwidth, reference.scales) for record in records]
     parts = [_of_record(one, reference) for one in signals]
-    blocks = tuple(block for blocks, _ in parts for block in blocks)
-    candidates = _joined([candidates for _, candidates in parts])
+    blocks = tuple(block for blocks, _, _ in parts for block in blocks)
+    candidates = _joined([candidates for _, candidates, _ in parts])
+    dependences = tuple(across(each) for each in zip(*(those for _, _, those in parts), strict=True))
     parameters, units = zip(*_baseline_names(records[0].axes, reference.scales), strict=True)
-    return Problem(parameters, units, blocks, candidates)
+    return Problem(parameters, units, blocks, candidates, dependences=dependences)
 
 
-def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]]]:
+def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]], list[Dependence]]:
     period = with_repeats(signals.record)
     models = [_model(signals, index, scale) for index, scale in enumerate(reference.scales)]
     baselines = _baselines(models, signals, reference.scales)
     blocks = [_block(signals, model, columns, period) for model, columns in zip(models, baselines, strict=True)]
-    return blocks, [_candidates(model, scale) for model, scale in zip(models, reference.scales, strict=True)]
+    candidates = [_candidates(model, scale) for model, scale in zip(models, reference.scales, strict=True)]
+    return blocks, candidates, [one for model in models for one in axis_dependences(model)]
 
 
 def delayed_axes(found: Refit, problem: Problem, axes: Sequence[AxisSignals], scales: Sequence[Scale]) -> list[bool]:

@@ -15,6 +15,7 @@ from ident.diagnosis.problem import Block, Channel, Nominal, Problem
 from ident.diagnosis.vehicle.candidates import candidate_of, causes_of, seen_together, slid_by_any
 from ident.diagnosis.vehicle.context import MODEL_COLUMNS, Context, fitted_parameters, make_context, table_of
 from ident.diagnosis.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
+from ident.diagnosis.vehicle.dependences import vehicle_dependences
 from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.library import TermCause
 from ident.diagnosis.vehicle.moments import apart_from_moments
@@ -77,6 +78,7 @@ def build_problem(
         candidates=tuple(seen_together(candidates, slid, sources, context)),
         nominal=_nominal(model) if model else None,
         spreads=dict.fromkeys(CREEP_NAMES, CREEP_STD),
+        dependences=tuple(vehicle_dependences(sources, context)),
     )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.diagnosis import Gap
 from ident.diagnosis.findings import Findings
+from ident.diagnosis.law.answer import law_effect
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel, Problem
 from ident.diagnosis.refit import Refit
@@ -65,10 +66,15 @@ def extended_model(
         held_out: whether the confirming rows take no part.
     """
     refit = findings.held_out.extended if held_out else findings.after
-    candidates = {cause.candidate.key: cause.candidate for cause in findings.causes}
+    causes = {cause.candidate.key: cause for cause in findings.causes}
     effects = []
     for part in refit.parts:
-        candidate = candidates[part.key]
+        cause = causes[part.key]
+        candidate = cause.candidate
+        if cause.law is not None:
+            law = law_effect(cause.law, float(part.values[0]), float(part.std[0]))
+            effects += [] if law is None else [law]
+            continue
         names = [entry.name for entry in candidate.parameters]
         values, std = (dict(zip(names, numbers.tolist(), strict=True)) for numbers in (part.values, part.std))
         effects.append(make_effect(EffectName(candidate.effect), candidate.where, values, std))

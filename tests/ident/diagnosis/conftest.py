@@ -105,6 +105,7 @@ class Machine:
         follower: friction that follows the speed of another carriage, which moves by itself [N s/m, N].
         read: part of a sample interval, of the effort being held, after which the position is read.
         spring: between carriage and frame [N/m].
+        law: force that resists beside all this [N], of time, position and velocity.
         noise, encoder: rms of the noise of the measured effort [N] and of the positions [m].
     """
 
@@ -122,6 +123,7 @@ class Machine:
     follower: tuple[float, float] = (0.0, 0.0)
     read: float = 0.5
     spring: float = 0.0
+    law: Callable[[float, float, float], float] | None = None
     noise: float = 0.2
     encoder: float = 2e-7
     rate: float = 1000.0
@@ -183,6 +185,8 @@ class Machine:
                     positions[index] = x
                 late.append(wanted)
                 force = late.popleft() - self.viscous * v - self.asymmetry * abs(v) - self.offset - self.spring * x
+                if self.law is not None:
+                    force -= self.law((index + sub / self.substeps) / self.rate, x, v)
                 if following:
                     force -= self.follower[0] * another + self.follower[1] * _sign(v + another)
                 if self.compliance:

@@ -64,9 +64,16 @@ def test_a_delay_is_named_with_all_of_its_length_beside_a_held_effort(machine: M
     assert _value(findings, "time_delay")[0] == pytest.approx(0.0015, rel=0.02)
 
 
-def test_a_spring_that_the_library_does_not_have_is_no_ripple(machine: Make) -> None:
+def test_a_spring_that_the_library_does_not_have_is_a_law_of_the_position_and_no_ripple(machine: Make) -> None:
     """Half a period of a sine of the position looks like it."""
-    assert _diagnosed(machine(spring=100.0)).verdict is Verdict.UNKNOWN
+    findings = _diagnosed(machine(spring=100.0))
+    assert findings.verdict is Verdict.LAW
+    (cause,) = findings.causes
+    assert cause.law_answer is not None
+    assert (cause.law_answer.variable, cause.law_answer.partner) == ("angle", "")
+    x, force, std = cause.law_answer.curve.T
+    assert np.gradient(force, x) == pytest.approx(100.0, rel=0.05)
+    assert std.max() < 0.05
 
 
 def test_friction_that_depends_on_direction_is_named_with_its_size(machine: Make) -> None:

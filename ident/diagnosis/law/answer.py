@@ -1,0 +1,136 @@
+"""A law as people and programs read it: its curve, a formula where a short one does as well, and its nearest name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.law.dependence import Dependence
+from ident.diagnosis.law.formula import formula_of
+from ident.diagnosis.law.stage import Law
+from ident.effects import Effect, make_effect
+from ident.effects.laws import LAWS, coefficient
+from ident.writing import json_number
+
+Array = NDArray[np.float64]
+
+POINTS: Final = 41
+"""Of a curve."""
+
+
+@dataclass(frozen=True)
+class LawAnswer:
+    """A law as it is written down.
+
+    Attributes:
+        variable: what it is a function of.
+        partner: what the function is multiplied with: `direction`, `rate`, `acceleration`; empty: nothing.
+        of: whose motion, where that is not the place's own.
+        channel: of the rows in which it was found.
+        period: after which it comes around, in `unit_x`; None where it does not.
+        unit_x, unit_y: of the variable and of the function.
+        curve: (POINTS, 3) variable, function, standard deviation.
+        formula: one that does as well as the curve; None where none that is short does.
+        nearest: effect of the library that comes nearest, with its place; None where none is near.
+        distance: share of what the law adds that the nearest effect cannot, as an rms.
+    """
+
+    variable: str
+    partner: str
+    of: str
+    channel: str
+    period: float | None
+    unit_x: str
+    unit_y: str
+    curve: Array
+    formula: str | None
+    nearest: str | None
+    distance: float | None
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values; what does not apply is null."""
+        return {
+            "variable": self.variable,
+            "with": self.partner or None,
+            "of": self.of or None,
+            "channel": self.channel,
+            "period": json_number(self.period) if self.period is not None else None,
+            "unit_x": self.unit_x,
+            "unit_y": self.unit_y,
+            "curve": [[json_number(value) for value in point] for point in self.curve.tolist()],
+            "formula": self.formula,
+            "nearest": self.nearest,
+            "distance": json_number(self.distance) if self.distance is not None else None,
+        }
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """What these records do not tell from a cause: an effect by name, or a law by variable, and where."""
+
+    name: str | None
+    variable: str | None
+    where: str
+
+    def as_json(self) -> dict[str, str]:
+        """The name or the variable, and the place."""
+        what = {"name": self.name} if self.name is not None else {"variable": self.variable or ""}
+        return {**what, "where": self.where}
+
+
+def law_answer(law: Law, channel: str, nearest: tuple[str, float] | None) -> LawAnswer:
+    """What a law says.
+
+    Args:
+        law: as it was learnt.
+        channel: of its rows.
+        nearest: key of the nearest effect of the library, and the cosine of what both add.
+    """
+    dependence, knots = law.dependence, law.learnt.knots
+    x = np.linspace(0.0, knots.period, POINTS) if knots.period else np.linspace(*knots.ends, POINTS)
+    basis = knots.basis(x)
+    y, covariance = basis @ law.learnt.whole, basis @ law.learnt.covariance @ basis.T
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return LawAnswer(
+        variable=str(dependence.variable),
+        partner=str(dependence.partner),
+        of=dependence.of,
+        channel=channel,
+        period=knots.period or None,
+        unit_x=dependence.unit_x,
+        unit_y=dependence.unit_y,
+        curve=np.stack([x, y, std], axis=1),
+        formula=formula_of(x, y, std, knots.period),
+        nearest=None if nearest is None else nearest[0],
+        distance=None if nearest is None else math.sqrt(max(1 - nearest[1] ** 2, 0.0)),
+    )
+
+
+def alternatives(law: Law, dependences: Sequence[Dependence]) -> tuple[Alternative, ...]:
+    """The laws of another variable, or elsewhere, that add the same to these records."""
+    by_key = {one.key: one for one in dependences}
+    others = [by_key[key] for key in law.same]
+    found = dict.fromkeys((str(other.variable), other.where) for other in others)
+    found.pop((str(law.dependence.variable), law.dependence.where), None)
+    return tuple(Alternative(None, variable, where) for variable, where in found)
+
+
+def law_effect(law: Law, scale: float, std: float) -> Effect | None:
+    """The law as an effect of a model; None where a model has no form for it.
+
+    Args:
+        law: as it was learnt.
+        scale, std: of it, by the refit.
+    """
+    name = "_".join(part for part in ("law", law.dependence.variable, law.dependence.partner) if part)
+    if name not in LAWS or law.dependence.where not in LAWS[name].places:
+        return None
+    knots = law.learnt.knots
+    coefficients = {coefficient(index): value for index, value in enumerate(law.learnt.weights.tolist())}
+    values = {"scale": scale, "start": knots.start, "step": knots.step, "period": knots.period}
+    return make_effect(name, law.dependence.where, values | coefficients, {"scale": std})

@@ -1,0 +1,99 @@
+"""On what a remainder may depend: a smooth function of one variable of the motion, at a place.
+
+A law adds partner(t) f(x(t)) to the rows of its place, f unknown: f(v), f(q), f(q) sign(v) for friction over position,
+f(q) a for inertia over position. A group of equals has one f, each with its own x.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.law.spline import Knots
+
+Array = NDArray[np.float64]
+Design = Callable[[Knots], Sequence[Array | None]]
+"""Knots -> columns (N, K) of every block, filtered like the block; None where the law does not act."""
+
+
+class Variable(enum.StrEnum):
+    """What a law is a function of."""
+
+    RATE = "rate"
+    DIRECTION = "direction"
+    ANGLE = "angle"
+    LOAD = "load"
+    LOAD_RATE = "load_rate"
+    LOAD_SECOND_RATE = "load_second_rate"
+    ACCELERATION = "acceleration"
+    TIME = "time"
+    TEMPERATURE = "temperature"
+    PATH_SINCE_REVERSAL = "path_since_reversal"
+    OTHER_AXIS = "other_axis"
+
+
+class Partner(enum.StrEnum):
+    """What the function is multiplied with."""
+
+    NOTHING = ""
+    DIRECTION = "direction"
+    RATE = "rate"
+    ACCELERATION = "acceleration"
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """A variable at a place, of which the rows may hold a smooth function.
+
+    Attributes:
+        where: place.
+        variable, partner: f(variable) times partner.
+        unit_x, unit_y: of the variable and of f.
+        arguments: (N, J) of every block, the variable at each of J equals; None where the law does not act.
+        design: columns of every block for some knots.
+        of: which motion, where that is not the place's own or comes around: another axis, a sum with it, a turn.
+        period: of the variable where it comes around, else 0.
+    """
+
+    where: str
+    variable: Variable
+    partner: Partner
+    unit_x: str
+    unit_y: str
+    arguments: tuple[Array | None, ...]
+    design: Design
+    of: str = ""
+    period: float = 0.0
+
+    @property
+    def effect(self) -> str:
+        """Name of the law as an effect of a model."""
+        parts = ("law", self.variable, self.of, self.partner)
+        return "_".join(str(part) for part in parts if part)
+
+    @property
+    def key(self) -> str:
+        """Unique in a problem."""
+        return f"{self.effect}@{self.where}"
+
+
+def across(parts: Sequence[Dependence]) -> Dependence:
+    """One dependence of several records, with columns in the blocks of all."""
+
+    def design(knots: Knots) -> Sequence[Array | None]:
+        return [column for part in parts for column in part.design(knots)]
+
+    return replace(parts[0], arguments=tuple(x for part in parts for x in part.arguments), design=design)
+
+
+def path_since_reversal(position: Array, velocity: Array) -> Array:
+    """Distance (N,) that a position has gone since its velocity last changed sign."""
+    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(position)))])
+    turned = np.flatnonzero(np.diff(np.sign(velocity)) != 0) + 1
+    since = np.zeros(len(position), dtype=np.int64)
+    since[turned] = turned
+    return np.asarray(gone - gone[np.maximum.accumulate(since)])

@@ -1,0 +1,242 @@
+"""How well a smooth function explains the rows: its evidence, and its curve.
+
+The function is Gaussian beside the baseline and the effects taken, whose columns are projected out; its length and size
+are those that make the fitted rows most likely (Rasmussen and Williams 2006, (5.8)), and are held for the confirming
+ones. Noise that remembers itself makes all evidence smaller by the factor by which it scatters (`evidence.scatter`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from ident.diagnosis.directions import VISIBLE
+from ident.diagnosis.evidence import scatter
+from ident.diagnosis.law.dependence import Dependence
+from ident.diagnosis.law.spline import Knots, knots_around, knots_over
+from ident.diagnosis.linear import orthonormal
+from ident.diagnosis.problem import Problem
+from ident.diagnosis.regression import Regression
+from ident.diagnosis.rows import Rows
+from ident.diagnosis.whitening import Whitener
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LENGTHS: Final = (1.0, 0.5, 0.25, 0.125, 0.07)
+"""Of a function that are tried, over the range of its variable; the last is what the knots resolve."""
+
+ROUNDING: Final = 1e-9
+"""Range of a variable, relative to its size, from which it changes."""
+
+RIDGE: Final = 1e-9
+"""Of columns of unit length, where some of them are the same."""
+
+SIZES: Final = tuple(np.logspace(0, 8, 17).tolist())
+"""Of a function that are tried: power of its best direction over that of the noise."""
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """One dependence, learnt.
+
+    Attributes:
+        index: of the dependence in its problem.
+        knots: of its function.
+        log_evidence: of the fitted rows, against no function.
+        log_predictive: what the confirming rows add to it.
+        weights: (K,) coefficients, learnt from the fitted rows alone.
+        whole: (K,) the same from all rows.
+        covariance: (K, K) of those.
+        shape: (n,) what it adds to the whitened rows beside the baseline, by all rows.
+    """
+
+    index: int
+    knots: Knots
+    log_evidence: float
+    log_predictive: float
+    weights: Array
+    whole: Array
+    covariance: Array
+    shape: Array
+
+    @property
+    def total(self) -> float:
+        """Log evidence of all rows."""
+        return self.log_evidence + self.log_predictive
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """Whitened rows with the baseline and what is taken projected out, of some rows.
+
+    Attributes:
+        basis: (n, p) orthonormal, of what is projected out.
+        residual: (n,) of the target.
+        stretch: (n,) number of the stretch of noise that a row belongs to.
+    """
+
+    basis: Array
+    residual: Array
+    stretch: NDArray[np.int64]
+
+    def without(self, columns: Array) -> Array:
+        """Columns (n, k) beside it."""
+        return np.asarray(columns - self.basis @ (self.basis.T @ columns))
+
+
+class Learner:
+    """Learns dependences beside some variants that are taken."""
+
+    def __init__(self, regression: Regression, whitener: Whitener, taken: Sequence[int]) -> None:
+        rows = regression.rows
+        self.regression, self._whitener, self.rows = regression, whitener, rows
+        design = np.column_stack([rows.target, rows.baseline, regression.columns_of(tuple(taken))])
+        white = whitener.apply(rows, design)
+        self._target, self._model = white[:, 0], white[:, 1:]
+        self.fitted = ~rows.confirming
+        self._part, self._all = self._beside(self.fitted), self._beside(np.ones(len(rows), dtype=bool))
+
+    def learn(self, index: int, design: Array, knots: Knots) -> Learnt | None:
+        """A dependence; None where the fitted rows show nothing of it.
+
+        Args:
+            index: of it in its problem.
+            design: (n, K) its columns in the rows.
+            knots: of its function.
+        """
+        white = self._whitener.apply(self.rows, design)
+        left = self._part.without(white[self.fitted])
+        span = knots.period or knots.ends[1] - knots.ends[0]
+        best = max((_fit(left, self._part, knots.prior(share * span)) for share in LENGTHS), key=lambda fit: fit.log)
+        if not best.log > 0:
+            return None
+        whole = _fit(self._all.without(white), self._all, best.prior, best.size)
+        scale = self._scale(best, whole)
+        turn = best.prior @ _beside_absorbed(white @ best.prior, self._all)
+        return Learnt(
+            index=index,
+            knots=knots,
+            log_evidence=best.log / scale,
+            log_predictive=(whole.log - best.log) / scale,
+            weights=turn @ best.mean,
+            whole=turn @ whole.mean,
+            covariance=scale * turn @ whole.covariance @ turn.T,
+            shape=whole.shape,
+        )
+
+    def _scale(self, part: _Fit, whole: _Fit) -> float:
+        """By how much the noise along the function scatters more than white noise would."""
+        pairs = ((part.shape, self._part), (whole.shape, self._all))
+        found = [
+            scatter((shape / length)[:, None], beside.residual, beside.stretch)
+            for shape, beside in pairs
+            if (length := float(np.linalg.norm(shape))) > 0
+        ]
+        return max(found, default=1.0)
+
+    def _beside(self, chosen: Mask) -> _Beside:
+        basis = orthonormal(self._model[chosen])
+        target = self._target[chosen]
+        return _Beside(basis, target - basis @ (basis.T @ target), self.regression.stretch[chosen])
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """A function of one prior beside some rows.
+
+    Attributes:
+        prior: (K, R) factor of its covariance.
+        size: power of the prior, over that of the noise.
+        log: log evidence against no function.
+        mean: (R,) coefficients in the directions of the prior.
+        covariance: (R, R) of them.
+        shape: (n,) what it adds.
+    """
+
+    prior: Array
+    size: float
+    log: float
+    mean: Array
+    covariance: Array
+    shape: Array
+
+
+def _fit(columns: Array, beside: _Beside, prior: Array, size: float | None = None) -> _Fit:
+    """The most likely size, or the one given, of a function with columns (n, K) and a prior (K, R)."""
+    design = columns @ prior
+    powers, turn = np.linalg.eigh(design.T @ design)
+    powers = np.maximum(powers, 0.0)
+    amplitudes = turn.T @ (design.T @ beside.residual)
+    largest = max(float(powers.max(initial=0.0)), np.finfo(float).tiny)
+    sizes = np.array([size]) if size is not None else np.array(SIZES) / largest
+    gains = sizes[:, None] / (1 + sizes[:, None] * powers)
+    logs = 0.5 * np.sum(gains * amplitudes**2 - np.log1p(sizes[:, None] * powers), axis=1)
+    best = int(np.argmax(logs))
+    mean = turn @ (gains[best] * amplitudes)
+    return _Fit(prior, float(sizes[best]), float(logs[best]), mean, turn * gains[best] @ turn.T, design @ mean)
+
+
+def _beside_absorbed(design: Array, beside: _Beside) -> Array:
+    """What takes the part off coefficients (R,) that the baseline absorbs: a constant, where that is the friction's.
+
+    Args:
+        design: (n, R) columns.
+        beside: the baseline.
+    """
+    whole, left = design.T @ design, beside.without(design)
+    size = np.sqrt(np.maximum(np.diag(whole), np.finfo(float).tiny))
+    scaled = whole / np.outer(size, size) + RIDGE * np.eye(len(whole))
+    shares, turn = linalg.eigh(left.T @ left / np.outer(size, size), scaled)
+    absorbed = turn[:, shares < VISIBLE**2] / size[:, None]
+    # Orthonormal in the metric of the whole columns: what is taken off is what these rows cannot tell.
+    return np.asarray(np.eye(len(whole)) - absorbed @ absorbed.T @ whole)
+
+
+class Designs:
+    """Columns of every dependence in the rows of some problems, made once.
+
+    Args:
+        problems: to fit and to confirm.
+        rows: of them; those of the same problems with more candidates are the same.
+    """
+
+    def __init__(self, problems: Sequence[Problem], rows: Rows) -> None:
+        self._rows, self._problems = rows, problems
+        self._knots: dict[int, Knots | None] = {}
+        self._columns: dict[int, Array] = {}
+
+    def knots(self, index: int) -> Knots | None:
+        """Of the function of a dependence; None where its variable hardly changes in the rows."""
+        if index not in self._knots:
+            self._knots[index] = _knots_of(self._parts(index), [kept.samples.ravel() for _, kept in self._rows.blocks])
+        return self._knots[index]
+
+    def columns(self, index: int) -> Array:
+        """(n, K) of a dependence that has knots."""
+        if index not in self._columns:
+            knots = self.knots(index)
+            assert knots is not None
+            series = [column for part in self._parts(index) for column in part.design(knots)]
+            self._columns[index] = self._rows.stack(series, len(knots.places))
+        return self._columns[index]
+
+    def _parts(self, index: int) -> list[Dependence]:
+        return [problem.dependences[index] for problem in self._problems]
+
+
+def _knots_of(parts: Sequence[Dependence], samples: Sequence[NDArray[np.int64]]) -> Knots | None:
+    """Knots over the range that the variable has in the rows used; None where it has none."""
+    if parts[0].period:
+        return knots_around(parts[0].period)
+    arguments = [argument for part in parts for argument in part.arguments]
+    used = [x[chosen] for x, chosen in zip(arguments, samples, strict=True) if x is not None and chosen.size]
+    if not used:
+        return None
+    low, high = min(float(x.min()) for x in used), max(float(x.max()) for x in used)
+    return knots_over(low, high) if high - low > ROUNDING * max(abs(low), abs(high)) else None

@@ -1,0 +1,163 @@
+"""On what the remainder of the vehicle may depend: the motion and the load of its joints, one by one and all equals.
+
+A torque f at a joint j stands in the generalized rows as H_k(α)ᵀ e_j f, as friction does in (14).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.law.dependence import Dependence, Partner, Variable, path_since_reversal
+from ident.diagnosis.law.spline import Knots
+from ident.diagnosis.problem import Channel
+from ident.diagnosis.vehicle.context import Context
+from ident.diagnosis.vehicle.inputs import SLICES
+from ident.diagnosis.vehicle.sources import Source
+from ident.plant import kinematics
+from ident.plant.kinematics import GENERALIZED_VELOCITIES
+from ident.plant.places import STEERING, WHEEL_PLACES, rows_of
+from ident.vehicle.geometry import WHEELS
+from ident.vehicle.parameters import COULOMB_EPSILON
+
+Array = NDArray[np.float64]
+
+JOINTS: Final = (*STEERING, "steering", *WHEEL_PLACES, "wheels")
+
+FIRST_JOINT: Final = 3
+"""Row of q of the first joint; the six joints are the two steering axes and the four wheels."""
+
+
+@dataclass(frozen=True)
+class _Law:
+    """A variable of joints, and what the function of it is multiplied with.
+
+    Attributes:
+        variable, partner: which.
+        unit: of the variable.
+        places: where it is tried.
+        turn: of what it comes around with, `wheel` or `motor`; empty where it does not.
+    """
+
+    variable: Variable
+    partner: Partner
+    unit: str
+    places: tuple[str, ...]
+    turn: str = ""
+
+
+_WHEELS: Final = (*WHEEL_PLACES, "wheels")
+_UNITS: Final = {
+    Partner.NOTHING: "Nm",
+    Partner.DIRECTION: "Nm",
+    Partner.RATE: "Nm s/rad",
+    Partner.ACCELERATION: "kg m^2",
+}
+_STEERING: Final = (*STEERING, "steering")
+_LAWS: Final = (
+    _Law(Variable.RATE, Partner.NOTHING, "rad/s", JOINTS),
+    *(_Law(Variable.ANGLE, partner, "rad", _STEERING) for partner in Partner),
+    *(_Law(Variable.ANGLE, Partner.NOTHING, "rad", _WHEELS, turn) for turn in ("wheel", "motor")),
+    *(_Law(Variable.ANGLE, Partner.DIRECTION, "rad", _WHEELS, turn) for turn in ("wheel",)),
+    _Law(Variable.PATH_SINCE_REVERSAL, Partner.DIRECTION, "rad", JOINTS),
+)
+
+
+def vehicle_dependences(sources: Sequence[Source], context: Context) -> list[Dependence]:
+    """Every variable that is tried for the joints of the vehicle, with what the function is multiplied with."""
+    levers = [_levers(source, context) for source in sources]
+    return [_dependence(law, where, sources, levers, context) for law in _LAWS for where in law.places]
+
+
+def _dependence(
+    law: _Law, where: str, sources: Sequence[Source], levers: Sequence[Array | None], context: Context
+) -> Dependence:
+    joints = [row - FIRST_JOINT for row in rows_of(where)]
+
+    def design(knots: Knots) -> Sequence[Array | None]:
+        found: list[Array | None] = []
+        for source, lever in zip(sources, levers, strict=True):
+            if lever is None:
+                found += [None] * len(source.coordinates)
+                continue
+            inputs = context.inputs(source)
+            columns = sum(
+                (_partner(inputs, joint, law.partner) * lever[:, joint].T)[:, :, None]
+                * knots.basis(_variable(inputs, joint, law))[None]
+                for joint in joints
+            )
+            filtered = context.filtered(np.moveaxis(np.asarray(columns), 0, 1), source)
+            found += [column if column.any() else None for column in np.moveaxis(filtered, 1, 0)]
+        return found
+
+    arguments: list[Array | None] = []
+    for source, lever in zip(sources, levers, strict=True):
+        if lever is None:
+            arguments += [None] * len(source.coordinates)
+            continue
+        inputs = context.inputs(source)
+        x = np.stack([_variable(inputs, joint, law)[:: source.factor] for joint in joints], axis=1)
+        acts = [bool(lever[:, joints, row].any()) for row in range(len(source.coordinates))]
+        arguments += [x if one else None for one in acts]
+    turn = {"": 0.0, "wheel": 2 * math.pi, "motor": 2 * math.pi / context.geometry.gear_ratio}[law.turn]
+    return Dependence(
+        where=where,
+        variable=law.variable,
+        partner=law.partner,
+        unit_x=law.unit,
+        unit_y=_UNITS[law.partner],
+        arguments=tuple(arguments),
+        design=design,
+        of=law.turn,
+        period=turn,
+    )
+
+
+def _levers(source: Source, context: Context) -> Array | None:
+    """What a torque at each of the six joints is in the rows of a source, (M, 6, rows); None where it is nothing."""
+    if source.channel is not Channel.DYNAMIC or source.own is not None:
+        return None
+    inputs, spec = context.inputs(source), source.spec
+    if spec.mode is None:
+        found = np.zeros((len(inputs), 6, len(source.coordinates)))
+        for row, name in enumerate(source.coordinates):
+            found[:, 2 + WHEELS.index(name.removeprefix("beta_")), row] = 1.0
+        return found
+    names = GENERALIZED_VELOCITIES[spec.mode]
+    columns = [names.index(name) for name in source.coordinates]
+    complement = kinematics.complement(spec.mode, inputs[:, SLICES["alpha"]], context.geometry)
+    return np.asarray(complement[:, FIRST_JOINT:][:, :, columns])
+
+
+def _joint(inputs: Array, joint: int, steering: str, wheel: str) -> Array:
+    """A signal (M,) of a joint."""
+    name, index = (steering, joint) if joint < 2 else (wheel, joint - 2)
+    return inputs[:, SLICES[name].start + index]
+
+
+def _variable(inputs: Array, joint: int, law: _Law) -> Array:
+    rate = _joint(inputs, joint, "alpha_rate", "beta_rate")
+    match law.variable:
+        case Variable.RATE:
+            return rate
+        case Variable.PATH_SINCE_REVERSAL:
+            return path_since_reversal(_joint(inputs, joint, "alpha", "beta"), rate)
+        case _:
+            return _joint(inputs, joint, "alpha", "beta")
+
+
+def _partner(inputs: Array, joint: int, partner: Partner) -> Array | float:
+    match partner:
+        case Partner.DIRECTION:
+            return np.tanh(_joint(inputs, joint, "alpha_rate", "beta_rate") / COULOMB_EPSILON)
+        case Partner.RATE:
+            return _joint(inputs, joint, "alpha_rate", "beta_rate")
+        case Partner.ACCELERATION:
+            return _joint(inputs, joint, "alpha_acceleration", "beta_acceleration")
+        case _:
+            return 1.0

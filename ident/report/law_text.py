@@ -1,0 +1,61 @@
+"""A law without a name, in words."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from ident.diagnosis.diagnosis import NamedEffect
+from ident.diagnosis.law.answer import LawAnswer
+from ident.report.digits import percent, plain, significant, unit_text
+
+_FORCES: Final = MappingProxyType(
+    {
+        "": "a force that depends on {x}",
+        "direction": "friction that depends on {x}",
+        "rate": "viscous friction that depends on {x}",
+        "acceleration": "inertia that depends on {x}",
+    }
+)
+
+_VARIABLES: Final = MappingProxyType(
+    {
+        "rate": "the speed",
+        "angle": "the position",
+        "load": "the load",
+        "load_rate": "the rate of the load",
+        "load_second_rate": "the second derivative of the load",
+        "acceleration": "the acceleration",
+        "time": "time",
+        "temperature": "the temperature",
+        "path_since_reversal": "the path since a reversal",
+        "other_axis": "another axis",
+    }
+)
+
+
+def law_name(law: LawAnswer, where: str) -> str:
+    """What it is and where, as part of a sentence."""
+    return f"{_FORCES[law.partner].format(x=variable_text(law))} ({where})"
+
+
+def variable_text(law: LawAnswer) -> str:
+    """What it depends on."""
+    text = _VARIABLES[law.variable]
+    return f"{text} ({plain(law.of)})" if law.of else text
+
+
+def law_line(effect: NamedEffect, law: LawAnswer) -> str:
+    """A law as a line under the verdict: how large, as what formula, what it closes, what else it may be."""
+    y, std = law.curve[:, 1], law.curve[:, 2]
+    swing = f"from {significant(float(y.min()))} to {significant(float(y.max()))} {unit_text(law.unit_y)}"
+    formula = f", {law.formula} of x = {variable_text(law)}" if law.formula else ""
+    sure = f" (± {significant(float(np.median(std)))})"
+    others = ", ".join(f"{other.variable or other.name}@{other.where}" for other in effect.alternatives)
+    other = f"; might as well be {others}" if others else ""
+    near = "" if law.nearest is None else f"; nearest name {law.nearest}, which misses {percent(law.distance or 0.0)}"
+    closes = percent(effect.gap_closed_held_out)
+    head = f"  {effect.probability:.0%} law@{effect.where}: {swing}{sure} over {variable_text(law)}{formula}"
+    return f"{head}; closes {closes} of the gap{other}{near}"
