@@ -13,12 +13,13 @@ from emulator.as_built import AsBuilt
 from emulator.effects import library
 from emulator.effects.base import Injector, Placed, Unlibraried, Wanted
 from emulator.effects.injection import Injection
+from emulator.effects.measured import MEASURED
 from emulator.effects.places import each, wheels_of
 from emulator.effects.transmissions import MOTOR_SHARE
 from emulator.prototype import Prototype
 from ident.errors import UserError
 
-__all__ = ["INJECTORS", "Injector", "Unlibraried", "Wanted", "inject"]
+__all__ = ["INJECTORS", "MEASURED", "Injector", "Unlibraried", "Wanted", "inject", "injector_of"]
 
 
 def _found() -> dict[str, Injector]:
@@ -29,6 +30,11 @@ def _found() -> dict[str, Injector]:
 
 INJECTORS: Final[Mapping[str, Injector]] = MappingProxyType(_found())
 """Every effect by its name: one for each module of `emulator.effects.library`."""
+
+
+def injector_of(name: str) -> Injector | None:
+    """Of an effect of the library, or of a law without a name; None where there is neither."""
+    return INJECTORS.get(name) or MEASURED.get(name)
 
 
 def inject(prototype: Prototype, effects: Sequence[Wanted], step: float) -> Injection:
@@ -47,16 +53,21 @@ def inject(prototype: Prototype, effects: Sequence[Wanted], step: float) -> Inje
         _refuse_strange(effect)
     _refuse_twice(effects)
     injection = Injection(AsBuilt.of(prototype), step)
-    for effect in sorted(effects, key=lambda effect: not INJECTORS[effect.name].first):
+    for effect in sorted(effects, key=lambda effect: not _known(effect).first):
         for where in each(effect.where):
-            injection = INJECTORS[effect.name].inject(injection, Placed(effect, where))
+            injection = _known(effect).inject(injection, Placed(effect, where))
     return _without_motor_inertia(injection)
 
 
-def _refuse_strange(effect: Wanted) -> None:
-    known = INJECTORS.get(effect.name)
+def _known(effect: Wanted) -> Injector:
+    known = injector_of(effect.name)
     if known is None:
         raise UserError(f"{effect}: the emulator has no such effect.", f"It has: {', '.join(sorted(INJECTORS))}.")
+    return known
+
+
+def _refuse_strange(effect: Wanted) -> None:
+    known = _known(effect)
     if effect.where not in known.places:
         raise UserError(f"{effect}: it cannot be there.", f"Places of {known.name}: {', '.join(known.places)}.")
 
@@ -84,7 +95,7 @@ def _refuse_twice(effects: Sequence[Wanted]) -> None:
 
 def _overlap(effect: Wanted, other: Wanted) -> bool:
     """The same place; or the same wheel, where one would replace the other."""
-    if not INJECTORS[effect.name].exclusive:
+    if not _known(effect).exclusive:
         return effect.where == other.where
     here, there = ({wheel for where in each(one.where) for wheel in wheels_of(where)} for one in (effect, other))
     return bool(here & there)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Sequence
 
-from ident.effects import EFFECTS, Effect
+from ident.effects import EFFECTS, LAWS, Effect
 from ident.errors import UserError
 from ident.plant.places import ALL_WHEELS, GROUPS
 
@@ -54,7 +54,7 @@ def refuse_strangers(effects: Sequence[Effect]) -> None:
     Raises:
         UserError: with the first of them.
     """
-    known = set(EffectName)
+    known = {*EffectName, *(name for name, kind in LAWS.items() if not kind.takes_time)}
     for effect in effects:
         if effect.name not in known:
             raise UserError(

@@ -149,6 +149,11 @@ class EffectKind:
         """The parameter that says how large the effect is."""
         return self.parameters[0]
 
+    @property
+    def takes_time(self) -> bool:
+        """Whether it depends on the time since the start of the campaign."""
+        return self.term(self.name, self.places[0], self.neutral()).takes_time
+
     def unit(self, parameter: str, where: str) -> str:
         """Unit of a parameter at a place."""
         if parameter == self.size.name and where in self.units_at:
