@@ -44,7 +44,8 @@ class Fitted:
         self.after, self.before = self._refit(found.variants), self._refit(())
         left = self.rows.target - self.rows.stack(list(self.after.blocks)) - self.rest.prediction
         self.floors = noise_floors(self.rows, self.after.blocks, left)
-        self.untouched = self._held_out_models(())
+        self._plain = self._held_out_models(())
+        self.untouched = self._drifting(self._plain)
 
     @property
     def count(self) -> int:
@@ -168,7 +169,30 @@ class Fitted:
 
     @property
     def _extended_models(self) -> Sequence[Array]:
-        return self._extended.blocks if self.found.variants else self.untouched
+        return self._extended.blocks if self.found.variants else self._plain
+
+    @cached_property
+    def closed_by_drift(self) -> float:
+        """Share of the removable held-out gap that what follows time closes, the other effects given."""
+        without = held_out_gap(self.rows, self.floors, self.untouched, self._drifting(self._extended_models))
+        removable = self.exactly.before**2 - self.exactly.floor**2
+        return (without.after**2 - self.exactly.after**2) / removable if removable > 0 else 0.0
+
+    def _drifting(self, models: Sequence[Array]) -> Sequence[Array]:
+        """Models of all blocks that say nothing of a drift that was taken off the targets, parameters refitted."""
+        drifts = [block.drift for block, _ in self.rows.blocks]
+        if all(drift is None for drift in drifts):
+            return models
+        absorbed = np.zeros(self.rows.baseline.shape[1])
+        if not self._is_given:
+            fitted = ~self.rows.confirming
+            pair = np.column_stack([self.rows.baseline, self.rows.stack(drifts)])
+            white = self._weights.apply(self.rows, pair)[fitted]
+            absorbed = least_squares(white[:, :-1], white[:, -1])
+        return [
+            model + block.baseline @ absorbed - (0.0 if block.drift is None else block.drift)
+            for (block, _), model in zip(self.rows.blocks, models, strict=True)
+        ]
 
 
 def _weights(regression: Regression, found: Found) -> Whitener:

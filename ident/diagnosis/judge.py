@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judgement import Judgement
+from ident.diagnosis.law.drift import time_law, without_drift, without_time
 from ident.diagnosis.law.learning import Designs
 from ident.diagnosis.law.stage import Law, next_law, with_law
 from ident.diagnosis.limits import Limits
@@ -46,13 +47,29 @@ def judge(
     settings, limits = settings or Settings(), limits or Limits()
     # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
+        stage("what follows time")
+        drift = time_law((fit, confirm), settings, seed)
+        averaged = [replace(problem, dependences=without_time(problem)) for problem in (fit, confirm)]
+        if drift is not None:
+            problems = (without_drift(fit, drift), without_drift(confirm, drift))
+            judgement = _unrefuted(problems, seed, settings, limits, stage)
+            if judgement.fitted.closed_by_drift > limits.law:
+                return judgement.findings(drift)
+        return _unrefuted((averaged[0], averaged[1]), seed, settings, limits, stage).findings()
+
+
+def _unrefuted(
+    problems: tuple[Problem, Problem], seed: int, settings: Settings, limits: Limits, stage: Stage
+) -> Judgement:
+    """Judged again and again without the candidates that the records speak against."""
+    fit, confirm = problems
+    judgement = _judged_once((fit, confirm), seed, settings, limits, stage)
+    while refuted := judgement.refuted():
+        stage(f"again without {', '.join(sorted(refuted))}")
+        fit, confirm = (_without(problem, refuted) for problem in (fit, confirm))
         judgement = _judged_once((fit, confirm), seed, settings, limits, stage)
-        while refuted := judgement.refuted():
-            stage(f"again without {', '.join(sorted(refuted))}")
-            fit, confirm = (_without(problem, refuted) for problem in (fit, confirm))
-            judgement = _judged_once((fit, confirm), seed, settings, limits, stage)
-        stage("numbers of the answer")
-        return judgement.findings()
+    stage("numbers of the answer")
+    return judgement
 
 
 def _judged_once(

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.chance import chances
 from ident.diagnosis.diagnosis import Verdict
-from ident.diagnosis.evidence import cosines
 from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.fitted import Fitted
-from ident.diagnosis.law.answer import alternatives, law_answer
+from ident.diagnosis.law.answer import LawAnswer, alternatives, law_answer
+from ident.diagnosis.law.drift import drift_cause
+from ident.diagnosis.law.neighbours import channel_of, nearest_name
 from ident.diagnosis.law.stage import Law
 from ident.diagnosis.limits import Limits
 from ident.diagnosis.probability import calibration, rank
@@ -45,10 +46,11 @@ class Judgement:
         self.rows = regression.rows
         self.fitted = Fitted(problems, regression, found, seed)
 
-    def findings(self) -> Findings:
-        """The answer, with all that reports show of it."""
-        causes, verdict = self._causes(), self._verdict()
-        if verdict is Verdict.EFFECT and any(cause.law is not None for cause in causes):
+    def findings(self, drift: Law | None = None) -> Findings:
+        """The answer, with all that reports show of it; beside a drift that was taken off before."""
+        drifting = () if drift is None else (drift_cause(drift, self.fitted.closed_by_drift, calibration()),)
+        causes, verdict = (*self._causes(), *drifting), self._verdict()
+        if any(cause.law is not None for cause in causes) and (verdict is not Verdict.UNKNOWN):
             verdict = Verdict.LAW
         return Findings(
             verdict=verdict,
@@ -92,6 +94,9 @@ class Judgement:
         refuted = [index for index in widened if self._measurable() or self._log_predictive(index) < self.limits.sure]
         if refuted:
             return self.fitted.others(min(refuted, key=lambda index: closed[index]))
+        bent = [index for index in range(self.fitted.count) if self._law(index) and closed[index] < self.limits.law]
+        if bent:
+            return self.fitted.others(min(bent, key=lambda index: closed[index]))
         if self.fitted.count < 2:
             return variants
         for index in range(self.fitted.count):
@@ -103,6 +108,11 @@ class Judgement:
         trifle = self.limits.trifle * self.fitted.whole.floor**2 / max(self.fitted.removable, np.finfo(float).tiny)
         needed = max(trifle, self.limits.share * self.fitted.left)
         return self.fitted.others(least) if minor and closed[least] < needed else variants
+
+    def _law(self, index: int) -> Law | None:
+        """The law that a cause is, if it is one."""
+        owner = self.regression.owners[self.found.variants[index]]
+        return next((law for law in self.laws if law.number == owner), None)
 
     def _log_evidence(self, index: int) -> float:
         return float(self.found.slots[index].evidence.log_evidence[self.found.variants[index]])
@@ -238,7 +248,7 @@ class Judgement:
     def _cause(self, index: int, variant: int) -> Cause:
         settings = calibration()
         ranked = rank(self.regression, self.found.slots[index], variant, settings)
-        law = next((law for law in self.laws if law.number == self.regression.owners[variant]), None)
+        law = self._law(index)
         probability = ranked.probability if law is None else law.probability(settings.temperature)
         return Cause(
             candidate=self.fitted.candidate(index),
@@ -252,26 +262,13 @@ class Judgement:
             biased=self.fitted.biased(index),
             sizeless=self._sizeless(index),
             law=law,
-            law_answer=None if law is None else law_answer(law, self._channel(variant), self._nearest(index, variant)),
+            law_answer=None if law is None else self._law_answer(law, index, variant),
             alternatives=() if law is None else alternatives(law, self.problems[0].dependences),
         )
 
-    def _channel(self, variant: int) -> str:
-        """Of the rows in which a variant acts."""
-        column = self.rows.layout[variant]
-        series = self.problems[0].candidates[column.candidate].variants[column.variant].columns
-        blocks = zip(self.problems[0].blocks, series, strict=True)
-        return str(next(block.channel for block, acting in blocks if acting is not None))
-
-    def _nearest(self, index: int, variant: int) -> tuple[str, float] | None:
-        """The effect of the library that can add most of what a law adds, and the cosine; None where none can."""
-        slot = self.found.slots[index]
-        cosine = cosines(slot.evidence, variant)
-        laws = {law.number for law in self.laws}
-        owners = self.regression.owners
-        named = [other for other in range(len(owners)) if owners[other] not in laws and cosine[other] > 0]
-        best = max(named, key=lambda other: float(cosine[other]), default=None)
-        return None if best is None else (self.regression.key(best), float(cosine[best]))
+    def _law_answer(self, law: Law, index: int, variant: int) -> LawAnswer:
+        nearest = nearest_name(self.regression, self.found.slots[index], variant, {law.number for law in self.laws})
+        return law_answer(law, channel_of(self.problems[0], self.rows.layout[variant]), nearest)
 
 
 def _ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:

@@ -26,6 +26,7 @@ class Limits:
         widening: share of the held-out gap by which an effect may seem to widen it.
         most: share of the held-out gap that all effects must close where nothing repeats.
         measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.
+        law: share of the held-out gap that a law must close: a curve bends to what is left of any other cause.
         sure: log Bayes factor of the confirming rows from which an effect stands although it seems to, by accident.
         minor: log evidence over that of the strongest effect above which one counts that closes less.
         share: of the gap that is left, which an effect must close to count all the same.
@@ -53,6 +54,7 @@ class Limits:
     widening: float = 0.1
     most: float = 0.5
     measurable: float = 0.05
+    law: float = 0.1
     sure: float = 2.5
     minor: float = 0.05
     share: float = 0.1

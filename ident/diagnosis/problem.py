@@ -53,6 +53,7 @@ class Block:
         features: (N, f) states that an unknown cause might depend on (speeds, angles, accelerations); any scale.
         tolerance: rms up to which a gap means nothing, however well it repeats, in the unit of the target.
         irregular: (N,) part of the target that may differ between repeats and is no noise; None: nothing.
+        drift: (N,) what follows time, taken off the target; None: nothing.
     """
 
     record: str
@@ -70,6 +71,7 @@ class Block:
     features: Array | None = None
     tolerance: float = 0.0
     irregular: Array | None = None
+    drift: Array | None = None
 
     @property
     def regular(self) -> Array:

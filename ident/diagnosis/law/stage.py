@@ -23,6 +23,9 @@ from ident.effects import EffectParameter
 
 Array = NDArray[np.float64]
 
+SCALE: Final = EffectParameter("scale", "1", "of the law as it was learnt")
+"""The one number that a law has in a refit."""
+
 SAME: Final = 0.98
 """Cosine of what two laws add to the rows, above which these records do not tell them apart."""
 
@@ -89,14 +92,13 @@ def with_law(
     problems: Sequence[Problem], regression: Regression, law: Law
 ) -> tuple[tuple[Problem, ...], Regression, int]:
     """The problems and their rows with the law as one more candidate, and the number of its variant."""
-    parameter = EffectParameter("scale", "1", "of the law as it was learnt")
     changed: list[Problem] = []
     series: list[Array | None] = []
     for problem in problems:
         design = problem.dependences[law.learnt.index].design(law.learnt.knots)
         columns = tuple(None if one is None else (one @ law.learnt.weights)[:, None] for one in design)
         series += columns
-        candidate = Candidate(law.dependence.effect, law.dependence.where, (parameter,), (Variant(columns),), least=0.0)
+        candidate = Candidate(law.dependence.effect, law.dependence.where, (SCALE,), (Variant(columns),), least=0.0)
         changed.append(replace(problem, candidates=(*problem.candidates, candidate)))
     rows = regression.rows
     end = rows.columns.shape[1]

@@ -78,6 +78,9 @@ def extended_model(
         names = [entry.name for entry in candidate.parameters]
         values, std = (dict(zip(names, numbers.tolist(), strict=True)) for numbers in (part.values, part.std))
         effects.append(make_effect(EffectName(candidate.effect), candidate.where, values, std))
+    fitted = {part.key for part in refit.parts}
+    drifts = [cause.law for cause in findings.causes if cause.law is not None and cause.candidate.key not in fitted]
+    effects += [law for drift in drifts if (law := law_effect(drift, 1.0, 0.0)) is not None]
     return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), combined(given, effects))
 
 

@@ -65,6 +65,7 @@ _LAWS: Final = (
     *(_Law(Variable.ANGLE, Partner.NOTHING, "rad", _WHEELS, turn) for turn in ("wheel", "motor")),
     *(_Law(Variable.ANGLE, Partner.DIRECTION, "rad", _WHEELS, turn) for turn in ("wheel",)),
     _Law(Variable.PATH_SINCE_REVERSAL, Partner.DIRECTION, "rad", JOINTS),
+    _Law(Variable.TIME, Partner.DIRECTION, "s", JOINTS),
 )
 
 
@@ -88,7 +89,7 @@ def _dependence(
             inputs = context.inputs(source)
             columns = sum(
                 (_partner(inputs, joint, law.partner) * lever[:, joint].T)[:, :, None]
-                * knots.basis(_variable(inputs, joint, law))[None]
+                * knots.basis(_variable(inputs, joint, law, source.time))[None]
                 for joint in joints
             )
             filtered = context.filtered(np.moveaxis(np.asarray(columns), 0, 1), source)
@@ -101,7 +102,7 @@ def _dependence(
             arguments += [None] * len(source.coordinates)
             continue
         inputs = context.inputs(source)
-        x = np.stack([_variable(inputs, joint, law)[:: source.factor] for joint in joints], axis=1)
+        x = np.stack([_variable(inputs, joint, law, source.time)[:: source.factor] for joint in joints], axis=1)
         acts = [bool(lever[:, joints, row].any()) for row in range(len(source.coordinates))]
         arguments += [x if one else None for one in acts]
     turn = {"": 0.0, "wheel": 2 * math.pi, "motor": 2 * math.pi / context.geometry.gear_ratio}[law.turn]
@@ -140,11 +141,13 @@ def _joint(inputs: Array, joint: int, steering: str, wheel: str) -> Array:
     return inputs[:, SLICES[name].start + index]
 
 
-def _variable(inputs: Array, joint: int, law: _Law) -> Array:
+def _variable(inputs: Array, joint: int, law: _Law, time: Array) -> Array:
     rate = _joint(inputs, joint, "alpha_rate", "beta_rate")
     match law.variable:
         case Variable.RATE:
             return rate
+        case Variable.TIME:
+            return time
         case Variable.PATH_SINCE_REVERSAL:
             return path_since_reversal(_joint(inputs, joint, "alpha", "beta"), rate)
         case _:

@@ -53,6 +53,7 @@ class Source:
         moving: rows to be used (M,), a mask for each of its coordinates.
         period: (M,).
         record: for messages.
+        time: (M,) since the record began [s].
         rattles: (M, 4) where the motor of each wheel rattles in its gear.
         own: its rows, if they are those of what is loose, instead of what rolls.
     """
@@ -66,6 +67,7 @@ class Source:
     moving: tuple[NDArray[np.bool_], ...]
     period: NDArray[np.int64]
     record: str
+    time: Array
     rattles: NDArray[np.bool_]
     own: rows.OwnRows | None = None
 
@@ -164,6 +166,7 @@ def _sources(
         "factor": factor // stride,
         "period": segment.period[::stride],
         "record": signals.record,
+        "time": segment.time[::stride],
         "rattles": loose.rattles[::stride],
     }
     dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)

@@ -135,3 +135,24 @@ def _torque(name: str, values: dict[str, float], coefficients: np.ndarray[Any, A
         return float(function([angle, 0.0], [0, 0, 0, rate, 0, 0, 0, 0, 0]))
 
     return at
+
+
+def test_friction_that_warms_up_is_a_law_of_time_and_no_noise(machine: Make) -> None:
+    """Repeats differ by it, and what differs between repeats was noise by definition once."""
+    warming = {"law": lambda t, _x, v: -3.2 * (1 - math.exp(-t / 6)) * _sign(v)}
+    findings = diagnose_axis([machine(**warming).drive(11)], [machine(**warming).drive(12)], seed=1)
+    assert findings.verdict is Verdict.LAW
+    (cause,) = findings.causes
+    assert cause.law_answer is not None
+    assert (cause.law_answer.variable, cause.law_answer.partner) == ("time", "direction")
+    assert cause.closed > 0.95
+    time, friction, _ = cause.law_answer.curve.T
+    expected = -3.2 * (1 - np.exp(-time / 6))
+    assert friction - friction.mean() == pytest.approx(expected - expected.mean(), abs=0.1)
+
+
+def test_slow_noise_of_the_effort_is_no_law_of_time(machine: Make) -> None:
+    for seed in (21, 31, 41):
+        plain = machine()
+        records = [plain.drive(seed), plain.drive(seed + 1)]
+        assert diagnose_axis(records[:1], records[1:], seed=1).verdict is Verdict.NONE
