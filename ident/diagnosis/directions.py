@@ -63,7 +63,8 @@ class Directions:
     Attributes:
         basis: (n, D).
         places: of every variant in the basis; empty where the baseline absorbs it.
-        least, negligible: (D,) amplitudes, and sizes of them, below which a direction counts nothing.
+        least: (D,) amplitudes below which a direction counts nothing.
+        negligible: (D, 2) the same as sizes, of negative and of positive ones.
         bounded: variants of several columns whose coefficients have a least value.
         residual: (n,) target minus its projection on the baseline.
         volume: log of the determinant of each variant's columns beside the baseline.
@@ -84,7 +85,8 @@ class Directions:
 
     def possible(self, amplitudes: Array) -> Mask:
         """Which amplitudes (..., D) are as large as they must be."""
-        found = (amplitudes >= self.least) & (np.abs(amplitudes) >= self.negligible)
+        limit = np.where(amplitudes < 0, self.negligible[:, 0], self.negligible[:, 1])
+        found = (amplitudes >= self.least) & (np.abs(amplitudes) >= limit)
         for several in self.bounded:
             coefficients = amplitudes[..., several.place] @ several.turn.T
             found[..., several.place] &= np.all(coefficients >= several.least, axis=-1, keepdims=True)
@@ -111,7 +113,7 @@ def directions(white: White, layout: Sequence[Column], rows: Mask | None = None)
     left = columns - base @ (base.T @ columns)
     full = np.linalg.norm(white.columns, axis=0)
     parts, places, volumes, end = [np.zeros((len(target), 0))], [], [], 0
-    bounds: list[tuple[float, float]] = []
+    bounds: list[tuple[float, ...]] = []
     bounded: list[Bounded] = []
     for column in layout:
         scale = np.where(full[column.place] > 0, full[column.place], 1.0)
@@ -121,12 +123,13 @@ def directions(white: White, layout: Sequence[Column], rows: Mask | None = None)
         length = float(vectors[:, 0] @ left[:, column.place.start]) if single else 1.0
         parts.append(vectors[:, :count] * np.sign(length))
         least = column.least if single else -math.inf
-        bounds += [(least * abs(length), column.negligible * abs(length))] * count
+        bounds += [(least * abs(length), *(size * abs(length) for size in column.negligible))] * count
         places.append(slice(end, end + count))
         if count and not single and math.isfinite(column.least):
             coefficients = (turn[:count].T / singular[:count]) / scale[:, None]
             bounded.append(Bounded(len(places) - 1, places[-1], coefficients, column.least))
         volumes.append(2 * float(np.sum(np.log(np.maximum(singular, VISIBLE)))))
         end += count
-    low, small = np.array(bounds).reshape(-1, 2).T
+    limits = np.array(bounds).reshape(-1, 3)
+    low, small = limits[:, 0], limits[:, 1:]
     return Directions(np.hstack(parts), tuple(places), low, small, residual, np.array(volumes), tuple(bounded))

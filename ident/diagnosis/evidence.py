@@ -80,7 +80,7 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
     spread = np.maximum(found.ratios(surrogates).mean(axis=0) / np.maximum(sizes, 1), 1.0)
     beside = np.minimum([column.beside for column in layout], np.maximum(sizes - 1, 0))
     price = 0.5 * sizes * math.log(len(white.target))
-    price += BESIDE * beside
+    price += BESIDE * beside + np.array([column.price for column in layout])
     tested = np.where(competing, 0.5 * ratios / spread - price, -np.inf)
     by_chance = np.where((sizes > 0) & ~excluded, 0.5 * found.ratios(surrogates) / spread - price, -np.inf)
     competing &= own / scale > 0.5 * (sizes - beside) * math.log(len(white.target))

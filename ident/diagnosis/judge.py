@@ -10,10 +10,11 @@ from threadpoolctl import threadpool_limits
 
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judgement import Judgement
-from ident.diagnosis.law.drift import time_law, without_drift, without_time
+from ident.diagnosis.law.drift import repeats, time_law, without_drift, without_time
 from ident.diagnosis.law.learning import Designs
 from ident.diagnosis.law.stage import Law, next_law, with_law
 from ident.diagnosis.limits import Limits
+from ident.diagnosis.orders import with_orders
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import make_rows
@@ -47,6 +48,9 @@ def judge(
     settings, limits = settings or Settings(), limits or Limits()
     # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
+        fit, confirm = with_orders((fit, confirm))
+        if not repeats((fit, confirm)):
+            return _unrefuted((fit, confirm), seed, settings, limits, stage).findings()
         stage("what follows time")
         drift = time_law((fit, confirm), settings, seed)
         averaged = [replace(problem, dependences=without_time(problem)) for problem in (fit, confirm)]

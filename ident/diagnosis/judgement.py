@@ -76,9 +76,13 @@ class Judgement:
         return self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeating() > 1
 
     def left_and_causes(self) -> tuple[float, int]:
-        """Part of the held-out gap that is left, to a fiftieth, and the number of causes; the less, the better."""
+        """Part of the held-out gap that is left, to a fiftieth, and the number of causes; the less, the better.
+
+        A law, which can be anything, must close more than a name does: what one must close at least is its price.
+        """
         gap = self.fitted.exactly
-        return round(50 * gap.after / gap.before) / 50 if gap.before > 0 else 1.0, self.fitted.count
+        left = gap.after / gap.before if gap.before > 0 else 1.0
+        return round(50 * (left + self.limits.law * len(self.laws))) / 50, self.fitted.count
 
     def refuted(self) -> frozenset[str]:
         """Effects of no size of which another candidate is what comes along with them, not refuted before."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
 
 from ident.effects import EFFECTS, LAWS, Effect
 from ident.errors import UserError
-from ident.plant.places import ALL_WHEELS, GROUPS
+from ident.plant.places import GROUPS
 
 
 class EffectName(enum.StrEnum):
@@ -35,13 +37,16 @@ class EffectName(enum.StrEnum):
     PARAMETER_CHANGE = "parameter_change"
 
 
-_OF_ALL_WHEELS = (
-    EffectName.STRIBECK,
-    EffectName.ASYMMETRIC_COULOMB,
-    EffectName.ASYMMETRIC_VISCOUS,
-    EffectName.QUADRATIC_DRAG,
+_AT_GROUPS: Final[Mapping[EffectName, tuple[str, ...]]] = MappingProxyType(
+    {
+        EffectName.STRIBECK: ("wheels", "steering"),
+        EffectName.ASYMMETRIC_COULOMB: ("wheels", "steering"),
+        EffectName.ASYMMETRIC_VISCOUS: ("wheels", "steering"),
+        EffectName.QUADRATIC_DRAG: ("wheels",),
+        EffectName.TIME_DELAY: ("drives", "encoders"),
+    }
 )
-"""Effects that are looked for at all wheels at once."""
+"""Groups of equals at which an effect is looked for too: what one bearing, one bus or one firmware does, all do."""
 
 
 MEMORIES = (EffectName.TIME_DELAY, EffectName.BACKLASH, EffectName.ELASTICITY, EffectName.SLIP)
@@ -64,6 +69,6 @@ def refuse_strangers(effects: Sequence[Effect]) -> None:
 
 
 def places_of(name: EffectName) -> tuple[str, ...]:
-    """Places at which a cause is looked for: each by itself, friction also at all wheels at once."""
-    groups = ALL_WHEELS if name in _OF_ALL_WHEELS else ()
+    """Places at which a cause is looked for: each by itself, and groups of equals that are alike by nature."""
+    groups = _AT_GROUPS.get(name, ())
     return tuple(where for where in EFFECTS[name].places if where not in GROUPS or where in groups)

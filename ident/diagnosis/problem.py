@@ -105,6 +105,19 @@ class Variant:
 
 
 @dataclass(frozen=True)
+class Periodic:
+    """A force that is a wave over an angle, of an order that the records are asked for.
+
+    Attributes:
+        dependence: key of that on the angle.
+        start: order [1/unit of the angle] -> coefficients of its sine and cosine -> values of the parameters.
+    """
+
+    dependence: str
+    start: Callable[[float], Callable[[Array], Array]]
+
+
+@dataclass(frozen=True)
 class Candidate:
     """A possible cause at a place.
 
@@ -117,7 +130,8 @@ class Candidate:
         drift: it is a changed value of the model, no structure that the model lacks.
         least: what the coefficients of a variant must reach, 0 for a play or a mass; if the data want one smaller,
             this is not the cause. None: anything is possible.
-        negligible: size of the coefficient of a single column up to which it means nothing, in its unit.
+        negligible: sizes of the coefficient of a single column, where it is negative and where it is positive, up to
+            which it means nothing, in its unit.
         lowest: what the parameters must reach in size after the refit to be this effect; empty: anything.
         excluded: the records speak against it, so that no others can bring it back.
         spread: standard deviations of the parameters that come with the way they are told, beyond the scatter of the
@@ -126,6 +140,8 @@ class Candidate:
         yielding: the same over what comes along but the last `others` numbers: a load, of what flanks yield under it.
         others: how many of the numbers that come along, the last ones, are no part of the effect itself.
         curve: whose friction over the speed it changes, if it is a friction.
+        periodic: of a wave over an angle; its variants are then those of the orders that the records show.
+        price: log evidence that the choice of its variants costs beyond that of its coefficients.
         along: effect at the same place that comes along with it in its widest variant; both at once are that variant.
     """
 
@@ -136,7 +152,7 @@ class Candidate:
     contribution: Contribution | None = None
     drift: bool = False
     least: float | None = None
-    negligible: float = 0.0
+    negligible: tuple[float, float] = (0.0, 0.0)
     lowest: tuple[float, ...] = ()
     excluded: bool = False
     spread: tuple[float, ...] = ()
@@ -145,6 +161,8 @@ class Candidate:
     others: int = 0
     curve: str = ""
     along: str = ""
+    periodic: Periodic | None = None
+    price: float = 0.0
 
     @property
     def key(self) -> str:

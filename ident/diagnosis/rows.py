@@ -51,18 +51,20 @@ class Column:
         candidate, variant: numbers.
         place: among all columns.
         least: value that all of its coefficients must reach, -inf where there is none such.
-        negligible: size that its one coefficient must exceed.
+        negligible: sizes that its one coefficient must exceed, where it is negative and where it is positive.
         beside: columns, the last ones, that only come along.
         itself: whether the other ones must show by themselves.
+        price: log evidence that its choice costs.
     """
 
     candidate: int
     variant: int
     place: slice
     least: float
-    negligible: float
+    negligible: tuple[float, float]
     beside: int = 0
     itself: bool = True
+    price: float = 0.0
 
     @property
     def own(self) -> slice:
@@ -170,14 +172,15 @@ def _candidate_columns(problems: Sequence[Problem], kept: Sequence[Kept]) -> tup
             stacks.append(_stack(kept, series, width))
             variant, place = candidates[0].variants[number], slice(end, end + width)
             bounds = _bounds(candidates[0], width)
-            layout.append(Column(index, number, place, *bounds, beside=variant.beside, itself=variant.itself))
+            along = {"beside": variant.beside, "itself": variant.itself, "price": candidates[0].price}
+            layout.append(Column(index, number, place, *bounds, **along))
             end += width
     return np.hstack(stacks), tuple(layout)
 
 
-def _bounds(candidate: Candidate, width: int) -> tuple[float, float]:
+def _bounds(candidate: Candidate, width: int) -> tuple[float, tuple[float, float]]:
     least = -math.inf if candidate.least is None else candidate.least
-    return least, candidate.negligible if width == 1 else 0.0
+    return least, candidate.negligible if width == 1 else (0.0, 0.0)
 
 
 def _groups(labels: Sequence[tuple[int, str, str, str]], counts: Sequence[int]) -> Indices:

@@ -26,7 +26,7 @@ def log_unsteady(regression: Regression, found: Found) -> float:
     """Log evidence that the causes found have other coefficients in some steps than in the others."""
     white = regression.white(found.whitener, found.variants)
     columns = _by_step(regression, white.baseline[:, regression.rows.baseline.shape[1] :])
-    everywhere = Column(0, 0, slice(0, columns.shape[1]), -math.inf, 0.0)
+    everywhere = Column(0, 0, slice(0, columns.shape[1]), -math.inf, (0.0, 0.0))
     added = directions(replace(white, columns=columns), [everywhere])
     count = added.basis.shape[1]
     if count == 0:

@@ -178,7 +178,9 @@ def _time_delay(axis: AxisModel) -> Candidate:
     slope = differentiate(axis.effort, axis.sample_time, SEVEN)
     variants = (Variant(axis.alone(slope[:, None])),)
     shortest = LONGEST_HOLD * axis.sample_time
-    return Candidate(EffectName.TIME_DELAY, axis.place, parameters, variants, contribution, negligible=shortest)
+    return Candidate(
+        EffectName.TIME_DELAY, axis.place, parameters, variants, contribution, negligible=(shortest, shortest)
+    )
 
 
 def _elasticity(axis: AxisModel) -> Candidate:
@@ -189,7 +191,7 @@ def _elasticity(axis: AxisModel) -> Candidate:
     sampling = axis.sample_time**2 / abs(axis.inertia)
     column = axis.alone((-axis.inertia * bend)[:, None])
     parameters = (EffectParameter("compliance", unit, meaning),)
-    return Candidate(EffectName.ELASTICITY, axis.place, parameters, (Variant(column),), negligible=sampling)
+    return Candidate(EffectName.ELASTICITY, axis.place, parameters, (Variant(column),), negligible=(sampling, sampling))
 
 
 def _backlash(axis: AxisModel) -> Candidate:

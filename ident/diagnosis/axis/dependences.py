@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.candidates import AxisModel
-from ident.diagnosis.law.dependence import Dependence, Partner, Variable, path_since_reversal
-from ident.diagnosis.law.spline import Knots
+from ident.diagnosis.law.dependence import Basis, Dependence, Partner, Variable, path_since_reversal
 from ident.estimate.filters import SEVEN, differentiate
 
 Array = NDArray[np.float64]
@@ -55,8 +54,8 @@ def _of_others(axis: AxisModel) -> Iterator[Dependence]:
 def _dependence(axis: AxisModel, variable: Variable, partner: Partner, x: Array, unit: str, of: str = "") -> Dependence:
     factor = _partner(axis, partner)
 
-    def design(knots: Knots) -> Sequence[Array | None]:
-        columns = knots.basis(x)
+    def design(basis: Basis) -> Sequence[Array | None]:
+        columns = basis(x)
         return axis.alone(columns if factor is None else factor[:, None] * columns)
 
     arguments = tuple(x[:, None] if block == axis.block else None for block in range(axis.blocks))

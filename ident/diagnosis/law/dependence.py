@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.law.spline import Knots
-
 Array = NDArray[np.float64]
-Design = Callable[[Knots], Sequence[Array | None]]
-"""Knots -> columns (N, K) of every block, filtered like the block; None where the law does not act."""
+Basis = Callable[[Array], Array]
+"""Values x (...) -> K functions of it (..., K)."""
+Design = Callable[[Basis], Sequence[Array | None]]
+"""Functions -> their columns (N, K) in every block, filtered like it; None where the law does not act."""
 
 
 class Variable(enum.StrEnum):
@@ -54,7 +54,7 @@ class Dependence:
         variable, partner: f(variable) times partner.
         unit_x, unit_y: of the variable and of f.
         arguments: (N, J) of every block, the variable at each of J equals; None where the law does not act.
-        design: columns of every block for some knots.
+        design: columns of every block for some functions of the variable.
         of: which motion, where that is not the place's own or comes around: another axis, a sum with it, a turn.
         period: of the variable where it comes around, else 0.
     """
@@ -84,8 +84,8 @@ class Dependence:
 def across(parts: Sequence[Dependence]) -> Dependence:
     """One dependence of several records, with columns in the blocks of all."""
 
-    def design(knots: Knots) -> Sequence[Array | None]:
-        return [column for part in parts for column in part.design(knots)]
+    def design(basis: Basis) -> Sequence[Array | None]:
+        return [column for part in parts for column in part.design(basis)]
 
     return replace(parts[0], arguments=tuple(x for part in parts for x in part.arguments), design=design)
 

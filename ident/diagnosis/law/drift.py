@@ -1,7 +1,8 @@
 """What follows the time since the start of a campaign: it makes repeats differ, and is no noise.
 
 It is looked for in what differs between repeats, each row by itself: there nothing that repeats can stand in for it.
-Where nothing repeats, all rows are taken as they are. What is found is taken off the targets before the search begins.
+What is found is taken off the targets before the search begins. Where nothing repeats, time is one more variable of the
+motion, and competes with all others in the rows as they are.
 """
 
 from __future__ import annotations
@@ -14,9 +15,8 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.findings import Cause
 from ident.diagnosis.law.answer import law_answer
-from ident.diagnosis.law.dependence import Dependence, Variable
+from ident.diagnosis.law.dependence import Basis, Dependence, Variable
 from ident.diagnosis.law.learning import Designs
-from ident.diagnosis.law.spline import Knots
 from ident.diagnosis.law.stage import SCALE, Law, next_law
 from ident.diagnosis.probability import Calibration, Ranked
 from ident.diagnosis.problem import Block, Candidate, Problem
@@ -30,8 +30,13 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
+def repeats(problems: Sequence[Problem]) -> bool:
+    """Whether some rows are driven more than once."""
+    return any(len(repeats_of(block.period)) > 1 for problem in problems for block in problem.blocks)
+
+
 def time_law(problems: Sequence[Problem], settings: Settings, seed: int) -> Law | None:
-    """The law of time that explains most; None where none does surely."""
+    """The law of time that explains most of what differs between repeats; None where none does surely."""
     numbers = [index for index, one in enumerate(problems[0].dependences) if one.variable is Variable.TIME]
     if not numbers:
         return None
@@ -43,7 +48,7 @@ def time_law(problems: Sequence[Problem], settings: Settings, seed: int) -> Law 
 def without_drift(problem: Problem, law: Law) -> Problem:
     """A problem with what follows time taken off its targets, and none of it looked for any more."""
     (dependence,) = [one for one in problem.dependences if one.key == law.dependence.key]
-    series = [None if one is None else one @ law.learnt.weights for one in dependence.design(law.learnt.knots)]
+    series = [None if one is None else one @ law.learnt.weights for one in dependence.design(law.learnt.knots.basis)]
     blocks = tuple(
         block if drift is None else replace(block, target=block.target - drift, drift=drift)
         for block, drift in zip(problem.blocks, series, strict=True)
@@ -74,8 +79,8 @@ def _deviations(problem: Problem, numbers: Sequence[int]) -> Problem:
 
 
 def _from_means(dependence: Dependence, samples: Sequence[Indices]) -> Dependence:
-    def design(knots: Knots) -> Sequence[Array | None]:
-        columns = dependence.design(knots)
+    def design(basis: Basis) -> Sequence[Array | None]:
+        columns = dependence.design(basis)
         return [None if one is None else _from_mean(one, each) for one, each in zip(columns, samples, strict=True)]
 
     return replace(dependence, design=design)

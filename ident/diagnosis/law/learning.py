@@ -222,7 +222,7 @@ class Designs:
         if index not in self._columns:
             knots = self.knots(index)
             assert knots is not None
-            series = [column for part in self._parts(index) for column in part.design(knots)]
+            series = [column for part in self._parts(index) for column in part.design(knots.basis)]
             self._columns[index] = self._rows.stack(series, len(knots.places))
         return self._columns[index]
 

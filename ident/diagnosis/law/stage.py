@@ -95,14 +95,14 @@ def with_law(
     changed: list[Problem] = []
     series: list[Array | None] = []
     for problem in problems:
-        design = problem.dependences[law.learnt.index].design(law.learnt.knots)
+        design = problem.dependences[law.learnt.index].design(law.learnt.knots.basis)
         columns = tuple(None if one is None else (one @ law.learnt.weights)[:, None] for one in design)
         series += columns
         candidate = Candidate(law.dependence.effect, law.dependence.where, (SCALE,), (Variant(columns),), least=0.0)
         changed.append(replace(problem, candidates=(*problem.candidates, candidate)))
     rows = regression.rows
     end = rows.columns.shape[1]
-    column = Column(law.number, 0, slice(end, end + 1), 0.0, 0.0)
+    column = Column(law.number, 0, slice(end, end + 1), 0.0, (0.0, 0.0))
     wider = replace(rows, columns=np.hstack([rows.columns, rows.stack(series, 1)]), layout=(*rows.layout, column))
     return tuple(changed), Regression(changed[0], wider, regression.settings, regression.seed), len(rows.layout)
 

@@ -24,6 +24,7 @@ from ident.diagnosis.vehicle.library import (
     TermCause,
     friction_curve,
     placed_parameters,
+    ripple_over,
     term_causes,
 )
 from ident.diagnosis.vehicle.sliding import (
@@ -82,6 +83,9 @@ Three percent of a gear's, which may stay untold (`rattling.UNTOLD`); half of wh
 On cases of an exam gears of 172 μrad/Nm seemed to have plays of 58 and 80 μrad, couplings of 20 μrad/Nm of 40 and 57.
 """
 
+HELD: Final = 0.55
+"""Sample intervals by which a torque may seem to act before it is reported: half of one is what holding it does."""
+
 SPREADS: Final[Mapping[tuple[EffectName, str], float]] = MappingProxyType(
     dict.fromkeys([(EffectName.STEERING_OFFSET, place) for place in STEERING], OFFSET_STD)
     | dict.fromkeys([(EffectName.ELASTICITY, place) for place in DRIVES], COMPLIANCE_STD)
@@ -121,12 +125,19 @@ def candidate_of(
         contribution=None if linear else contribution_of(cause, acting_in(variants, sources), sources, context),
         drift=cause.name in DRIFTS,
         least=0.0 if cause.name in ONE_SIDED else None,
+        negligible=(_held(sources), 0.0) if cause.name == EffectName.TIME_DELAY else (0.0, 0.0),
         spread=(SPREADS[cause.name, cause.where],) if (cause.name, cause.where) in SPREADS else (),
         part=PLAY_PART if cause.name == EffectName.BACKLASH and cause.where in DRIVES else 0.0,
         yielding=LOAD_STD[cause.where] if cause.name == EffectName.BACKLASH else 0.0,
+        periodic=ripple_over(cause.where, context.geometry) if cause.name == EffectName.TORQUE_RIPPLE else None,
         curve=friction_curve(cause.name, cause.where),
         along=EffectName.ELASTICITY if cause.name == EffectName.BACKLASH else "",
     )
+
+
+def _held(sources: Sequence[Source]) -> float:
+    """By how much a torque or an angle may seem to act before it is reported [s]: half of a sample, as it is held."""
+    return max((HELD * source.sample_time for source in sources), default=0.0)
 
 
 def slid_by_any(sources: Sequence[Source], context: Context) -> Sequence[Array | None]:

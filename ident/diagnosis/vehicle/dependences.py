@@ -13,8 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.law.dependence import Dependence, Partner, Variable, path_since_reversal
-from ident.diagnosis.law.spline import Knots
+from ident.diagnosis.law.dependence import Basis, Dependence, Partner, Variable, path_since_reversal
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.vehicle.context import Context
 from ident.diagnosis.vehicle.inputs import SLICES
@@ -80,7 +79,7 @@ def _dependence(
 ) -> Dependence:
     joints = [row - FIRST_JOINT for row in rows_of(where)]
 
-    def design(knots: Knots) -> Sequence[Array | None]:
+    def design(basis: Basis) -> Sequence[Array | None]:
         found: list[Array | None] = []
         for source, lever in zip(sources, levers, strict=True):
             if lever is None:
@@ -89,7 +88,7 @@ def _dependence(
             inputs = context.inputs(source)
             columns = sum(
                 (_partner(inputs, joint, law.partner) * lever[:, joint].T)[:, :, None]
-                * knots.basis(_variable(inputs, joint, law, source.time))[None]
+                * basis(_variable(inputs, joint, law, source.time))[None]
                 for joint in joints
             )
             filtered = context.filtered(np.moveaxis(np.asarray(columns), 0, 1), source)

@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName, places_of
+from ident.diagnosis.problem import Periodic
 from ident.diagnosis.vehicle.rows import UnitTerm
 from ident.effects import EFFECTS, EffectParameter, effect_term
 from ident.plant.places import ALL_WHEELS, STEERING, WHEEL_PLACES
+from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]
 
@@ -56,7 +58,7 @@ SHAPES: Final[Mapping[EffectName, Shape]] = MappingProxyType(
         EffectName.PAYLOAD: Shape(("mass", "inertia")),
         EffectName.TORQUE_GAIN: Shape(("error",)),
         EffectName.TORQUE_BIAS: Shape(("bias",)),
-        EffectName.TORQUE_RIPPLE: Shape(("amplitude",), angle="phase", tried={"order": (1.0, 2.0, 3.0, 4.0, 6.0)}),
+        EffectName.TORQUE_RIPPLE: Shape(("amplitude",), angle="phase", tried={"order": (1.0,)}),
         EffectName.WHEEL_RADIUS: Shape(("error",)),
         EffectName.WHEEL_ECCENTRICITY: Shape(("amplitude",), angle="phase"),
         EffectName.STEERING_OFFSET: Shape(("offset",)),
@@ -74,7 +76,6 @@ DRIFTS: Final = (EffectName.PARAMETER_CHANGE, EffectName.PAYLOAD)
 ONE_SIDED: Final = (
     EffectName.STRIBECK,
     EffectName.QUADRATIC_DRAG,
-    EffectName.TIME_DELAY,
     EffectName.BACKLASH,
     EffectName.ELASTICITY,
     EffectName.SCRUB,
@@ -96,6 +97,7 @@ FRICTIONS: Final = (
 
 _CURVES: Final[Mapping[str, str]] = MappingProxyType(
     dict.fromkeys((*WHEEL_PLACES, *ALL_WHEELS, "d_vw", "d_cw"), ALL_WHEELS[0])
+    | {"steering": "steering"}
     | dict.fromkeys((STEERING[0], "d_vl", "d_cl"), STEERING[0])
     | dict.fromkeys((STEERING[1], "d_vr", "d_cr"), STEERING[1])
 )
@@ -104,6 +106,22 @@ _CURVES: Final[Mapping[str, str]] = MappingProxyType(
 def friction_curve(name: EffectName, where: str) -> str:
     """Whose friction over the speed an effect changes: that of the wheels or of a steering axis; mostly none."""
     return _CURVES.get(where, "") if name in (*FRICTIONS, EffectName.PARAMETER_CHANGE) else ""
+
+
+def ripple_over(where: str, geometry: Geometry) -> Periodic:
+    """A ripple of a drive as a wave over the angle of its wheel, of any order.
+
+    Its wave is in the torque of the drive, which stands on the other side of the rows than what resists at the wheel.
+    """
+    ratio = geometry.gear_ratio
+
+    def start(order: float) -> Callable[[Array], Array]:
+        def values(found: Array) -> Array:
+            return np.array([np.hypot(*found) / ratio, order / ratio, np.arctan2(-found[1], -found[0])])
+
+        return values
+
+    return Periodic(f"law_angle_motor@wheel_{where.removeprefix('drive_')}", start)
 
 
 @dataclass(frozen=True)

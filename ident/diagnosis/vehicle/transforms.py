@@ -21,7 +21,7 @@ from ident.diagnosis.vehicle.rattling import above_band, moved_by
 from ident.diagnosis.vehicle.resting import range_of
 from ident.diagnosis.vehicle.signals import shifted
 from ident.estimate.filters import SEVEN, differentiate, second_derivative, zero_phase
-from ident.plant.places import DRIVES, ENCODERS, STEERING
+from ident.plant.places import DRIVES, ENCODERS, STEERING, indices
 from ident.plant.springs import MOTOR_SHARE
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
@@ -214,7 +214,7 @@ class TransformCause:
 
     Attributes:
         name, where: which.
-        place: index of the drive or side.
+        places: indices of the drives or sides.
         transform: takes the effect out of the inputs.
         probes: small sizes (k,) at which the columns are taken: the effect's own first, behind it those of what may
             come along with it.
@@ -222,7 +222,7 @@ class TransformCause:
 
     name: EffectName
     where: str
-    place: int
+    places: tuple[int, ...]
     transform: Transform
     probes: tuple[float, ...]
 
@@ -230,7 +230,9 @@ class TransformCause:
         """Inputs (N, INPUTS) without the effect; what it is not given a size for does not come along."""
         padded = np.zeros(len(self.probes))
         padded[: len(sizes)] = sizes
-        return self.transform(inputs, self.place, padded, setting)
+        for place in self.places:
+            inputs = self.transform(inputs, place, padded, setting)
+        return inputs
 
 
 _DRIVE, _SIDE = "drive", "side"
@@ -258,6 +260,6 @@ def transform_cause(name: EffectName, where: str) -> TransformCause:
     Raises:
         KeyError: the effect has no memory.
     """
-    places = next(places for places in (DRIVES, ENCODERS, STEERING) if where in places)
-    kind = _DRIVE if places is DRIVES else _SIDE
-    return TransformCause(name, where, places.index(where), *_TRANSFORMS[name, kind])
+    kind = next(places for places in (DRIVES, ENCODERS, STEERING) if indices(where, places))
+    side = _DRIVE if kind is DRIVES else _SIDE
+    return TransformCause(name, where, indices(where, kind), *_TRANSFORMS[name, side])

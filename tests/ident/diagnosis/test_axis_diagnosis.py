@@ -37,7 +37,7 @@ def test_a_machine_that_is_the_model_lacks_nothing(machine: Make) -> None:
     stages: list[str] = []
     findings = diagnose_axis([machine().drive(11)], [machine().drive(12)], seed=1, stage=stages.append)
     # Who waits is told what is done, in the order in which it is.
-    assert [stage.split()[0] for stage in stages[:3]] == ["filter", "searching", "fitting"]
+    assert [stage.split()[0] for stage in stages[:4]] == ["filter", "what", "searching", "fitting"]
     assert stages[-1] == "numbers of the answer"
     assert findings.verdict is Verdict.NONE
     found = dict(zip(findings.problem.names, findings.after.baseline.tolist(), strict=True))

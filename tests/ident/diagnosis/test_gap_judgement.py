@@ -430,7 +430,16 @@ def test_the_json_holds_what_was_agreed_and_nothing_else(world: type[Any], tmp_p
     path = tmp_path / "deep" / "diagnosis.json"
     write_diagnosis(_judged(world(seed=7, true={"c": 0.3})).diagnosis("drive more"), path)
     content = json.loads(path.read_text())
-    assert list(content) == ["verdict", "effects", "where", "gap", "invisible", "next_experiment", "faults"]
+    assert list(content) == [
+        "verdict",
+        "effects",
+        "where",
+        "gap",
+        "invisible",
+        "next_experiment",
+        "faults",
+        "unseen",
+    ]
     assert list(content["effects"][0]) == [
         "name",
         "where",
@@ -438,6 +447,8 @@ def test_the_json_holds_what_was_agreed_and_nothing_else(world: type[Any], tmp_p
         "probability",
         "ambiguity_set",
         "gap_closed_held_out",
+        "alternatives",
+        "law",
     ]
     assert set(content["effects"][0]["parameters"]["size"]) == {"value", "std", "unit"}
     assert set(content["where"][0]) == {"channel", "step", "coordinate", "region", "share"}

@@ -80,7 +80,7 @@ def _white(seed: int, size: float) -> tuple[White, tuple[Column, ...]]:
     baseline, columns = generator.normal(size=(600, 3)), generator.normal(size=(600, 4))
     columns[:, 3] = baseline @ np.array([1.0, 2.0, -1.0])
     target = baseline @ np.ones(3) + size * columns[:, 0] + generator.normal(size=600)
-    layout = tuple(Column(index, 0, slice(index, index + 1), -np.inf, 0.0) for index in range(4))
+    layout = tuple(Column(index, 0, slice(index, index + 1), -np.inf, (0.0, 0.0)) for index in range(4))
     return White(target, baseline, columns, np.arange(600) // 20, np.arange(600) >= 300), layout
 
 
@@ -127,7 +127,7 @@ def test_the_predictive_factor_is_the_ratio_of_predicted_densities() -> None:
 
 
 def _volume_gain(white: White) -> float:
-    layout = (Column(0, 0, slice(0, 1), -np.inf, 0.0),)
+    layout = (Column(0, 0, slice(0, 1), -np.inf, (0.0, 0.0)),)
     whole, fitted = directions(white, layout), directions(white, layout, ~white.confirming)
     return float(whole.volume[0] - fitted.volume[0])
 
