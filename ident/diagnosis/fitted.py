@@ -84,7 +84,11 @@ class Fitted:
     @cached_property
     def exactly(self) -> Gap:
         """With all effects, as their exact forms."""
-        return held_out_gap(self.rows, self.floors, self.untouched, self._extended_models)
+        return self.measured(self.floors)
+
+    def measured(self, floors: Array) -> Gap:
+        """The same with the noise of every block as given."""
+        return held_out_gap(self.rows, floors, self.untouched, self._extended_models)
 
     @cached_property
     def whole(self) -> Gap:

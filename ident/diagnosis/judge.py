@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ident.diagnosis.findings import Findings
@@ -21,6 +22,7 @@ from ident.diagnosis.rows import make_rows
 from ident.diagnosis.search import concluded
 from ident.diagnosis.settings import Settings
 from ident.diagnosis.shapes import Shaped, search
+from ident.diagnosis.symmetry import most_symmetric
 from ident.stages import Stage, untold
 
 MOST_LAWS: Final = 2
@@ -81,7 +83,7 @@ def _judged_once(
 ) -> Judgement:
     stage(f"searching {len(problems[0].candidates)} candidates")
     regression = Regression(problems[0], make_rows(*problems), settings, seed)
-    searched = search(problems, regression)
+    searched = most_symmetric(search(problems, regression))
     stage(f"fitting {len(searched.taken)} causes")
 
     def concluded_from(found: Shaped, laws: tuple[Law, ...] = ()) -> Judgement:
@@ -93,8 +95,9 @@ def _judged_once(
     stage(f"on what the remainder depends: {len(problems[0].dependences)} possibilities")
     designs = Designs(problems, regression.rows)
     starts = [searched, *([Shaped(problems, regression, ())] if searched.taken else [])]
-    found = [judgement, *(_with_laws(start, designs, concluded_from) for start in starts)]
-    return min((one for one in found if one is not None), key=Judgement.left_and_causes)
+    found = [judgement, *(one for start in starts if (one := _with_laws(start, designs, concluded_from)) is not None)]
+    floors = np.min([one.fitted.floors for one in found], axis=0)
+    return min(found, key=lambda one: one.cost(floors))
 
 
 def _judged(searched: Shaped, laws: tuple[Law, ...], limits: Limits, seed: int) -> Judgement:
@@ -119,7 +122,7 @@ def _with_laws(
             break
         laws = (*laws, law)
         problems, regression, variant = with_law(found.problems, found.regression, law)
-        found = search(problems, regression, (*found.taken, variant))
+        found = most_symmetric(search(problems, regression, (*found.taken, variant)))
         judgement = judged(found, laws)
         if not judgement.incomplete():
             break

@@ -14,7 +14,7 @@ from ident.diagnosis.chance import chances
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.fitted import Fitted
-from ident.diagnosis.law.answer import LawAnswer, alternatives, law_answer
+from ident.diagnosis.law.answer import LawAnswer, alternatives, law_answer, same_names
 from ident.diagnosis.law.drift import drift_cause
 from ident.diagnosis.law.neighbours import channel_of, nearest_name
 from ident.diagnosis.law.stage import Law
@@ -22,7 +22,7 @@ from ident.diagnosis.limits import Limits
 from ident.diagnosis.probability import calibration, rank
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
-from ident.diagnosis.remainder import lasting, repeated, shares
+from ident.diagnosis.remainder import lasting, mostly_tolerated, repeated, shares
 from ident.diagnosis.search import Found
 from ident.diagnosis.steady import log_unsteady
 
@@ -73,45 +73,50 @@ class Judgement:
 
     def incomplete(self) -> bool:
         """Whether something is left beside the effects that a law may explain."""
-        return self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeating() > 1
+        left = self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeating() > 1
+        return left or self.fitted.exactly.after**2 > 1 + self.limits.measurable
 
-    def left_and_causes(self) -> tuple[float, int]:
-        """Part of the held-out gap that is left, to a fiftieth, and the number of causes; the less, the better.
+    def cost(self, floors: Array) -> tuple[float, int]:
+        """Of an explanation: the part of the held-out gap that it leaves and what its causes cost, and their number.
 
-        A law, which can be anything, must close more than a name does: what one must close at least is its price.
+        A law, which can be anything, costs what it must close at least, and so does what nobody knows; a name, which
+        says more, is cheaper.
+
+        Args:
+            floors: noise of every block, the same for all explanations that are compared.
         """
-        gap = self.fitted.exactly
+        gap, laws = self.fitted.measured(floors), len(self.laws)
         left = gap.after / gap.before if gap.before > 0 else 1.0
-        return round(50 * (left + self.limits.law * len(self.laws))) / 50, self.fitted.count
+        unknown = self._verdict() is Verdict.UNKNOWN
+        price = self.limits.law * (laws + unknown) + self.limits.name * (self.fitted.count - laws)
+        return round(50 * (left + price)) / 50, self.fitted.count
 
     def refuted(self) -> frozenset[str]:
-        """Effects of no size of which another candidate is what comes along with them, not refuted before."""
+        """Effects of no size of which another candidate is what comes along with them, and those that are none."""
         keys = {candidate.key for candidate in self.problems[0].candidates if not candidate.excluded}
-        taken = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._sizeless(index)]
-        return frozenset(one.key for one in taken if f"{one.along}@{one.where}" in keys)
+        sizeless = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._sizeless(index)]
+        outside = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._outside(index)]
+        return frozenset(
+            [*(one.key for one in sizeless if f"{one.along}@{one.where}" in keys), *(one.key for one in outside)]
+        )
 
     def worthwhile(self) -> tuple[int, ...]:
-        """The effects without one that widens the held-out gap, is of no size itself, or is the least and a trifle."""
-        variants = self.found.variants
+        """The effects without one that widens the held-out gap, is of no size itself, or closes next to nothing."""
         closed = self.fitted.closed
         widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
         refuted = [index for index in widened if self._measurable() or self._log_predictive(index) < self.limits.sure]
-        if refuted:
-            return self.fitted.others(min(refuted, key=lambda index: closed[index]))
         bent = [index for index in range(self.fitted.count) if self._law(index) and closed[index] < self.limits.law]
-        if bent:
-            return self.fitted.others(min(bent, key=lambda index: closed[index]))
-        if self.fitted.count < 2:
-            return variants
-        for index in range(self.fitted.count):
-            if index != self._strongest and (self._sizeless(index) or self._outside(index)):
+        for superfluous in (refuted, bent):
+            if superfluous:
+                return self.fitted.others(min(superfluous, key=lambda index: closed[index]))
+        others = [index for index in range(self.fitted.count) if index != self._strongest] if closed else []
+        for index in others:
+            if self._sizeless(index) or self._outside(index):
                 return self.fitted.others(index)
-        evidence = [self._log_evidence(index) for index in range(self.fitted.count)]
-        least = int(np.argmin(evidence))
-        minor = evidence[least] < self.limits.minor * max(evidence) and closed[least] < self.limits.improvement
-        trifle = self.limits.trifle * self.fitted.whole.floor**2 / max(self.fitted.removable, np.finfo(float).tiny)
-        needed = max(trifle, self.limits.share * self.fitted.left)
-        return self.fitted.others(least) if minor and closed[least] < needed else variants
+        least = min(others, key=lambda index: closed[index], default=None)
+        if least is not None and self._measurable() and closed[least] < self.limits.improvement:
+            return self.fitted.others(least)
+        return self.found.variants
 
     def _law(self, index: int) -> Law | None:
         """The law that a cause is, if it is one."""
@@ -144,7 +149,8 @@ class Judgement:
 
     def _verdict(self) -> Verdict:
         if not self.found.variants:
-            return Verdict.UNKNOWN if self._predictable() or self._surely_repeating() else Verdict.NONE
+            left = self._predictable() or self._surely_repeating() or self.fitted.exactly.after > self.limits.far_off
+            return Verdict.UNKNOWN if left else Verdict.NONE
         unexplained = self._predictable() and self._explained() < self.limits.explained
         strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
         another = self._sizeless(self._strongest) or self._outside(self._strongest)
@@ -230,7 +236,8 @@ class Judgement:
 
     def _excesses(self) -> Mapping[str, float]:
         """The same by coordinate."""
-        creeping = {block.label for block, _ in self.rows.blocks if block.tolerance > 0}
+        blocks = zip(self.rows.blocks, self.fitted.floors, strict=True)
+        creeping = {block.label for (block, _), floor in blocks if mostly_tolerated(block, floor)}
         stricter = self.found.variants and self._measurable()
         usual = self.limits.beside if stricter else self.limits.repeating
         return {
@@ -267,7 +274,7 @@ class Judgement:
             sizeless=self._sizeless(index),
             law=law,
             law_answer=None if law is None else self._law_answer(law, index, variant),
-            alternatives=() if law is None else alternatives(law, self.problems[0].dependences),
+            alternatives=(same_names(ranked.alike) if law is None else alternatives(law, self.problems[0].dependences)),
         )
 
     def _law_answer(self, law: Law, index: int, variant: int) -> LawAnswer:

@@ -15,7 +15,7 @@ class Limits:
         repeating: the same, above which there is a remainder whether or not it can be predicted.
         chance: probability that noise alone makes it that large in some coordinate, above which that is no remainder.
         beside: the same beside effects that are named, where the held-out gap can be measured.
-        creeping: the same of rows with a tolerance, whose noise is that.
+        creeping: the same of rows whose noise is mostly what a model may lack.
         foreign: the same of rows that the model says nothing of; where no effect acts, `nearly` pardons it.
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
         named: what one effect must close, over that and what all leave, where a remainder repeats.
@@ -26,11 +26,10 @@ class Limits:
         widening: share of the held-out gap by which an effect may seem to widen it.
         most: share of the held-out gap that all effects must close where nothing repeats.
         measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.
+        far_off: held-out gap, over its noise, above which nothing is called complete, whatever can be predicted.
         law: share of the held-out gap that a law must close: a curve bends to what is left of any other cause.
+        name: the same of a name that stands in place of a law: several of them bend to a curve as well.
         sure: log Bayes factor of the confirming rows from which an effect stands although it seems to, by accident.
-        minor: log evidence over that of the strongest effect above which one counts that closes less.
-        share: of the gap that is left, which an effect must close to count all the same.
-        trifle: power, over the noise's, by which it must lower the held-out gap in any case.
         unsteady: log evidence, for other sizes of the effects in some steps, from which they are not what they seem.
         bent: the same as a share of the evidence for the effects: columns are not quite what a large effect does.
         sized: standard deviations that an effect must have in size where something else comes along with it.
@@ -54,11 +53,10 @@ class Limits:
     widening: float = 0.1
     most: float = 0.5
     measurable: float = 0.05
-    law: float = 0.1
+    far_off: float = 1.3
+    law: float = 0.12
+    name: float = 0.05
     sure: float = 2.5
-    minor: float = 0.05
-    share: float = 0.1
-    trifle: float = 5e-3
     unsteady: float = 5.0
     bent: float = 1e-3
     sized: float = 1.0

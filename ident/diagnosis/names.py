@@ -44,6 +44,7 @@ _AT_GROUPS: Final[Mapping[EffectName, tuple[str, ...]]] = MappingProxyType(
         EffectName.ASYMMETRIC_VISCOUS: ("wheels", "steering"),
         EffectName.QUADRATIC_DRAG: ("wheels",),
         EffectName.TIME_DELAY: ("drives", "encoders"),
+        EffectName.TORQUE_RIPPLE: ("drives",),
     }
 )
 """Groups of equals at which an effect is looked for too: what one bearing, one bus or one firmware does, all do."""

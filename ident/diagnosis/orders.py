@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.law.dependence import Basis, Dependence
 from ident.diagnosis.linear import least_squares, rms
 from ident.diagnosis.problem import Block, Candidate, Problem, Variant
+from ident.diagnosis.regression import SILENT
 from ident.diagnosis.rows import Kept, kept_rows
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ SHARE: Final = 0.1
 MOST: Final = 2.0**17
 """Orders that are looked at, over the resolution: beyond them nothing but rows at rest is slow enough."""
 
-FEWEST: Final = 1.0
+FEWEST: Final = 2.0
 """Periods over the range of the angle below which a force is no ripple."""
 
 
@@ -94,7 +95,7 @@ def _level(block: Block, kept: Kept) -> Array:
     """Rms (m,) of what a block's own parameters leave of it."""
     target, baseline = kept.mean(block.target), kept.mean(block.baseline)
     size = rms(target - baseline @ least_squares(baseline, target)) if target.size else 0.0
-    return np.full(len(target), max(size, np.finfo(float).tiny))
+    return np.full(len(target), size if size > SILENT else 1.0)
 
 
 def _peaks(

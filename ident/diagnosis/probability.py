@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -87,12 +87,16 @@ def rank(regression: Regression, slot: Slot, variant: int, settings: Calibration
         name = key.split("@")[0]
         names[name] = names.get(name, 0.0) + probability
     ordered = dict(sorted(names.items(), key=lambda entry: -entry[1]))
-    return Ranked(probabilities, ordered, _alike(regression, slot, variant))
+    same = tuple(regression.key(other) for other in alike(regression, slot, variant))
+    return Ranked(probabilities, ordered, same)
 
 
-def _alike(regression: Regression, slot: Slot, variant: int) -> tuple[str, ...]:
+def alike(regression: Regression, slot: Slot, variant: int) -> list[int]:
+    """Variants that are the same as the one taken in these records, itself first, one a candidate."""
     evidence = slot.evidence
     sizes = evidence.directions.sizes
-    alike = (cosines(evidence, variant) > ALIKE) & (sizes == sizes[variant]) & np.isfinite(evidence.log_evidence)
-    same: Sequence[int] = np.flatnonzero(alike).tolist()
-    return tuple(dict.fromkeys([regression.key(variant), *(regression.key(other) for other in same)]))
+    same = (cosines(evidence, variant) > ALIKE) & (sizes == sizes[variant]) & np.isfinite(evidence.log_evidence)
+    found: dict[str, int] = {regression.key(variant): variant}
+    for other in sorted(np.flatnonzero(same).tolist(), key=lambda one: -float(evidence.log_evidence[one])):
+        found.setdefault(regression.key(other), other)
+    return list(found.values())

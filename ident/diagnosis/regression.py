@@ -150,6 +150,12 @@ class Regression:
         residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
         return fit_whitener(self.rows, residual, design.shape[1], order, self.repeats)
 
+    def log_likelihood(self, columns: Array, whitener: Whitener) -> float:
+        """Largest log likelihood of all rows with the baseline and columns (n, k), but for a constant of all noises."""
+        white = whitener.apply(self.rows, np.column_stack([self.rows.baseline, columns, self.rows.target]))
+        left = white[:, -1] - white[:, :-1] @ least_squares(white[:, :-1], white[:, -1])
+        return whitener.log_volume(self.rows) - 0.5 * float(left @ left)
+
     def _level(self, design: Array) -> Array:
         """Coefficients of some columns (n, k), every group in units of what the baseline leaves of it."""
         weighted = np.column_stack([design, self.rows.target]) / self._scale[:, None]

@@ -42,6 +42,11 @@ def noise_floors(rows: Rows, models: Series, left: Array) -> Array:
     return np.maximum(values, np.finfo(float).tiny)
 
 
+def mostly_tolerated(block: Block, floor: float) -> bool:
+    """Whether most of a block's noise is no noise, but what a model may lack."""
+    return bool(2 * block.tolerance**2 > floor**2)
+
+
 def held_out_gap(rows: Rows, floors: Array, before: Series, after: Series) -> Gap:
     """Rms over all samples of the confirming blocks, each over its noise."""
     sums, count = np.zeros(3), 0
@@ -52,7 +57,7 @@ def held_out_gap(rows: Rows, floors: Array, before: Series, after: Series) -> Ga
         floor = floors[index]
         for place, model in enumerate((before[index], after[index])):
             power = float(np.sum(((block.target - model)[samples] / floor) ** 2))
-            sums[place] += max(power, len(samples)) if block.tolerance > 0 else power
+            sums[place] += max(power, len(samples)) if mostly_tolerated(block, floor) else power
         sums[2] += len(samples)
         count += len(samples)
     mean = np.sqrt(sums / count) if count else np.zeros(3)

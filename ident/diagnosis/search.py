@@ -47,7 +47,7 @@ def extended(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
 def concluded(regression: Regression, taken: tuple[int, ...]) -> Found:
     """What can be said of effects that are taken."""
     whitener = regression.whitener(taken)
-    slots = tuple(regression.slot(_without(taken, index), whitener) for index in range(len(taken)))
+    slots = tuple(regression.slot(without(taken, index), whitener) for index in range(len(taken)))
     return Found(taken, whitener, slots, regression.slot(taken, whitener))
 
 
@@ -87,13 +87,13 @@ def settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
 def _revised(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:
     whitener = regression.whitener(taken)
     for index, variant in enumerate(taken):
-        slot = regression.slot(_without(taken, index), whitener)
+        slot = regression.slot(without(taken, index), whitener)
         best = slot.variants[0] if slot.variants else variant
         log_evidence = slot.evidence.log_evidence
         if log_evidence[best] > log_evidence[variant] + regression.settings.lead:
             return (*taken[:index], best, *taken[index + 1 :])
         if not _believed(slot, variant, regression.settings, alone=len(taken) == 1):
-            return _without(taken, index)
+            return without(taken, index)
     return taken
 
 
@@ -108,5 +108,6 @@ def joined(regression: Regression, taken: tuple[int, ...], wholes: Sequence[Whol
     return taken
 
 
-def _without(taken: tuple[int, ...], index: int) -> tuple[int, ...]:
+def without(taken: tuple[int, ...], index: int) -> tuple[int, ...]:
+    """All variants taken but one."""
     return (*taken[:index], *taken[index + 1 :])

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from ident.diagnosis.problem import Block, Problem
 
@@ -14,12 +15,16 @@ Mask = NDArray[np.bool_]
 Numbers = NDArray[np.int64]
 
 FITTED: Final = 0.6
-"""Part of a record without repeats that is fitted; what follows confirms."""
+"""Part of a record without repeats that is fitted; the rest confirms."""
+
+TURNS: Final = 5
+"""Of fitting and confirming parts in such a record: motions often change along it, and what the fitted part does not
+show, the other one cannot confirm."""
 
 
 def split_problem(problem: Problem) -> tuple[Problem, Problem]:
     """A problem to fit and one to confirm: the first half of the repeats of every block and the others, or, without
-    repeats, an earlier and a later part.
+    repeats, parts of it by turns.
     """
     fitted = tuple(_part(block, confirming=False) for block in problem.blocks)
     confirmed = tuple(_part(block, confirming=True) for block in problem.blocks)
@@ -40,10 +45,10 @@ def part_of(moving: Mask, period: Numbers, guard: int, *, confirming: bool) -> t
         fitted = repeats[: (len(repeats) + 1) // 2]
         inside = (period >= 0) & (np.isin(period, fitted) != confirming)
         return moving & inside, np.where(inside, period, -1)
-    rows = np.flatnonzero(moving)
-    border = rows[int(FITTED * (len(rows) - 1))] if rows.size else 0
-    number = np.arange(len(moving))
-    return moving & (number > border + guard if confirming else number <= border), period
+    rank = np.cumsum(moving) / max(int(moving.sum()), 1)
+    confirms = (TURNS * rank) % 1.0 > FITTED
+    border = ndimage.binary_dilation(np.diff(confirms, prepend=confirms[:1]), np.ones(2 * guard + 1))
+    return moving & (confirms == confirming) & ~(border & confirms), period
 
 
 def guard_of(bandwidth: float, sample_time: float) -> int:

@@ -44,7 +44,7 @@ def drives(prototype: VehicleDescription) -> Callable[..., Records]:
 
     def make(periods: int = 3, *, bristles: tuple[int, float, float] | None = None, compliance: float = 0.0) -> Records:
         truth = Truth(bristles=LuGre(*bristles) if bristles else None, compliance=compliance)
-        return two_records(truth, prototype, np.random.default_rng(7), periods)
+        return two_records(truth, prototype, np.random.default_rng(7), periods, length=4.0)
 
     return make
 

@@ -35,8 +35,8 @@ _WIDTH = {"steering_left": 0.9, "steering_right": 0.9, "straight": 1.1, "rotatio
 """Largest speed of the coordinate [rad/s or m/s]."""
 
 
-def course(step: str, generator: np.random.Generator, periods: int, length: float = 4.0) -> Course:
-    """Five harmonics, repeated, after a quarter of a period in which they swell."""
+def course(step: str, generator: np.random.Generator, periods: int, length: float) -> Course:
+    """Five harmonics, repeated, after a quarter of a period [s] in which they swell."""
     samples, lead = round(length / CYCLE), round(length / 4 / CYCLE)
     time = np.arange(-lead, periods * samples) * CYCLE
     harmonics = np.arange(1, 6)
@@ -107,9 +107,13 @@ def _segment(each: Course, index: int, torques: Array, read: list[Array], genera
 
 
 def two_records(
-    truth: Truth, vehicle: VehicleDescription, generator: np.random.Generator, periods: int = 3
+    truth: Truth,
+    vehicle: VehicleDescription,
+    generator: np.random.Generator,
+    periods: int = 3,
+    length: float = 8.0,
 ) -> tuple[Record, Record]:
-    """A record to fit and one to confirm, of other motions and noise."""
-    courses = [course(step, generator, periods) for _ in range(2) for step in STEPS]
+    """A record to fit and one to confirm, of other motions and noise, in periods of some length [s]."""
+    courses = [course(step, generator, periods, length) for _ in range(2) for step in STEPS]
     segments = drive(truth, vehicle, courses, generator)
     return Record(segments[:4], "fit"), Record(segments[4:], "confirm")

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from ident.diagnosis.axis.motion import AxisMotion
 from ident.diagnosis.delays import delayed
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.problem import Candidate, Variant
+from ident.diagnosis.orders import FEWEST
+from ident.diagnosis.problem import Candidate, Periodic, Variant
 from ident.effects import EffectParameter
 from ident.estimate.filters import SEVEN, differentiate
 from ident.records.axis_record import AxisKind
@@ -34,11 +35,6 @@ LEAST_SHARE: Final = 0.1
 """Of the effort that must lie behind a play for it to be one."""
 LONGEST_HOLD: Final = 0.55
 """Sample intervals up to which a lag is no delay: half of one is what holding the effort over the interval does."""
-FEWEST_RIPPLES: Final = 2.0
-"""Periods over the range of the position below which a force that follows the position is no ripple."""
-RIPPLE_STEP: Final = 0.7
-MOST_RIPPLES: Final = 90.0
-"""Periods over the range of the position that are tried, and their step."""
 
 
 class AxisEffect(enum.StrEnum):
@@ -228,23 +224,25 @@ def _torque_ripple(axis: AxisModel) -> Candidate:
     def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
         return axis.alone(values[0] * np.sin(values[1] * angle + values[2]))
 
-    def variant(order: float) -> Variant:
-        columns = np.stack([np.sin(order * angle), np.cos(order * angle)], axis=1)
-        return Variant(axis.alone(columns), lambda found: _polar(found, order))
+    def start(order: float) -> Callable[[Array], Array]:
+        return lambda found: np.array([np.hypot(*found), order * turn / (2 * np.pi), np.arctan2(found[1], found[0])])
 
     parameters = (
         EffectParameter("amplitude", axis.unit(), "not reported by the drive"),
         EffectParameter("order", "1" if axis.kind is AxisKind.ROTARY else "1/m", "periods a turn, or a metre"),
         EffectParameter("phase", "rad", "at position zero"),
     )
-    periods = np.arange(1.0, MOST_RIPPLES + RIPPLE_STEP, RIPPLE_STEP)
-    variants = tuple(variant(float(count) * turn / axis.reach) for count in periods)
-    lowest = (0.0, FEWEST_RIPPLES * turn / axis.reach, 0.0)
-    return Candidate(EffectName.TORQUE_RIPPLE, axis.place, parameters, variants, contribution, lowest=lowest)
-
-
-def _polar(found: Array, order: float) -> Array:
-    return np.array([np.hypot(found[0], found[1]), order, np.arctan2(found[1], found[0])])
+    fewest = FEWEST * turn / axis.reach
+    slowest = np.stack([np.sin(fewest * angle), np.cos(fewest * angle)], axis=1)
+    return Candidate(
+        EffectName.TORQUE_RIPPLE,
+        axis.place,
+        parameters,
+        (Variant(axis.alone(slowest), start(2 * np.pi * fewest / turn)),),
+        contribution,
+        lowest=(0.0, fewest, 0.0),
+        periodic=Periodic(f"law_angle@{axis.place}", start),
+    )
 
 
 def _coupled_friction(axis: AxisModel) -> list[Candidate]:

@@ -47,6 +47,8 @@ REST: Final = 12.0
 samples of white noise have a range of 10."""
 FEWEST_ROWS: Final = 60
 """Independent rows that a diagnosis needs."""
+LEAST_BAND: Final = 1.2 * FEWEST_ROWS / ROWS_PER_CUTOFF / ROWS_CUTOFF
+"""Cutoff of the position filter at least, times the duration: behind it, the rows of a slow motion suffice."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ def position_cutoff(record: AxisRecord) -> float:
     only noise is left; its smoothed minimum lies between, and the smallest over the axes is taken.
     """
     rate = 1 / record.sample_time
-    lowest = min(20 / (len(record) * record.sample_time), LARGEST_CUTOFF * rate)
+    lowest = min(LEAST_BAND / (len(record) * record.sample_time), LARGEST_CUTOFF * rate)
     found = [_quietest(axis.position, rate) for axis in record.axes]
     return 2 * math.pi * float(np.clip(min(found), lowest, LARGEST_CUTOFF * rate))
 
@@ -108,11 +110,12 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth:
         raise EstimationError(
             f"{record.source}: the effort of {axis.label} never changes.", "Record the force or torque of its drive."
         )
-    if len(record) * dt * bandwidth / (2 * math.pi) < FEWEST_ROWS / ROWS_PER_CUTOFF:
+    rows = ROWS_PER_CUTOFF * len(record) * dt * bandwidth / (2 * math.pi)
+    if rows < FEWEST_ROWS:
         raise EstimationError(
-            f"{record.source} lasts {len(record) * dt:.3g} s, too short for its bandwidth of "
-            f"{bandwidth / (2 * math.pi):.3g} Hz.",
-            "Record longer, at least some ten strokes.",
+            f"{record.source} lasts {len(record) * dt:.3g} s and shows the axis up to "
+            f"{bandwidth / (2 * math.pi):.3g} Hz: {rows:.0f} independent rows, where a diagnosis needs {FEWEST_ROWS:.0f}.",
+            "Record longer, or faster where the sampling is why: its frequency must be 20 times what shall be seen.",
         )
     position = smoothed(axis.position, cutoff, dt)
     velocity = differentiate(position, dt, SEVEN)

@@ -120,6 +120,12 @@ def alternatives(law: Law, dependences: Sequence[Dependence]) -> tuple[Alternati
     return tuple(Alternative(None, variable, where) for variable, where in found)
 
 
+def same_names(keys: Sequence[str]) -> tuple[Alternative, ...]:
+    """The effects that add the same to these records as the first of them does."""
+    pairs = (key.split("@", 1) for key in keys[1:])
+    return tuple(Alternative(name, None, where) for name, where in pairs)
+
+
 def law_effect(law: Law, scale: float, std: float) -> Effect | None:
     """The law as an effect of a model; None where a model has no form for it.
 

@@ -54,6 +54,7 @@ class Learnt:
         whole: (K,) the same from all rows.
         covariance: (K, K) of those.
         shape: (n,) what it adds to the whitened rows beside the baseline, by all rows.
+        scale: by which all evidence was divided, as the noise along the function scatters more than white noise.
     """
 
     index: int
@@ -64,11 +65,11 @@ class Learnt:
     whole: Array
     covariance: Array
     shape: Array
+    scale: float
 
-    @property
-    def total(self) -> float:
-        """Log evidence of all rows."""
-        return self.log_evidence + self.log_predictive
+    def total(self, cost: float) -> float:
+        """Log evidence of all rows, less that of a noise without a law by which `cost` more of them is explained."""
+        return self.log_evidence + self.log_predictive - cost / self.scale
 
 
 @dataclass(frozen=True)
@@ -128,6 +129,7 @@ class Learner:
             whole=turn @ whole.mean,
             covariance=scale * turn @ whole.covariance @ turn.T,
             shape=whole.shape,
+            scale=scale,
         )
 
     def _scale(self, part: _Fit, whole: _Fit) -> float:

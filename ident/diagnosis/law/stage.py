@@ -1,7 +1,8 @@
 """The search for a law: on what does the remainder depend, beside what is taken?
 
 Every dependence is learnt beside the baseline and the effects taken. First noise has a level alone, so that a law of
-long memory is not taken for its colour; then the colour of what the best law leaves, and all are learnt again.
+long memory is not taken for its colour; then the colour of what the best law leaves, and all are learnt again. A law
+must explain more than coloured noise without a law does: that noise is as free to remember as the law is.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from ident.diagnosis.law.learning import Designs, Learner, Learnt
 from ident.diagnosis.problem import Candidate, Problem, Variant
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Column
+from ident.diagnosis.whitening import ORDER
 from ident.effects import EffectParameter
 
 Array = NDArray[np.float64]
@@ -33,7 +35,7 @@ ROUNDS: Final = 3
 """Of learning all dependences: with levels alone, with the colour of what the best law leaves, and with its colour."""
 
 SURELY: Final = 3.0
-"""Log odds that a law, all that were tried shared among, must have, and log evidence of the confirming rows."""
+"""Log odds that a law, all that were tried shared among, must have, and log evidence of the rows of either record."""
 
 
 @dataclass(frozen=True)
@@ -71,20 +73,24 @@ def next_law(problems: Sequence[Problem], regression: Regression, designs: Desig
     """The law that explains most beside what is taken; None where none does surely."""
     dependences = problems[0].dependences
     columns = regression.columns_of(tuple(taken))
-    whitener, tried = regression.colour_beside(columns, order=0), range(len(dependences))
+    tried, order = range(len(dependences)), 0
+    beside = columns
     for _ in range(ROUNDS):
+        whitener = regression.colour_beside(beside, order)
         learner = Learner(regression, whitener, taken)
         made = [one for index in tried if (one := _tried(learner, designs, index)) is not None]
-        found = sorted(made, key=lambda one: -one.total)
+        found = sorted(made, key=lambda one: -one.total(0.0))
         if not found:
             return None
-        added = designs.columns(found[0].index) @ found[0].whole
-        whitener = regression.colour_beside(np.column_stack([columns, added]))
+        beside, order = np.column_stack([columns, designs.columns(found[0].index) @ found[0].whole]), ORDER
     best_one = found[0]
-    if best_one.total < SURELY + math.log(len(dependences)) or best_one.log_predictive < SURELY:
+    coloured = regression.log_likelihood(columns, regression.colour_beside(columns))
+    cost = max(coloured - regression.log_likelihood(columns, whitener), 0.0)
+    seen_in_both = min(best_one.log_evidence, best_one.log_predictive) > SURELY
+    if best_one.total(cost) < SURELY + math.log(len(dependences)) or not seen_in_both:
         return None
     same = tuple(dependences[one.index].key for one in found if _cosine(one.shape, best_one.shape) > SAME)
-    odds = {dependences[one.index].key: one.total for one in found}
+    odds = {dependences[one.index].key: one.total(cost) for one in found}
     return Law(dependences[best_one.index], best_one, odds, same, len(problems[0].candidates))
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,7 @@ from ident.diagnosis.vehicle.context import MODEL_COLUMNS, Context, fitted_param
 from ident.diagnosis.vehicle.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
 from ident.diagnosis.vehicle.dependences import vehicle_dependences
 from ident.diagnosis.vehicle.inputs import SLICES
+from ident.diagnosis.vehicle.lag import LAG_NAME, LAG_STD, lag_columns
 from ident.diagnosis.vehicle.library import TermCause
 from ident.diagnosis.vehicle.moments import apart_from_moments
 from ident.diagnosis.vehicle.rattling import SHAKEN
@@ -29,6 +32,12 @@ from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters
 
 Array = NDArray[np.float64]
+
+UNSTATED: Final[Mapping[str, float]] = MappingProxyType(dict.fromkeys(CREEP_NAMES, CREEP_STD) | {LAG_NAME: LAG_STD})
+"""Standard deviations, about zero, of what is fitted beside the parameters and is no cause."""
+
+INEXACT: Final = 1e-3
+"""Part of what a dynamic row measures that no model and no sensor is expected to have right."""
 
 
 def build_problem(
@@ -72,20 +81,23 @@ def build_problem(
     candidates = [candidate_of(cause, columns, sources, tables, context) for cause in causes]
     slid = slid_by_any(sources, context)
     return Problem(
-        names=(*PARAMETER_NAMES, *CREEP_NAMES),
-        units=(*PARAMETER_UNITS.values(), *["1"] * len(CREEP_NAMES)),
-        blocks=tuple(replace(block, irregular=series) for block, series in zip(blocks, slid, strict=True)),
+        names=(*PARAMETER_NAMES, *UNSTATED),
+        units=(*PARAMETER_UNITS.values(), *["1"] * len(CREEP_NAMES), "samples"),
+        blocks=tuple(
+            replace(block, irregular=series, baseline=np.column_stack([block.baseline, late]))
+            for block, series, late in zip(blocks, slid, lag_columns(sources, context), strict=True)
+        ),
         candidates=tuple(seen_together(candidates, slid, sources, context)),
         nominal=_nominal(model) if model else None,
-        spreads=dict.fromkeys(CREEP_NAMES, CREEP_STD),
+        spreads=UNSTATED,
         dependences=tuple(vehicle_dependences(sources, context)),
     )
 
 
 def _nominal(model: Parameters) -> Nominal:
-    """Values of the model, whose wheels do not creep."""
-    creep = len(CREEP_NAMES)
-    return Nominal(np.append(model.values, np.zeros(creep)), np.append(model.std, np.full(creep, CREEP_STD)))
+    """Values of the model, whose wheels do not creep and whose torques act when they are reported."""
+    spreads = np.array(list(UNSTATED.values()))
+    return Nominal(np.append(model.values, np.zeros(len(spreads))), np.append(model.std, spreads))
 
 
 def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
@@ -121,7 +133,8 @@ def _tolerance(source: Source, row: int, target: Array, context: Context) -> flo
         size = rms(context.filtered(source.own.of(source.inputs)[:, row], source)[used])
         return math.hypot(source.own.untold * size, source.own.lever * source.own.other)
     if source.channel is Channel.DYNAMIC:
-        return SHAKEN * rms(target[used]) if source.travels and source.rattles.any() else 0.0
+        shaken = SHAKEN if source.travels and source.rattles.any() else 0.0
+        return math.hypot(shaken, INEXACT) * rms(target[used])
     return tolerated_creep(source, source.coordinates[row], context.geometry)
 
 

@@ -17,6 +17,7 @@ from ident.diagnosis.problem import Candidate, Variant
 from ident.diagnosis.vehicle.askew import beside_sliding, stands_askew
 from ident.diagnosis.vehicle.context import FORMULAS_KEPT, MODEL_COLUMNS, Context
 from ident.diagnosis.vehicle.contribution import Cause, acting_in, contribution_of, side_by_side
+from ident.diagnosis.vehicle.lag import HELD
 from ident.diagnosis.vehicle.library import (
     DRIFTS,
     ONE_SIDED,
@@ -83,9 +84,6 @@ Three percent of a gear's, which may stay untold (`rattling.UNTOLD`); half of wh
 On cases of an exam gears of 172 μrad/Nm seemed to have plays of 58 and 80 μrad, couplings of 20 μrad/Nm of 40 and 57.
 """
 
-HELD: Final = 0.55
-"""Sample intervals by which a torque may seem to act before it is reported: half of one is what holding it does."""
-
 SPREADS: Final[Mapping[tuple[EffectName, str], float]] = MappingProxyType(
     dict.fromkeys([(EffectName.STEERING_OFFSET, place) for place in STEERING], OFFSET_STD)
     | dict.fromkeys([(EffectName.ELASTICITY, place) for place in DRIVES], COMPLIANCE_STD)
@@ -125,7 +123,7 @@ def candidate_of(
         contribution=None if linear else contribution_of(cause, acting_in(variants, sources), sources, context),
         drift=cause.name in DRIFTS,
         least=0.0 if cause.name in ONE_SIDED else None,
-        negligible=(_held(sources), 0.0) if cause.name == EffectName.TIME_DELAY else (0.0, 0.0),
+        negligible=_by_sampling(cause, sources),
         spread=(SPREADS[cause.name, cause.where],) if (cause.name, cause.where) in SPREADS else (),
         part=PLAY_PART if cause.name == EffectName.BACKLASH and cause.where in DRIVES else 0.0,
         yielding=LOAD_STD[cause.where] if cause.name == EffectName.BACKLASH else 0.0,
@@ -135,9 +133,12 @@ def candidate_of(
     )
 
 
-def _held(sources: Sequence[Source]) -> float:
-    """By how much a torque or an angle may seem to act before it is reported [s]: half of a sample, as it is held."""
-    return max((HELD * source.sample_time for source in sources), default=0.0)
+def _by_sampling(cause: Cause, sources: Sequence[Source]) -> tuple[float, float]:
+    """Sizes of a delay [s], as a lead and as itself, up to which sampling may be what it is."""
+    if cause.name != EffectName.TIME_DELAY:
+        return 0.0, 0.0
+    held = HELD * max((source.sample_time for source in sources), default=0.0)
+    return held, held if cause.where == "drives" else 0.0
 
 
 def slid_by_any(sources: Sequence[Source], context: Context) -> Sequence[Array | None]:

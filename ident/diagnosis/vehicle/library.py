@@ -121,7 +121,8 @@ def ripple_over(where: str, geometry: Geometry) -> Periodic:
 
         return values
 
-    return Periodic(f"law_angle_motor@wheel_{where.removeprefix('drive_')}", start)
+    joint = "wheels" if where == "drives" else f"wheel_{where.removeprefix('drive_')}"
+    return Periodic(f"law_angle_motor@{joint}", start)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 CREEP = np.array([0.02, 0.008, 0.012, 0.03])
 """Slip of each wheel for a traction as large as its load [-]."""
+COLUMNS = slice(len(PARAMETER_NAMES), len(PARAMETER_NAMES) + len(CREEP_NAMES))
+"""Of creep, in the baseline."""
 
 
 def creeping(segment: Segment, vehicle: VehicleDescription) -> Segment:
@@ -45,7 +47,7 @@ def rolling(problem: Problem) -> tuple[Array, Array, Array]:
     """Creep's columns, the column of an askew wheel and the target of the straight drive's rolling rows."""
     (variant,) = problem.candidate("steering_offset@steering_left").variants
     parts = [
-        (block.baseline[:, len(PARAMETER_NAMES) :], column, block.target, block.moving)
+        (block.baseline[:, COLUMNS], column, block.target, block.moving)
         for block, column in zip(problem.blocks, variant.columns, strict=True)
         if block.channel is Channel.KINEMATIC and block.step == Step.STRAIGHT
     ]
@@ -74,7 +76,7 @@ def test_creep_does_not_look_like_wheels_that_stand_askew(problem: Problem) -> N
 
 
 def test_creep_is_known_to_be_small_and_no_parameter_of_the_model(problem: Problem) -> None:
-    assert problem.names == (*PARAMETER_NAMES, *CREEP_NAMES)
+    assert problem.names[COLUMNS] == CREEP_NAMES
     assert problem.nominal is not None
     assert not problem.nominal.values[len(PARAMETER_NAMES) :].any()
     assert all(0.01 <= problem.spreads[name] <= 0.1 for name in CREEP_NAMES)
