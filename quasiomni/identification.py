@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from hil.campaign.axes import identify_axis_record, write_axis_result
 from hil.campaign.folder import RunFolder, open_run
 from hil.campaign.results import Result, identify_records, identify_run, report_run, write_result
 from ident.assessment import Verdict
 from ident.errors import UserError
 from ident.estimate.result import KnownInertia
 from ident.report.assessment import assessment_lines
-from ident.report.tables import condition_line, excitation_table, paper_table, parameter_table, step_table
+from ident.report.tables import axis_table, condition_line, excitation_table, paper_table, parameter_table, step_table
 from quasiomni.application import app, console
 from quasiomni.options import (
     GivenVehicleOption,
@@ -38,13 +40,25 @@ def identify(
     out: Annotated[
         Path | None, typer.Option(help="Folder for parameters.toml and report.html. Default: the run folder, or here.")
     ] = None,
+    axis: Annotated[
+        bool, typer.Option("--axis", help="The record is of servo axes: time, position, effort. Writes axis.toml.")
+    ] = False,
+    cutoff: Annotated[
+        float | None, typer.Option(min=0.0, help="Of the position filter of axes [Hz]. Default: from the record.")
+    ] = None,
 ) -> None:
     """Identify the parameters from recorded frames or records alone; writes parameters.toml and report.html.
 
     The result is assessed: good, doubtful (exit 0, with the command that looks for the cause), or unusable (exit 1).
     """
-    inertia = known_inertia(b_w, b_w_std)
     require_readers(records)
+    if axis:
+        _refuse_platform(records, vehicle, network, b_w, b_w_std)
+        _identify_axes(records[0], out or Path(), cutoff)
+        return
+    if cutoff is not None:
+        raise UserError("--cutoff is of the position filter of axes.", "Add --axis, or leave it out.")
+    inertia = known_inertia(b_w, b_w_std)
     is_run = len(records) == 1 and RunFolder(records[0]).manifest.is_file()
     target = out or (records[0] if is_run else Path())
     with stages() as stage:
@@ -53,6 +67,29 @@ def identify(
         else:
             result = identify_records(records, target, inertia, vehicle, network, stage)
     end_with(result, target)
+
+
+def _refuse_platform(records: list[Path], *options: object) -> None:
+    if any(option is not None for option in options):
+        raise UserError(
+            "--vehicle, --network, --b-w and --b-w-std are of the platform, --axis of records of servo axes.",
+            "Leave one side out.",
+        )
+    if len(records) > 1:
+        raise UserError("Axes are identified from one record.", "Name one of them, or diagnose all with --axis.")
+
+
+def _identify_axes(path: Path, out: Path, cutoff: float | None) -> None:
+    with stages() as stage:
+        stage("reading")
+        result = identify_axis_record(path, out, cutoff)
+    for found in result.axes:
+        console.print(axis_table(result.record.axis(found.axis).label, found))
+    hertz = result.processing.cutoff / (2 * math.pi)
+    say([f"Position filter {hertz:.3g} Hz, every {result.processing.decimation}. sample a row.", *result.notes])
+    written = write_axis_result(result, path, out)
+    console.print(f"Written: {written}")
+    say([f"What this model lacks: quasiomni diagnose {path} --axis"])
 
 
 @app.command()

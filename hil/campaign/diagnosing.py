@@ -10,9 +10,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.campaign.axes import assumed_kinds, axis_models
 from hil.campaign.folder import describe, sources_of
 from hil.campaign.reading import first_run, read_of, whole_records
 from hil.network.described import told_differences
+from ident.axis_file import AxisModelEntry, write_axis_models
 from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.diagnosis import Diagnosis, faulty, write_diagnosis
 from ident.diagnosis.findings import Findings
@@ -23,7 +25,7 @@ from ident.effects.extended import ExtendedModel
 from ident.errors import RecordError, UserError
 from ident.faults import Fault, find_faults
 from ident.parameters_file import read_model, write_model
-from ident.records.axis_record import AxisKind, AxisRecord, read_axis_record
+from ident.records.axis_record import AxisRecord, read_axis_record
 from ident.records.record import Record
 from ident.report.faults import fault_lines, write_fault_report
 from ident.report.gap import GapReport, write_gap_report
@@ -39,12 +41,6 @@ SAME: Final = 1e-6
 """Largest difference of two series over their range at which they are the same recording, written twice."""
 SAME_RATE: Final = 0.01
 """Largest relative difference of two sample times."""
-
-ASSUMED: Final = {
-    AxisKind.LINEAR: "No units are stated, m and N are taken; name a channel `position [rad]` if its axis turns.",
-    AxisKind.ROTARY: "No units are stated, rad and Nm are taken; name a channel `position [m]` if its axis slides.",
-}
-"""What is said where the kind of an axis is assumed."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +87,7 @@ class Answer:
         model: with the effects that are named; None where none is.
         notes: what the reader must know, a line each.
         geometry: of the vehicle that was diagnosed; None for axes.
+        axes: models of axes with the effects that are named; empty for a vehicle, or where none is.
     """
 
     findings: Findings | None
@@ -98,6 +95,7 @@ class Answer:
     model: ExtendedModel | None = None
     notes: tuple[str, ...] = ()
     geometry: Geometry | None = None
+    axes: tuple[AxisModelEntry, ...] = ()
 
     @property
     def summary(self) -> list[str]:
@@ -161,6 +159,9 @@ def write_answer(order: DiagnosisOrder, answer: Answer) -> list[Path]:
     if order.extended is not None and answer.model is not None:
         write_model(answer.model, order.extended, _provenance(order), geometry=answer.geometry)
         written.append(order.extended)
+    if order.extended is not None and answer.axes:
+        write_axis_models(answer.axes, order.extended, _provenance(order))
+        written.append(order.extended)
     return written
 
 
@@ -194,11 +195,6 @@ def _refuse_unworkable(order: DiagnosisOrder) -> None:
     read = [source for path in (*order.records, *order.confirm) for source in sources_of(path)]
     vehicle = None if order.vehicle is None or order.axis else find_data_file("ident.vehicle", order.vehicle)
     refuse_inputs(order.files, [*read, order.model, vehicle])
-    if order.axis and order.extended is not None:
-        raise UserError(
-            "--extended writes a model of the platform, --axis says that the records are of servo axes.",
-            "Leave one of them out; --json holds the causes of an axis.",
-        )
 
 
 def _axis_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
@@ -209,10 +205,12 @@ def _axis_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
         )
     stage("reading")
     records, confirming = ([read_axis_record(path) for path in paths] for paths in (order.records, order.confirm))
-    _refuse_repeated([_of_axes(record) for record in (*records, *confirming)])
+    _refuse_repeated([_of_axes(record) for record in (*records, *confirming)], same_rate=False)
     findings = diagnose_axis(records, confirming, seed=order.seed, stage=stage)
-    assumed = [axis.kind for record in records for axis in record.axes if axis.assumed]
-    return Answer(findings, findings.diagnosis(), notes=(ASSUMED[assumed[0]],) if assumed else ())
+    diagnosis = findings.diagnosis()
+    places = [axis.named("axis") for axis in records[0].axes]
+    axes = axis_models(findings, places) if diagnosis.verdict.explains else []
+    return Answer(findings, diagnosis, notes=assumed_kinds(records), axes=tuple(axes))
 
 
 def _vehicle_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
@@ -226,7 +224,7 @@ def _vehicle_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
         [read_of(path, order.vehicle, order.network, described) for path in paths]
         for paths in (order.records, order.confirm)
     )
-    _refuse_repeated([part for record in (*records, *confirming) for part in _of_vehicle(record)])
+    _refuse_repeated([part for record in (*records, *confirming) for part in _of_vehicle(record)], same_rate=True)
     stage("looking for faults of the records")
     faults = _faults((*records, *confirming), vehicle)
     notes = (told,) if told else ()
@@ -247,8 +245,8 @@ def _faults(records: Sequence[Record], vehicle: VehicleDescription) -> list[Faul
     return list({(fault.name, fault.channel, fault.step): fault for fault in found}.values())
 
 
-def _refuse_repeated(parts: Sequence[_Stretch]) -> None:
-    """Refuse what is there twice, under whatever name, and recordings of different rates.
+def _refuse_repeated(parts: Sequence[_Stretch], *, same_rate: bool) -> None:
+    """Refuse what is there twice, under whatever name, and recordings of different rates where they must be one.
 
     Raises:
         RecordError: named.
@@ -260,7 +258,7 @@ def _refuse_repeated(parts: Sequence[_Stretch]) -> None:
                     f"{part.source} holds the same samples as {other.source}.",
                     "A record cannot confirm itself, nor count twice: name independent ones, or leave it out.",
                 )
-            if abs(part.sample_time - other.sample_time) > SAME_RATE * other.sample_time:
+            if same_rate and abs(part.sample_time - other.sample_time) > SAME_RATE * other.sample_time:
                 raise RecordError(
                     f"{part.source} is sampled every {part.sample_time * 1e3:.4g} ms, {other.source} every "
                     f"{other.sample_time * 1e3:.4g} ms.",

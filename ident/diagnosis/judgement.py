@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -149,12 +150,17 @@ class Judgement:
 
     def _verdict(self) -> Verdict:
         if not self.found.variants:
-            left = self._predictable() or self._surely_repeating() or self.fitted.exactly.after > self.limits.far_off
+            left = self._predictable() or self._surely_repeating() or self._far_off()
             return Verdict.UNKNOWN if left else Verdict.NONE
         unexplained = self._predictable() and self._explained() < self.limits.explained
         strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
         another = self._sizeless(self._strongest) or self._outside(self._strongest)
         return Verdict.UNKNOWN if strange or another or self._short() else Verdict.EFFECT
+
+    def _far_off(self) -> bool:
+        """Whether the held-out gap is too large to be called noise, whatever can be predicted of it."""
+        count = max(int(self.rows.confirming.sum()), 1)
+        return self.fitted.exactly.after > 1 + max(self.limits.far_off, self.limits.scarce / math.sqrt(count))
 
     def _short(self) -> bool:
         """Whether the model with all effects, refitted exactly, is further from the held-out rows than without any.

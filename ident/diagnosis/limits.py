@@ -26,7 +26,8 @@ class Limits:
         widening: share of the held-out gap by which an effect may seem to widen it.
         most: share of the held-out gap that all effects must close where nothing repeats.
         measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.
-        far_off: held-out gap, over its noise, above which nothing is called complete, whatever can be predicted.
+        far_off: what the held-out gap may have beyond its noise, over that, to be called none.
+        scarce: the same times the square root of the confirming rows, where those are few.
         law: share of the held-out gap that a law must close: a curve bends to what is left of any other cause.
         name: the same of a name that stands in place of a law: several of them bend to a curve as well.
         sure: log Bayes factor of the confirming rows from which an effect stands although it seems to, by accident.
@@ -53,7 +54,8 @@ class Limits:
     widening: float = 0.1
     most: float = 0.5
     measurable: float = 0.05
-    far_off: float = 1.3
+    far_off: float = 0.3
+    scarce: float = 4.0
     law: float = 0.12
     name: float = 0.05
     sure: float = 2.5

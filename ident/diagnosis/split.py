@@ -17,7 +17,7 @@ Numbers = NDArray[np.int64]
 FITTED: Final = 0.6
 """Part of a record without repeats that is fitted; the rest confirms."""
 
-TURNS: Final = 5
+TURNS: Final = 3
 """Of fitting and confirming parts in such a record: motions often change along it, and what the fitted part does not
 show, the other one cannot confirm."""
 

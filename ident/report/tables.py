@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ident.campaign.plan import Plan
+from ident.estimate.axis import AxisIdentification
 from ident.estimate.result import Identification
 from ident.report.digits import MISSING, digits, percent, significant, unit_text, with_std
 from ident.report.paper import PaperResult, load_paper_result
@@ -35,6 +36,17 @@ def parameter_table(identification: Identification, truth: Parameters | None = N
     captions = [text for quality, text in _MARKED.items() if any(row.estimate.quality == quality for row in rows)]
     if captions:
         table.caption = f"Marked: {'; '.join(captions)}."
+    return table
+
+
+def axis_table(label: str, found: AxisIdentification) -> Table:
+    """Value, standard deviation and 95 % interval of M, Fv, Fc and offset of one axis."""
+    table = _table(f"Parameters of the {label}", ["", "value", "std", "95 % interval", "unit"], left=(0, 4))
+    for one in found.estimates:
+        low, high = (digits(bound, one.std) for bound in one.ci95)
+        unit = unit_text(one.unit)
+        table.add_row(one.name, digits(one.value, one.std), digits(one.std, one.std), f"{low} … {high}", unit)
+    table.caption = f"Relative error {percent(found.relative_error)}, cond {found.condition:.3g}."
     return table
 
 

@@ -7,15 +7,16 @@ drive and load by its first term in frequency.
 
 from __future__ import annotations
 
-import enum
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.axis.memories import friction_load, friction_warming, presliding, torque_filter
+from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear
 from ident.diagnosis.axis.motion import AxisMotion
+from ident.diagnosis.axis.positional import friction_position, gravity_loads, inertia_position
 from ident.diagnosis.delays import delayed
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.orders import FEWEST
@@ -25,112 +26,55 @@ from ident.estimate.filters import SEVEN, differentiate
 from ident.records.axis_record import AxisKind
 
 Array = NDArray[np.float64]
-Filter = Callable[[Array], Array]
 
 STRIBECK_SPEEDS: Final = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Tried first, over the 95th percentile of the speed."""
 BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
 """Tried first, over the range of the position."""
+GRID: Final = 0.3
+"""Part of a gap by which it may lie between those tried."""
 LEAST_SHARE: Final = 0.1
 """Of the effort that must lie behind a play for it to be one."""
 LONGEST_HOLD: Final = 0.55
 """Sample intervals up to which a lag is no delay: half of one is what holding the effort over the interval does."""
 
 
-class AxisEffect(enum.StrEnum):
-    """Effects that only coupled axes have."""
-
-    COUPLED_FRICTION = "coupled_friction"
-
-
-@dataclass(frozen=True)
-class AxisModel:
-    """What candidates are written in: one axis of a record.
-
-    Attributes:
-        place: its place, for results.
-        block: its number among the blocks of the problem.
-        blocks: how many blocks there are.
-        kind: says the units.
-        motion: smoothed.
-        sample_time: [s].
-        filtered: passes (N,) or (N, k) through the filter of the rows.
-        inertia: M of a first estimate [kg or kg m²].
-        effort: (N,) of that estimate, from the smoothed motion [N or Nm].
-        absorbed: (N,) the same, of the columns of the baseline itself.
-        speed: of which the axis is seldom faster [m/s or rad/s].
-        reach: range of its position [m or rad].
-        others: name and motion of the other axes.
-    """
-
-    place: str
-    block: int
-    blocks: int
-    kind: AxisKind
-    motion: AxisMotion
-    sample_time: float
-    filtered: Filter
-    inertia: float
-    effort: Array
-    absorbed: Array
-    speed: float
-    reach: float
-    others: tuple[tuple[str, AxisMotion], ...]
-
-    def alone(self, column: Array) -> tuple[Array | None, ...]:
-        """A filtered column in the block of this axis, nothing in the others."""
-        filtered = self.filtered(column)
-        return tuple(filtered if index == self.block else None for index in range(self.blocks))
-
-    def unit(self, per: str = "") -> str:
-        """Unit of the effort, over some power of position and time."""
-        return f"{self.kind.effort_unit}{per.replace('q', self.kind.position_unit)}"
-
-
 def axis_candidates(axis: AxisModel) -> list[Candidate]:
     """Every cause that the library has for an axis."""
-    made = [make(axis) for make in _LIBRARY]
-    return [*made, *_coupled_friction(axis)] if axis.others else made
-
-
-def _linear(
-    axis: AxisModel, effect: str, parameters: Sequence[EffectParameter], *columns: Array, least: float | None = None
-) -> Candidate:
-    variant = Variant(axis.alone(np.stack(columns, axis=1)))
-    return Candidate(effect, axis.place, tuple(parameters), (variant,), least=least)
+    return [*(make(axis) for make in _LIBRARY), *gravity_loads(axis), *_coupled_friction(axis)]
 
 
 def _asymmetric_viscous(axis: AxisModel) -> Candidate:
     unit = axis.unit(" s/q")
     parameter = EffectParameter("imbalance", unit, "friction is Fv + imbalance forward, Fv - imbalance backward")
-    return _linear(axis, EffectName.ASYMMETRIC_VISCOUS, [parameter], np.abs(axis.motion.velocity))
+    return linear(axis, EffectName.ASYMMETRIC_VISCOUS, [parameter], np.abs(axis.motion.velocity))
 
 
 def _asymmetric_coulomb(axis: AxisModel) -> Candidate:
     parameter = EffectParameter("imbalance", axis.unit(), "friction is Fc + imbalance forward, Fc - imbalance backward")
-    return _linear(axis, EffectName.ASYMMETRIC_COULOMB, [parameter], np.sign(axis.motion.velocity) ** 2)
+    return linear(axis, EffectName.ASYMMETRIC_COULOMB, [parameter], np.sign(axis.motion.velocity) ** 2)
 
 
 def _torque_bias(axis: AxisModel) -> Candidate:
     parameter = EffectParameter("bias", axis.unit(), "effort beyond the effort reported")
-    return _linear(axis, EffectName.TORQUE_BIAS, [parameter], -np.ones_like(axis.effort))
+    return linear(axis, EffectName.TORQUE_BIAS, [parameter], -np.ones_like(axis.effort))
 
 
 def _torque_gain(axis: AxisModel) -> Candidate:
     parameter = EffectParameter("error", "1", "effort is (1 + error) times the effort reported")
-    return _linear(axis, EffectName.TORQUE_GAIN, [parameter], -axis.absorbed)
+    return linear(axis, EffectName.TORQUE_GAIN, [parameter], -axis.absorbed)
 
 
 def _payload(axis: AxisModel) -> Candidate:
     unit = "kg" if axis.kind is AxisKind.LINEAR else "kg m^2"
     parameter = EffectParameter("mass", unit, "inertia that the model does not have")
-    return _linear(axis, EffectName.PAYLOAD, [parameter], axis.motion.linear[:, 0])
+    return linear(axis, EffectName.PAYLOAD, [parameter], axis.motion.linear[:, 0])
 
 
 def _quadratic_drag(axis: AxisModel) -> Candidate:
     parameter = EffectParameter("coefficient", axis.unit(" s^2/q^2"), "resistance is coefficient times v abs(v)")
     velocity = axis.motion.velocity
-    return _linear(axis, EffectName.QUADRATIC_DRAG, [parameter], velocity * np.abs(velocity), least=0.0)
+    return linear(axis, EffectName.QUADRATIC_DRAG, [parameter], velocity * np.abs(velocity))
 
 
 def _gravity(axis: AxisModel) -> Candidate:
@@ -138,12 +82,12 @@ def _gravity(axis: AxisModel) -> Candidate:
     position = axis.motion.position
     if axis.kind is AxisKind.LINEAR:
         parameter = EffectParameter("force", "N", "of gravity along the axis")
-        return _linear(axis, EffectName.SLOPE, [parameter], np.ones_like(position))
+        return linear(axis, EffectName.SLOPE, [parameter], np.ones_like(position))
     parameters = [
         EffectParameter("sine", "Nm", "moment of gravity, times the sine of the angle"),
         EffectParameter("cosine", "Nm", "moment of gravity, times the cosine of the angle"),
     ]
-    return _linear(axis, EffectName.COM_OFFSET, parameters, np.sin(position), np.cos(position))
+    return linear(axis, EffectName.COM_OFFSET, parameters, np.sin(position), np.cos(position))
 
 
 def _stribeck(axis: AxisModel) -> Candidate:
@@ -163,7 +107,7 @@ def _stribeck(axis: AxisModel) -> Candidate:
         EffectParameter("velocity", f"{axis.kind.position_unit}/s", "speed at which it has fallen to 1/e"),
     )
     variants = tuple(variant(share * axis.speed) for share in STRIBECK_SPEEDS)
-    return Candidate(EffectName.STRIBECK, axis.place, parameters, variants, contribution, least=0.0)
+    return Candidate(EffectName.STRIBECK, axis.place, parameters, variants, contribution)
 
 
 def _time_delay(axis: AxisModel) -> Candidate:
@@ -204,7 +148,7 @@ def _backlash(axis: AxisModel) -> Candidate:
         EffectParameter("share", "1", "of the effort that lies behind it"),
     )
     variants = tuple(variant(share * axis.reach) for share in BACKLASH_GAPS)
-    return Candidate(EffectName.BACKLASH, axis.place, parameters, variants, least=LEAST_SHARE)
+    return Candidate(EffectName.BACKLASH, axis.place, parameters, variants, least=LEAST_SHARE, part=GRID)
 
 
 def in_gap(position: Array, gap: float) -> Array:
@@ -274,4 +218,10 @@ _LIBRARY: Final[tuple[Callable[[AxisModel], Candidate], ...]] = (
     _time_delay,
     _backlash,
     _elasticity,
+    friction_position,
+    friction_load,
+    friction_warming,
+    inertia_position,
+    presliding,
+    torque_filter,
 )

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.axis.candidates import AxisModel
+from ident.diagnosis.axis.model import AxisModel
 from ident.diagnosis.law.dependence import Basis, Dependence, Partner, Variable, path_since_reversal
 from ident.estimate.filters import SEVEN, differentiate
 

@@ -12,23 +12,19 @@ from scipy import ndimage, signal
 
 from ident.diagnosis.rows import ROWS_PER_CUTOFF
 from ident.errors import EstimationError
+from ident.estimate.axis.cutoff import SPECTRUM_SEGMENTS
 from ident.estimate.axis.processing import smoothed
 from ident.estimate.filters import SEVEN, differentiate
 from ident.records.axis_record import AxisRecord, AxisSignals
 
 Array = NDArray[np.float64]
 
-LARGEST_CUTOFF: Final = 0.4
-"""Of the position filter, over the sampling frequency."""
 ROWS_CUTOFF: Final = 0.4
 """Cutoff of the rows over that of the position filter: sign(v) then sees the velocity itself."""
 LARGEST_ROWS_CUTOFF: Final = 1.0
 """Largest cutoff of the rows times the sample time."""
 NOISE_SHARE: Final = 0.1
 """Of the effort's noise that the noise of the acceleration may reach."""
-SPECTRUM_SEGMENTS: Final = 8
-BAND: Final = 1.3
-"""Ratio of the ends of the bands over which spectra are averaged."""
 LEAST_ROWS: Final = 300
 """Rows that the shortest repeat, or a record without any, shall have."""
 MOST_ROWS: Final = 4000
@@ -70,18 +66,6 @@ class AxisMotion:
     moving: NDArray[np.bool_]
 
 
-def position_cutoff(record: AxisRecord) -> float:
-    """Cutoff for the positions of a record [rad/s]: where the noise of their second derivative begins to prevail.
-
-    The power spectrum of the acceleration falls with the motion and rises with the fourth power of the frequency where
-    only noise is left; its smoothed minimum lies between, and the smallest over the axes is taken.
-    """
-    rate = 1 / record.sample_time
-    lowest = min(LEAST_BAND / (len(record) * record.sample_time), LARGEST_CUTOFF * rate)
-    found = [_quietest(axis.position, rate) for axis in record.axes]
-    return 2 * math.pi * float(np.clip(min(found), lowest, LARGEST_CUTOFF * rate))
-
-
 def noise_limit(axis: AxisSignals, inertia: float, cutoff: float, sample_time: float) -> float:
     """Frequency [rad/s] below which the noise of the acceleration, times the inertia, is well below that of the effort.
 
@@ -114,7 +98,7 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth:
     if rows < FEWEST_ROWS:
         raise EstimationError(
             f"{record.source} lasts {len(record) * dt:.3g} s and shows the axis up to "
-            f"{bandwidth / (2 * math.pi):.3g} Hz: {rows:.0f} independent rows, where a diagnosis needs {FEWEST_ROWS:.0f}.",
+            f"{bandwidth / (2 * math.pi):.3g} Hz: {rows:.0f} independent rows; a diagnosis needs {FEWEST_ROWS:.0f}.",
             "Record longer, or faster where the sampling is why: its frequency must be 20 times what shall be seen.",
         )
     position = smoothed(axis.position, cutoff, dt)
@@ -170,15 +154,6 @@ def _noise_power(series: Array, sample_time: float) -> float:
     length = max(16, len(series) // SPECTRUM_SEGMENTS)
     frequency, power = signal.welch(series, 1 / sample_time, nperseg=min(length, len(series)), detrend="linear")
     return float(np.median(power[len(frequency) // 2 :]))
-
-
-def _quietest(position: Array, rate: float) -> float:
-    acceleration = np.diff(position, 2) * rate**2
-    length = max(16, len(acceleration) // SPECTRUM_SEGMENTS)
-    frequency, power = signal.welch(acceleration, rate, nperseg=min(length, len(acceleration)), detrend="constant")
-    bands = frequency[1 : 1 + max(1, int(len(frequency) / BAND))]
-    level = [np.mean(power[(frequency >= low) & (frequency <= BAND * low)]) for low in bands]
-    return float(bands[int(np.argmin(level))])
 
 
 def _repeat_length(positions: Array) -> int | None:

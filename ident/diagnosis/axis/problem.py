@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.axis.candidates import LONGEST_HOLD, AxisModel, axis_candidates
+from ident.diagnosis.axis.candidates import LONGEST_HOLD, axis_candidates
 from ident.diagnosis.axis.dependences import axis_dependences
+from ident.diagnosis.axis.model import AxisModel
 from ident.diagnosis.axis.motion import AxisMotion, with_repeats
 from ident.diagnosis.axis.reference import Reference, Scale, Signals, axis_signals, own_columns, refuse_other_axes
 from ident.diagnosis.law.dependence import Dependence, across

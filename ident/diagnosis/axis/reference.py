@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.axis.motion import (
     FEWEST_ROWS,
-    LARGEST_CUTOFF,
+    LEAST_BAND,
     ROWS_CUTOFF,
     AxisMotion,
     axis_motion,
     effort_bandwidth,
     noise_limit,
-    position_cutoff,
     repeat_duration,
 )
 from ident.diagnosis.delays import delayed
 from ident.errors import EstimationError, RecordError
+from ident.estimate.axis.cutoff import LARGEST_CUTOFF, position_cutoff
 from ident.estimate.axis.processing import smoothed
 from ident.estimate.filters import SEVEN, differentiate, zero_phase
 from ident.records.axis_record import AxisRecord, AxisSignals
@@ -121,7 +121,7 @@ def axis_reference(records: Sequence[AxisRecord], cutoff: float | None = None) -
         EstimationError: a record is too short, or an axis does not move.
     """
     refuse_other_axes(records)
-    chosen = cutoff or min(position_cutoff(record) for record in records)
+    chosen = cutoff or min(position_cutoff(record, LEAST_BAND) for record in records)
     signals = [axis_signals(record, chosen, ROWS_CUTOFF * chosen) for record in records]
     scales = tuple(_scale(signals, index) for index in range(len(records[0].axes)))
     limit = min(

@@ -74,8 +74,6 @@ DRIFTS: Final = (EffectName.PARAMETER_CHANGE, EffectName.PAYLOAD)
 
 
 ONE_SIDED: Final = (
-    EffectName.STRIBECK,
-    EffectName.QUADRATIC_DRAG,
     EffectName.BACKLASH,
     EffectName.ELASTICITY,
     EffectName.SCRUB,

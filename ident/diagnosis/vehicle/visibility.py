@@ -16,6 +16,7 @@ from ident.diagnosis.problem import Channel, Problem, Variant
 from ident.diagnosis.rows import Rows, make_rows
 from ident.diagnosis.vehicle.build import build_problem
 from ident.diagnosis.vehicle.ideal import DIAGNOSTIC, FOUR, Drive, ideal_record
+from ident.diagnosis.vehicle.lag import LAG_NAME
 from ident.effects import Effect
 from ident.vehicle.description import VehicleDescription
 
@@ -55,10 +56,11 @@ class Sight:
 
 
 def sights(problem: Problem) -> Mapping[str, Sight]:
-    """What the rows of a problem show of every candidate, by key."""
+    """What the rows of a problem show of every candidate, by key; a lag absorbs no delay beyond a sample."""
     rows = make_rows(problem)
     scale = row_noise(rows)
-    baseline = orthonormal(rows.baseline / scale[:, None], RANK)
+    free = [column for column, name in enumerate(problem.names) if name != LAG_NAME]
+    baseline = orthonormal(rows.baseline[:, free] / scale[:, None], RANK)
     found = [_left(rows.columns[:, column.own] / scale[:, None], baseline) for column in rows.layout]
     owners = [problem.candidates[column.candidate].key for column in rows.layout]
     return {

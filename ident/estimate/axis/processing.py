@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from ident.errors import EstimationError
+from ident.estimate.axis.cutoff import position_cutoff
 from ident.estimate.filters import differentiate
 from ident.records.axis_record import AxisRecord, AxisSignals
 
@@ -28,6 +29,11 @@ CHEBYSHEV_RIPPLE: Final = 0.05
 """Pass-band ripple of the decimation filter [dB]."""
 CHEBYSHEV_EDGE: Final = 0.8
 """Pass-band edge of the decimation filter over the new Nyquist frequency."""
+
+LEAST_BAND: Final = 20.0
+"""Cutoff of the position filter at least, times the duration [Hz s]."""
+ROWS_PER_PERIOD: Final = 2.5
+"""Rows that are left of a period of the cutoff frequency, more than the two that show it."""
 
 PARAMETERS: Final = ("M", "Fv", "Fc", "offset")
 """Of the model M a + Fv v + Fc sign(v) + offset = effort."""
@@ -46,6 +52,18 @@ class AxisProcessing:
     cutoff: float = 2 * math.pi * 100
     skip: int = 49
     decimation: int = 10
+
+
+def processing_for(record: AxisRecord, cutoff: float | None = None) -> AxisProcessing:
+    """How a record of any rate becomes equations: filtered where its noise begins, thinned to that.
+
+    Args:
+        record: of any axes.
+        cutoff: of the position filter [rad/s]; None: from the record.
+    """
+    chosen = cutoff or position_cutoff(record, LEAST_BAND)
+    factor = max(1, int(2 * math.pi / (ROWS_PER_PERIOD * chosen * record.sample_time)))
+    return AxisProcessing(chosen, round(2 * math.pi / (chosen * record.sample_time)), factor)
 
 
 @dataclass(frozen=True)

@@ -93,10 +93,12 @@ def test_the_later_repeats_of_a_step_are_its_later_part(sources: list[Source]) -
             np.testing.assert_array_equal(rows, whole & (source.period == 1))
 
 
-def test_of_a_record_without_repeats_the_end_is_held_out(sources: list[Source]) -> None:
+def test_of_a_record_without_repeats_parts_are_held_out_by_turns(sources: list[Source]) -> None:
     source = replace(sources[0], period=np.full_like(sources[0].period, -1))
     (rows,), (whole,) = later_part(source).moving, source.moving
-    assert rows.sum() == pytest.approx(0.4 * whole.sum(), rel=0.05)
+    # Some of two fifths, the rest being too near to what is fitted.
+    assert 0.2 * whole.sum() < rows.sum() < 0.4 * whole.sum()
+    assert not np.any(rows & ~whole)
     assert np.flatnonzero(rows)[-1] == np.flatnonzero(whole)[-1]
 
 

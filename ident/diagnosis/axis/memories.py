@@ -1,0 +1,104 @@
+"""Possible causes that remember: friction after a reversal, with the load and with time, and a drive that follows."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear
+from ident.diagnosis.delays import LED_BACK
+from ident.diagnosis.law.dependence import path_since_reversal
+from ident.diagnosis.problem import Candidate, Variant
+from ident.effects import EffectParameter
+from ident.estimate.filters import SEVEN, differentiate
+
+Array = NDArray[np.float64]
+
+PATHS: Final = (0.001, 0.003, 0.01, 0.03, 0.1)
+"""Over which friction settles after a reversal, tried first, over the range of the position."""
+
+TIMES: Final = (0.1, 0.3, 1.0)
+"""Over which friction warms up, tried first, over the duration of the record; faster is a start, no warming."""
+
+WIDER: Final = 3.0
+"""How far beyond those tried first a distance or a time is followed: further away a record says nothing of it."""
+
+RARER: Final = 1.0
+"""Log odds of a filter in the drive against a plain delay, which rows of low frequency do not tell from it."""
+
+
+def presliding(axis: AxisModel) -> Candidate:
+    """Bristles that bend before they slide (Dahl 1968): beyond the friction in motion, exp(-s/d) over the path s."""
+    direction = np.sign(axis.motion.velocity)
+    path = path_since_reversal(axis.motion.position, axis.motion.velocity)
+
+    def series(distance: float) -> Array:
+        within = np.clip(abs(distance), PATHS[0] * axis.reach / WIDER, PATHS[-1] * axis.reach * WIDER)
+        return np.asarray(direction * np.exp(-path / within))
+
+    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
+        return axis.alone(values[0] * series(float(values[1])))
+
+    def variant(distance: float) -> Variant:
+        return Variant(axis.alone(series(distance)[:, None]), lambda found: np.append(found, distance))
+
+    parameters = (
+        EffectParameter("amplitude", axis.unit(), "friction right after a reversal beyond that in motion"),
+        EffectParameter("distance", axis.kind.position_unit, "path over which it has fallen to 1/e"),
+    )
+    variants = tuple(variant(share * axis.reach) for share in PATHS)
+    return Candidate(AxisEffect.PRESLIDING, axis.place, parameters, variants, contribution)
+
+
+def friction_load(axis: AxisModel) -> Candidate:
+    """Dry friction that grows with the load, as that of screws and of worm gears."""
+    parameter = EffectParameter("share", "1", "of the load that resists as dry friction")
+    return linear(axis, AxisEffect.FRICTION_LOAD, [parameter], np.abs(axis.effort) * np.sign(axis.motion.velocity))
+
+
+def friction_warming(axis: AxisModel) -> Candidate:
+    """Dry friction that comes to change as the axis warms up, by 1 - exp(-t/T)."""
+    time = np.arange(len(axis.effort)) * axis.sample_time
+    direction = np.sign(axis.motion.velocity)
+
+    def series(constant: float) -> Array:
+        within = np.clip(abs(constant), TIMES[0] * time[-1], TIMES[-1] * time[-1] * WIDER)
+        return np.asarray(direction * (1 - np.exp(-time / within)))
+
+    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
+        return axis.alone(values[0] * series(float(values[1])))
+
+    def variant(constant: float) -> Variant:
+        return Variant(axis.alone(series(constant)[:, None]), lambda found: np.append(found, constant))
+
+    parameters = (
+        EffectParameter("change", axis.unit(), "of the Coulomb friction, once warm"),
+        EffectParameter("time", "s", "in which 63 % of the change have come"),
+    )
+    variants = tuple(variant(share * time[-1]) for share in TIMES)
+    return Candidate(AxisEffect.FRICTION_WARMING, axis.place, parameters, variants, contribution)
+
+
+def torque_filter(axis: AxisModel) -> Candidate:
+    """A drive whose effort follows what is reported as a filter of first order does."""
+
+    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
+        return axis.alone(_led(axis.effort, float(values[0]), axis.sample_time) - axis.effort)
+
+    slope = differentiate(axis.effort, axis.sample_time, SEVEN)
+    parameters = (
+        EffectParameter("time", "s", "constant of the filter between the effort reported and the one that acts"),
+    )
+    variants = (Variant(axis.alone(slope[:, None])),)
+    return Candidate(AxisEffect.TORQUE_FILTER, axis.place, parameters, variants, contribution, least=0.0, price=RARER)
+
+
+def _led(series: Array, time: float, sample_time: float) -> Array:
+    """A series (N,) before a filter of first order, as it must have been: u + T u', by its spectrum."""
+    length = fft.next_fast_len(len(series) + LED_BACK, real=True)
+    closed = np.pad(series, (0, length - len(series)), mode="linear_ramp", end_values=series[0])
+    ahead = 1 + 2j * np.pi * fft.rfftfreq(length, sample_time) * time
+    return np.asarray(fft.irfft(fft.rfft(closed) * ahead, length)[: len(series)])

@@ -1,0 +1,88 @@
+"""What the candidates of an axis are written in: its motion and effort in one record."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.axis.motion import AxisMotion
+from ident.diagnosis.problem import Candidate, Variant
+from ident.effects import EffectParameter
+from ident.records.axis_record import AxisKind
+
+Array = NDArray[np.float64]
+Filter = Callable[[Array], Array]
+
+
+class AxisEffect(enum.StrEnum):
+    """Effects that are looked for at axes alone."""
+
+    COUPLED_FRICTION = "coupled_friction"
+    FRICTION_POSITION = "friction_position"
+    FRICTION_LOAD = "friction_load"
+    FRICTION_WARMING = "friction_warming"
+    PRESLIDING = "presliding"
+    GRAVITY_LOAD = "gravity_load"
+    INERTIA_POSITION = "inertia_position"
+    TORQUE_FILTER = "torque_filter"
+
+
+@dataclass(frozen=True)
+class AxisModel:
+    """What candidates are written in: one axis of a record.
+
+    Attributes:
+        place: its place, for results.
+        block: its number among the blocks of the problem.
+        blocks: how many blocks there are.
+        kind: says the units.
+        motion: smoothed.
+        sample_time: [s].
+        filtered: passes (N,) or (N, k) through the filter of the rows.
+        inertia: M of a first estimate [kg or kg m²].
+        effort: (N,) of that estimate, from the smoothed motion [N or Nm].
+        absorbed: (N,) the same, of the columns of the baseline itself.
+        speed: of which the axis is seldom faster [m/s or rad/s].
+        reach: range of its position [m or rad].
+        others: name and motion of the other axes.
+    """
+
+    place: str
+    block: int
+    blocks: int
+    kind: AxisKind
+    motion: AxisMotion
+    sample_time: float
+    filtered: Filter
+    inertia: float
+    effort: Array
+    absorbed: Array
+    speed: float
+    reach: float
+    others: tuple[tuple[str, AxisMotion], ...]
+
+    def alone(self, column: Array) -> tuple[Array | None, ...]:
+        """A filtered column in the block of this axis, nothing in the others."""
+        filtered = self.filtered(column)
+        return tuple(filtered if index == self.block else None for index in range(self.blocks))
+
+    def unit(self, per: str = "") -> str:
+        """Unit of the effort, over some power of position and time."""
+        return f"{self.kind.effort_unit}{per.replace('q', self.kind.position_unit)}"
+
+
+def linear(
+    axis: AxisModel,
+    effect: str,
+    parameters: Sequence[EffectParameter],
+    *columns: Array,
+    least: float | None = None,
+    where: str | None = None,
+) -> Candidate:
+    """An effect whose columns (N,) are all there is; at the axis, or as `where` names it."""
+    variant = Variant(axis.alone(np.stack(columns, axis=1)))
+    return Candidate(effect, where or axis.place, tuple(parameters), (variant,), least=least)
