@@ -16,6 +16,7 @@ from hil.exam.cases import Case, Injected, Kind
 from hil.exam.folder import ExamFolder
 from hil.exam.identity import Identities, Identity
 from hil.exam.said import Said, said_from
+from ident.diagnosis.findings import LAW
 from hil.exam.statistics import Z95
 from ident.diagnosis.vehicle.library import DRIFTS, SHAPES
 from ident.errors import UserError
@@ -163,8 +164,9 @@ class Answer:
 
     @property
     def rejected(self) -> bool:
-        """The answer is that nothing in the library explains the gap."""
-        return self.said.verdict == "unknown"
+        """The answer is that nothing in the library explains the gap: `unknown`, or laws without a name alone."""
+        laws = [effect["name"] == LAW for effect in self.said.effects]
+        return self.said.verdict == "unknown" or (bool(laws) and all(laws))
 
     @property
     def unseen(self) -> bool:
@@ -185,8 +187,12 @@ class Answer:
 
     @property
     def statements(self) -> list[tuple[float, bool]]:
-        """Every probability stated, and whether a true effect has that name, or one that no record tells from it."""
-        known = [] if self.case.kind is Kind.UNKNOWN else [identity.names for identity in self.identities]
+        """Every probability stated, and whether a true effect has that name, or one that no record tells from it.
+
+        Of an effect that the library lacks, a law without a name is right.
+        """
+        nameless = self.case.kind is Kind.UNKNOWN
+        known = [frozenset({LAW})] if nameless else [identity.names for identity in self.identities]
         return [
             (float(effect["probability"]), any(effect["name"] in names for names in known))
             for effect in self.said.effects

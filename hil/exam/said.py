@@ -30,8 +30,8 @@ class Said:
     """What the diagnosing side said of one case.
 
     Attributes:
-        verdict: `effect`, `none`, `unknown` or `failed`.
-        effects: as in `diagnosis.json`, most probable first; none unless the verdict is `effect`.
+        verdict: `effect`, `law`, `none`, `unknown` or `failed`.
+        effects: as in `diagnosis.json`, most probable first; none unless the verdict is `effect` or `law`.
         invisible: names that the records cannot show.
         closed: share of the removable held-out gap that the whole answer closes.
         seconds: processor time [s].

@@ -148,7 +148,9 @@ def _other_rates(answers: Sequence[Answer]) -> dict[str, Rate]:
     return {
         names.FALSE_ALARMS: rate([answer.said.verdict != "none" for answer in _of(answers, Kind.NONE)]),
         names.REJECTED: rate([answer.rejected for answer in unknown]),
-        names.NOT_NAMED: rate([answer.named is None and answer.said.verdict != FAILED for answer in unknown]),
+        names.NOT_NAMED: rate(
+            [answer.rejected or (answer.named is None and answer.said.verdict != FAILED) for answer in unknown]
+        ),
         names.INVISIBLE: rate([answer.unseen for answer in _of(answers, Kind.INVISIBLE)]),
         names.BOTH: rate([answer.both for answer in pairs]),
         names.BOTH_COVERED: rate([answer.both_covered for answer in pairs]),

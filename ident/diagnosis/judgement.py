@@ -78,19 +78,17 @@ class Judgement:
         return left or self.fitted.exactly.after**2 > 1 + self.limits.measurable
 
     def cost(self, floors: Array) -> tuple[float, int]:
-        """Of an explanation: the part of the held-out gap that it leaves and what its causes cost, and their number.
+        """Of an explanation: log of the held-out gap that it leaves, and what its causes cost, and their number.
 
-        A law, which can be anything, costs what it must close at least, and so does what nobody knows; a name, which
-        says more, is cheaper.
+        A law, which can be anything, costs more than a name, which says more; what nobody knows costs as much as a law.
 
         Args:
             floors: noise of every block, the same for all explanations that are compared.
         """
-        gap, laws = self.fitted.measured(floors), len(self.laws)
-        left = gap.after / gap.before if gap.before > 0 else 1.0
+        laws = len(self.laws)
         unknown = self._verdict() is Verdict.UNKNOWN
         price = self.limits.law * (laws + unknown) + self.limits.name * (self.fitted.count - laws)
-        return round(50 * (left + price)) / 50, self.fitted.count
+        return round(50 * (math.log(max(self.fitted.measured(floors).after, 1.0)) + price)) / 50, self.fitted.count
 
     def refuted(self) -> frozenset[str]:
         """Effects of no size of which another candidate is what comes along with them, and those that are none."""
@@ -102,7 +100,12 @@ class Judgement:
         )
 
     def worthwhile(self) -> tuple[int, ...]:
-        """The effects without one that widens the held-out gap, is of no size itself, or closes next to nothing."""
+        """The effects without one that widens the held-out gap, is of no size itself, or closes next to nothing.
+
+        None at all where nothing repeats and the gap is within what a record without repeats tells of its noise.
+        """
+        if not self._lasts and not self._measurable():
+            return ()
         closed = self.fitted.closed
         widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
         refuted = [index for index in widened if self._measurable() or self._log_predictive(index) < self.limits.sure]

@@ -28,8 +28,8 @@ class Limits:
         measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.
         far_off: what the held-out gap may have beyond its noise, over that, to be called none.
         scarce: the same times the square root of the confirming rows, where those are few.
-        law: share of the held-out gap that a law must close: a curve bends to what is left of any other cause.
-        name: the same of a name that stands in place of a law: several of them bend to a curve as well.
+        law: share of the held-out gap that a law must close, and log of it that a law costs where explanations compete.
+        name: log of it that a name costs there: several of them bend to a curve as well.
         sure: log Bayes factor of the confirming rows from which an effect stands although it seems to, by accident.
         unsteady: log evidence, for other sizes of the effects in some steps, from which they are not what they seem.
         bent: the same as a share of the evidence for the effects: columns are not quite what a large effect does.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,9 @@ Array = NDArray[np.float64]
 PATHS: Final = (0.001, 0.003, 0.01, 0.03, 0.1)
 """Over which friction settles after a reversal, tried first, over the range of the position."""
 
+NEAREST: Final = 0.02
+"""Of the rows, that are nearest to a reversal."""
+
 TIMES: Final = (0.1, 0.3, 1.0)
 """Over which friction warms up, tried first, over the duration of the record; faster is a start, no warming."""
 
@@ -34,9 +38,12 @@ def presliding(axis: AxisModel) -> Candidate:
     """Bristles that bend before they slide (Dahl 1968): beyond the friction in motion, exp(-s/d) over the path s."""
     direction = np.sign(axis.motion.velocity)
     path = path_since_reversal(axis.motion.position, axis.motion.velocity)
+    used = path[axis.motion.moving]
+    # What is over before the rows begin, none of them can bound.
+    shortest = max(PATHS[0] * axis.reach, float(np.quantile(used, NEAREST)) if used.size else 0.0)
 
     def series(distance: float) -> Array:
-        within = np.clip(abs(distance), PATHS[0] * axis.reach / WIDER, PATHS[-1] * axis.reach * WIDER)
+        within = np.clip(abs(distance), shortest, PATHS[-1] * axis.reach * WIDER)
         return np.asarray(direction * np.exp(-path / within))
 
     def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
@@ -49,8 +56,9 @@ def presliding(axis: AxisModel) -> Candidate:
         EffectParameter("amplitude", axis.unit(), "friction right after a reversal beyond that in motion"),
         EffectParameter("distance", axis.kind.position_unit, "path over which it has fallen to 1/e"),
     )
-    variants = tuple(variant(share * axis.reach) for share in PATHS)
-    return Candidate(AxisEffect.PRESLIDING, axis.place, parameters, variants, contribution)
+    variants = tuple(variant(max(share * axis.reach, shortest)) for share in PATHS)
+    price = math.log(len(variants))
+    return Candidate(AxisEffect.PRESLIDING, axis.place, parameters, variants, contribution, price=price)
 
 
 def friction_load(axis: AxisModel) -> Candidate:
@@ -79,7 +87,8 @@ def friction_warming(axis: AxisModel) -> Candidate:
         EffectParameter("time", "s", "in which 63 % of the change have come"),
     )
     variants = tuple(variant(share * time[-1]) for share in TIMES)
-    return Candidate(AxisEffect.FRICTION_WARMING, axis.place, parameters, variants, contribution)
+    price = math.log(len(variants))
+    return Candidate(AxisEffect.FRICTION_WARMING, axis.place, parameters, variants, contribution, price=price)
 
 
 def torque_filter(axis: AxisModel) -> Candidate:
