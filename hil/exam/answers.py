@@ -16,8 +16,8 @@ from hil.exam.cases import Case, Injected, Kind
 from hil.exam.folder import ExamFolder
 from hil.exam.identity import Identities, Identity
 from hil.exam.said import Said, said_from
-from ident.diagnosis.findings import LAW
 from hil.exam.statistics import Z95
+from ident.diagnosis.findings import LAW
 from ident.diagnosis.vehicle.library import DRIFTS, SHAPES
 from ident.errors import UserError
 

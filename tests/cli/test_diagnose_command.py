@@ -102,11 +102,11 @@ def test_time_that_jumps_is_refused(quasi: Quasi, record: Callable[..., Path], t
     assert "not uniform" in _refused(quasi, tmp_path, record(1, time=time), "--axis")
 
 
-def test_a_confirming_record_of_another_rate_is_refused(
-    quasi: Quasi, record: Callable[..., Path], tmp_path: Path
-) -> None:
-    slow = record(2, time=_axis(2)["time"] * 2)
-    assert "sampled every" in _refused(quasi, tmp_path, record(1), "--confirm", slow, "--axis")
+def test_records_of_axes_may_have_different_rates(quasi: Quasi, record: Callable[..., Path]) -> None:
+    slower = record(2, **{name: values[::2] for name, values in _axis(2).items()})
+    answer = quasi("diagnose", record(1), "--confirm", slower, "--axis")
+    assert answer.code == 0
+    assert "asymmetric viscous" in answer.out
 
 
 def test_an_axis_that_does_not_move_is_refused(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
@@ -175,5 +175,49 @@ def test_the_model_with_its_effects_is_written_for_every_command_that_takes_a_mo
     assert not (tmp_path / "again.toml").exists()
 
 
-def test_there_is_no_such_model_of_an_axis(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
-    assert "--extended" in _refused(quasi, tmp_path, record(1), "--axis", "--extended", tmp_path / "model.toml")
+def test_the_model_of_an_axis_is_written_with_its_effects(
+    quasi: Quasi, record: Callable[..., Path], tmp_path: Path
+) -> None:
+    extended = tmp_path / "extended.toml"
+    answer = quasi("diagnose", record(1), "--confirm", record(2), "--axis", "--extended", extended)
+    assert answer.code == 0
+    axis = read_toml(extended)["axis"]
+    assert axis["parameters"]["M"]["value"] == pytest.approx(10.0, rel=0.02)
+    (effect,) = axis["effects"]
+    assert (effect["name"], effect["where"]) == ("asymmetric_viscous", "axis")
+    assert effect["parameters"]["imbalance"]["value"] == pytest.approx(6.0, rel=0.1)
+
+
+def test_an_axis_without_a_gap_gets_no_extended_model(quasi: Quasi, tmp_path: Path) -> None:
+    paths = [tmp_path / f"{seed}.csv" for seed in (1, 2)]
+    for seed, path in enumerate(paths, 1):
+        write_channels(Channels(_axis(seed, asymmetry=0.0)), path)
+    extended = tmp_path / "extended.toml"
+    answer = quasi("diagnose", paths[0], "--confirm", paths[1], "--axis", "--extended", extended)
+    assert "is not written: no effect is named" in " ".join(answer.out.split())
+    assert not extended.exists()
+
+
+def test_an_axis_is_identified_by_the_command(quasi: Quasi, record: Callable[..., Path], tmp_path: Path) -> None:
+    answer = quasi("identify", record(1), "--axis", "--out", tmp_path / "out")
+    assert answer.code == 0
+    found = read_toml(tmp_path / "out" / "axis.toml")["axis"]["parameters"]
+    assert {name: entry["unit"] for name, entry in found.items()} == {
+        "M": "kg",
+        "Fv": "N s/m",
+        "Fc": "N",
+        "offset": "N",
+    }
+    assert found["M"]["value"] == pytest.approx(10.0, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"), [(("--vehicle", "prototype"), "--vehicle"), (("second.csv",), "one record")]
+)
+def test_axes_are_identified_from_one_record_of_their_own(
+    quasi: Quasi, record: Callable[..., Path], tmp_path: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    answer = quasi("identify", record(1), *arguments, "--axis", "--out", tmp_path / "out")
+    assert answer.code == 2
+    assert said in answer.error
+    assert not (tmp_path / "out").exists()

@@ -43,7 +43,7 @@ def diagnose_axis(
     """
     refuse_other_axes([*fit, *confirm])
     stage("filter of the records")
-    reference = axis_reference(fit, cutoff)
+    reference = axis_reference(fit, cutoff, confirm)
     findings = _judged(fit, confirm, reference, seed, stage)
     late = delayed_axes(findings.after, findings.problem, fit[0].axes, reference.scales)
     if not any(late):

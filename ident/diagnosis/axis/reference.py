@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.axis.motion import (
     FEWEST_ROWS,
+    LARGEST_ROWS_CUTOFF,
     LEAST_BAND,
     ROWS_CUTOFF,
     AxisMotion,
@@ -109,26 +110,31 @@ def own_columns(motions: Sequence[AxisMotion], index: int) -> Array:
     return np.stack(own, axis=1)
 
 
-def axis_reference(records: Sequence[AxisRecord], cutoff: float | None = None) -> Reference:
+def axis_reference(
+    records: Sequence[AxisRecord], cutoff: float | None = None, others: Sequence[AxisRecord] = ()
+) -> Reference:
     """Reference of the records of a fit.
 
     Args:
         records: of the same axes, at any rates.
         cutoff: of the position filter [rad/s]; None: chosen from the records.
+        others: that confirm, at any rates: they must pass the same filters.
 
     Raises:
         RecordError: the records do not have the same axes.
         EstimationError: a record is too short, or an axis does not move.
     """
     refuse_other_axes(records)
-    chosen = cutoff or min(position_cutoff(record, LEAST_BAND) for record in records)
+    everyone = [*records, *others]
+    chosen = cutoff or min(largest_cutoff(everyone), *(position_cutoff(record, LEAST_BAND) for record in records))
     signals = [axis_signals(record, chosen, ROWS_CUTOFF * chosen) for record in records]
     scales = tuple(_scale(signals, index) for index in range(len(records[0].axes)))
-    limit = min(
+    limits = [
         noise_limit(axis, scale.values[0], chosen, record.sample_time)
         for record in records
         for axis, scale in zip(record.axes, scales, strict=True)
-    )
+    ]
+    limit = min([*limits, *(LARGEST_ROWS_CUTOFF / record.sample_time for record in others)])
     bandwidth = max(
         effort_bandwidth(
             one.first_estimate(index, scale.values), repeat_duration(one.record), limit, one.record.sample_time
@@ -136,7 +142,7 @@ def axis_reference(records: Sequence[AxisRecord], cutoff: float | None = None) -
         for one in signals
         for index, scale in enumerate(scales)
     )
-    return Reference(max(chosen, min(bandwidth / ROWS_CUTOFF, largest_cutoff(records))), bandwidth, scales)
+    return Reference(max(chosen, min(bandwidth / ROWS_CUTOFF, largest_cutoff(everyone))), bandwidth, scales)
 
 
 def largest_cutoff(records: Sequence[AxisRecord]) -> float:
