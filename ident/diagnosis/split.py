@@ -45,7 +45,7 @@ def part_of(moving: Mask, period: Numbers, guard: int, *, confirming: bool) -> t
         fitted = repeats[: (len(repeats) + 1) // 2]
         inside = (period >= 0) & (np.isin(period, fitted) != confirming)
         return moving & inside, np.where(inside, period, -1)
-    rank = np.cumsum(moving) / max(int(moving.sum()), 1)
+    rank = np.maximum(np.cumsum(moving) - 1, 0) / max(int(moving.sum()), 1)
     confirms = (TURNS * rank) % 1.0 > FITTED
     border = ndimage.binary_dilation(np.diff(confirms, prepend=confirms[:1]), np.ones(2 * guard + 1))
     return moving & (confirms == confirming) & ~(border & confirms), period
