@@ -100,9 +100,11 @@ def load_rows(path: Path) -> list[EffectSize]:
 
 
 def replaced(rows: Sequence[EffectSize], anew: Sequence[EffectSize]) -> list[EffectSize]:
-    """Rows, those measured anew in the place of what they were."""
-    changed = {(row.name, row.where): row for row in anew}
-    return [changed.get((row.name, row.where), row) for row in rows]
+    """Rows, those of effects that were measured anew in the place of what they were, places that are new among them."""
+    measured = {row.name for row in anew}
+    everything = [*(row for row in rows if row.name not in measured), *anew]
+    names = dict.fromkeys(row.name for row in (*rows, *anew))
+    return [row for name in names for row in everything if row.name == name]
 
 
 def _row(entry: dict[str, Any]) -> EffectSize:
