@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from ident.axis_file import AxisEffectEntry, AxisModelEntry, write_axis_models
-from ident.diagnosis.findings import Findings
+from ident.diagnosis.findings import Cause, Findings
 from ident.estimate.axis import AxisIdentification, identify_axis
 from ident.estimate.axis.processing import PARAMETERS, AxisProcessing, processing_for
 from ident.records.axis_record import AxisKind, AxisRecord, read_axis_record
@@ -108,17 +108,11 @@ def axis_models(findings: Findings, axes: Sequence[str]) -> list[AxisModelEntry]
         for name in PARAMETERS:
             value, std, unit = values[f"{name}{suffix}"]
             parameters[name] = Quantity(float(value), unit, "diagnosis", float(std))
-        found.append(AxisModelEntry(place, parameters, _effects(findings, place)))
+        own = [_effect(cause) for cause in findings.causes if cause.candidate.where.split("<")[0] == place]
+        found.append(AxisModelEntry(place, parameters, own))
     return found
 
 
-def _effects(findings: Findings, place: str) -> list[AxisEffectEntry]:
-    entries = []
-    for cause in findings.causes:
-        if cause.candidate.where.split("<")[0] != place:
-            continue
-        numbers = zip(cause.candidate.parameters, cause.part.values, cause.part.std, strict=True)
-        parameters = {p.name: Quantity(float(value), p.unit, "diagnosis", float(std)) for p, value, std in numbers}
-        curve = [] if cause.law_answer is None else cause.law_answer.curve.tolist()
-        entries.append(AxisEffectEntry(str(cause.candidate.effect), cause.candidate.where, parameters, curve))
-    return entries
+def _effect(cause: Cause) -> AxisEffectEntry:
+    curve = [] if cause.law_answer is None else cause.law_answer.curve.tolist()
+    return AxisEffectEntry(str(cause.candidate.effect), cause.candidate.where, cause.quantities, curve)

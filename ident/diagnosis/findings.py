@@ -58,6 +58,12 @@ class Cause:
     law_answer: LawAnswer | None = None
     alternatives: tuple[Alternative, ...] = ()
 
+    @property
+    def quantities(self) -> Mapping[str, Quantity]:
+        """Its parameters with units and standard deviations, by name."""
+        numbers = zip(self.candidate.parameters, self.part.values, self.part.std, strict=True)
+        return {p.name: Quantity(float(value), p.unit, "diagnosis", float(std)) for p, value, std in numbers}
+
 
 @dataclass(frozen=True)
 class HeldOut:
@@ -128,12 +134,11 @@ class Findings:
 
 
 def _named(cause: Cause, coverage: float) -> NamedEffect:
-    values = zip(cause.candidate.parameters, cause.part.values, cause.part.std, strict=True)
     name = LAW if cause.law is not None else str(cause.candidate.effect)
     return NamedEffect(
         name=name,
         where=cause.candidate.where,
-        parameters={p.name: Quantity(float(value), p.unit, "diagnosis", float(std)) for p, value, std in values},
+        parameters=cause.quantities,
         probability=round(cause.probability, 2),
         ambiguity_set=(LAW,) if cause.law is not None else cause.ranked.ambiguity_set(name, coverage),
         gap_closed_held_out=cause.closed,

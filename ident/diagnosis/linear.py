@@ -26,6 +26,16 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
+SILENT: Final = 1e-12
+"""Rms, in whatever unit, of what leaves nothing at all, as ideal records do."""
+
+
+def unit_of(baseline: Array, target: Array) -> float:
+    """Rms of what a baseline leaves of a target: its unit, where other targets have others; 1 where nothing is left."""
+    size = rms(target - baseline @ least_squares(baseline, target)) if target.size else 0.0
+    return size if size > SILENT else 1.0
+
+
 def least_squares(design: Array, target: Array) -> Array:
     """Coefficients of columns of any scale; of dependent ones, the smallest."""
     scale = np.linalg.norm(design, axis=0)

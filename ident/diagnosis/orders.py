@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.law.dependence import Basis, Dependence
-from ident.diagnosis.linear import least_squares, rms
-from ident.diagnosis.problem import Block, Candidate, Problem, Variant
-from ident.diagnosis.regression import SILENT
-from ident.diagnosis.rows import Kept, kept_rows
+from ident.diagnosis.linear import least_squares, rms, unit_of
+from ident.diagnosis.problem import Candidate, Problem, Variant
+from ident.diagnosis.rows import kept_rows
 
 Array = NDArray[np.float64]
 
@@ -83,19 +82,12 @@ def _dependence(problem: Problem, candidate: Candidate) -> Dependence:
 def _left(problem: Problem) -> list[tuple[Array, float]]:
     """What the parameters leave of the target of every block (N,), and its rms in the rows used."""
     kept = [kept_rows(block) for block in problem.blocks]
-    design = np.concatenate([rows.mean(block.baseline) for block, rows in zip(problem.blocks, kept, strict=True)])
-    target = np.concatenate([rows.mean(block.target) for block, rows in zip(problem.blocks, kept, strict=True)])
-    level = np.concatenate([_level(block, rows) for block, rows in zip(problem.blocks, kept, strict=True)])
-    parameters = least_squares(design / level[:, None], target / level)
+    rows = [(one.mean(block.baseline), one.mean(block.target)) for block, one in zip(problem.blocks, kept, strict=True)]
+    scaled = [np.column_stack(pair) / unit_of(*pair) for pair in rows]
+    together = np.concatenate(scaled)
+    parameters = least_squares(together[:, :-1], together[:, -1])
     left = [block.target - block.baseline @ parameters for block in problem.blocks]
-    return [(one, rms(one[rows.samples])) for one, rows in zip(left, kept, strict=True)]
-
-
-def _level(block: Block, kept: Kept) -> Array:
-    """Rms (m,) of what a block's own parameters leave of it."""
-    target, baseline = kept.mean(block.target), kept.mean(block.baseline)
-    size = rms(target - baseline @ least_squares(baseline, target)) if target.size else 0.0
-    return np.full(len(target), size if size > SILENT else 1.0)
+    return [(series, rms(series[one.samples])) for series, one in zip(left, kept, strict=True)]
 
 
 def _peaks(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.directions import Directions, White, directions
 from ident.diagnosis.evidence import Evidence, gather
-from ident.diagnosis.linear import least_squares, rms
+from ident.diagnosis.linear import least_squares, unit_of
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.rows import Rows
 from ident.diagnosis.settings import Settings
@@ -38,9 +38,6 @@ SAME: Final = 0.9999
 
 SIMPLER: Final = 3.0
 """Log evidence that a further column of the same candidate must bring."""
-
-SILENT = 1e-12
-"""Rms, in whatever unit, of a group that leaves nothing at all, as ideal records do."""
 
 
 @dataclass(frozen=True)
@@ -174,10 +171,7 @@ class Regression:
         scale = np.ones(len(self.rows))
         for group in np.unique(self.rows.group):
             place = self.rows.group == group
-            baseline, target = self.rows.baseline[place], self.rows.target[place]
-            left = target - baseline @ least_squares(baseline, target)
-            size = rms(left)
-            scale[place] = size if size > SILENT else 1.0
+            scale[place] = unit_of(self.rows.baseline[place], self.rows.target[place])
         return scale
 
     def _best(self, found: Directions, given: Sequence[int], least: float) -> list[int]:

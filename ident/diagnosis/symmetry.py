@@ -6,8 +6,6 @@ all have is simpler to say, and nothing has to be special about one.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from ident.diagnosis.probability import alike
 from ident.diagnosis.search import without
 from ident.diagnosis.shapes import Shaped, shaped
@@ -16,11 +14,11 @@ from ident.plant.places import GROUPS, members
 
 def most_symmetric(found: Shaped) -> Shaped:
     """The same explanation at all equals where the records show no difference to one of them."""
-    regression = found.regression
+    regression, taken = found.regression, found.taken
     candidates = found.problems[0].candidates
-    for index, variant in enumerate(found.taken):
+    for index, variant in enumerate(taken):
         own = candidates[regression.owners[variant]]
-        slot = regression.slot(without(found.taken, index), regression.whitener(found.taken))
+        slot = regression.slot(without(taken, index), regression.whitener(taken))
         wider = [
             other
             for other in alike(regression, slot, variant)
@@ -31,5 +29,5 @@ def most_symmetric(found: Shaped) -> Shaped:
         ]
         if wider:
             best = max(wider, key=lambda other: float(slot.evidence.log_evidence[other]))
-            found = replace(found, taken=(*found.taken[:index], best, *found.taken[index + 1 :]))
-    return shaped(found.problems, regression, found.taken) if found.taken else found
+            taken = (*taken[:index], best, *taken[index + 1 :])
+    return found if taken == found.taken else shaped(found.problems, regression, taken)

@@ -20,15 +20,15 @@ Generator = np.random.Generator
 class Lacking(enum.StrEnum):
     """What the model of an axis may lack."""
 
-    NOTHING = "none"
-    ASYMMETRY = "asymmetric_viscous"
-    DRAG = "quadratic_drag"
-    STRIBECK = "stribeck"
-    DELAY = "time_delay"
-    SPRING = "law angle"
-    RIPPLE = "torque_ripple"
-    FRICTION = "law angle direction"
-    ELASTICITY = "elasticity"
+    NOTHING = "nothing"
+    ASYMMETRY = "friction of one direction"
+    DRAG = "drag"
+    BRISTLES = "bristles that break away"
+    DELAY = "delay"
+    SPRING = "force over the position"
+    RIPPLE = "ripple"
+    FRICTION = "friction over the position"
+    SECOND_MASS = "second mass"
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def draw_axis(seed: int, lacking: Lacking | None = None) -> DrawnAxis:
     causes = list(Lacking)
     cause = lacking or causes[int(generator.integers(len(causes)))]
     machine = _machine(generator)
-    return _with[cause](machine, generator)
+    return _DRAWN[cause](machine, generator)
 
 
 def _machine(generator: Generator) -> Machine:
@@ -112,10 +112,10 @@ def _drag(machine: Machine, generator: Generator) -> DrawnAxis:
     return _forced(machine, lambda _t, _x, v: coefficient * v * abs(v), Lacking.DRAG, size)
 
 
-def _stribeck(machine: Machine, generator: Generator) -> DrawnAxis:
+def _bristles(machine: Machine, generator: Generator) -> DrawnAxis:
     size, speed = 2 * _size(generator), float(generator.uniform(0.15, 0.5)) * machine.speeds[-1]
     bristle = replace(machine, bristle=5e3 * machine.mass, breakaway=size * machine.coulomb, stribeck=speed)
-    return DrawnAxis(replace(bristle, substeps=2 * machine.substeps), Lacking.STRIBECK, size)
+    return DrawnAxis(replace(bristle, substeps=2 * machine.substeps), Lacking.BRISTLES, size)
 
 
 def _delay(machine: Machine, generator: Generator) -> DrawnAxis:
@@ -155,23 +155,23 @@ def _friction(machine: Machine, generator: Generator) -> DrawnAxis:
     )
 
 
-def _elasticity(machine: Machine, generator: Generator) -> DrawnAxis:
+def _second_mass(machine: Machine, generator: Generator) -> DrawnAxis:
     resonance = 2 * math.pi * float(generator.uniform(15.0, 40.0))
     return DrawnAxis(
-        replace(machine, compliance=1 / (machine.mass * resonance**2)), Lacking.ELASTICITY, resonance / 2 / math.pi
+        replace(machine, compliance=1 / (machine.mass * resonance**2)), Lacking.SECOND_MASS, resonance / 2 / math.pi
     )
 
 
-_with: Final[Mapping[Lacking, Callable[[Machine, Generator], DrawnAxis]]] = MappingProxyType(
+_DRAWN: Final[Mapping[Lacking, Callable[[Machine, Generator], DrawnAxis]]] = MappingProxyType(
     {
         Lacking.NOTHING: _nothing,
         Lacking.ASYMMETRY: _asymmetry,
         Lacking.DRAG: _drag,
-        Lacking.STRIBECK: _stribeck,
+        Lacking.BRISTLES: _bristles,
         Lacking.DELAY: _delay,
         Lacking.SPRING: _spring,
         Lacking.RIPPLE: _ripple,
         Lacking.FRICTION: _friction,
-        Lacking.ELASTICITY: _elasticity,
+        Lacking.SECOND_MASS: _second_mass,
     }
 )

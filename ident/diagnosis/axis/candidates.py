@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.memories import friction_load, friction_warming, presliding, torque_filter
-from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear
+from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
 from ident.diagnosis.axis.motion import AxisMotion
 from ident.diagnosis.axis.positional import friction_position, gravity_loads, inertia_position
-from ident.diagnosis.delays import delayed
+from ident.diagnosis.delays import HELD, delayed
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.orders import FEWEST
 from ident.diagnosis.problem import Candidate, Periodic, Variant
@@ -35,8 +35,6 @@ GRID: Final = 0.3
 """Part of a gap by which it may lie between those tried."""
 LEAST_SHARE: Final = 0.1
 """Of the effort that must lie behind a play for it to be one."""
-LONGEST_HOLD: Final = 0.55
-"""Sample intervals up to which a lag is no delay: half of one is what holding the effort over the interval does."""
 
 
 def axis_candidates(axis: AxisModel) -> list[Candidate]:
@@ -96,18 +94,12 @@ def _stribeck(axis: AxisModel) -> Candidate:
     def curve(speed: float) -> Array:
         return np.asarray(np.sign(velocity) * np.exp(-np.square(velocity / speed)))
 
-    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
-        return axis.alone(values[0] * curve(float(values[1])))
-
-    def variant(speed: float) -> Variant:
-        return Variant(axis.alone(curve(speed)[:, None]), lambda found: np.append(found, speed))
-
     parameters = (
         EffectParameter("amplitude", axis.unit(), "friction at rest beyond the Coulomb friction"),
         EffectParameter("velocity", f"{axis.kind.position_unit}/s", "speed at which it has fallen to 1/e"),
     )
-    variants = tuple(variant(share * axis.speed) for share in STRIBECK_SPEEDS)
-    return Candidate(EffectName.STRIBECK, axis.place, parameters, variants, contribution)
+    speeds = [share * axis.speed for share in STRIBECK_SPEEDS]
+    return shaped_by(axis, EffectName.STRIBECK, parameters, curve, speeds)
 
 
 def _time_delay(axis: AxisModel) -> Candidate:
@@ -117,7 +109,7 @@ def _time_delay(axis: AxisModel) -> Candidate:
     parameters = (EffectParameter("delay", "s", "of the motion behind the effort, as reported"),)
     slope = differentiate(axis.effort, axis.sample_time, SEVEN)
     variants = (Variant(axis.alone(slope[:, None])),)
-    shortest = LONGEST_HOLD * axis.sample_time
+    shortest = HELD * axis.sample_time
     return Candidate(
         EffectName.TIME_DELAY, axis.place, parameters, variants, contribution, negligible=(shortest, shortest)
     )

@@ -7,10 +7,9 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
-from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear
-from ident.diagnosis.delays import LED_BACK
+from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
+from ident.diagnosis.delays import led
 from ident.diagnosis.law.dependence import path_since_reversal
 from ident.diagnosis.problem import Candidate, Variant
 from ident.effects import EffectParameter
@@ -46,19 +45,12 @@ def presliding(axis: AxisModel) -> Candidate:
         within = np.clip(abs(distance), shortest, PATHS[-1] * axis.reach * WIDER)
         return np.asarray(direction * np.exp(-path / within))
 
-    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
-        return axis.alone(values[0] * series(float(values[1])))
-
-    def variant(distance: float) -> Variant:
-        return Variant(axis.alone(series(distance)[:, None]), lambda found: np.append(found, distance))
-
     parameters = (
         EffectParameter("amplitude", axis.unit(), "friction right after a reversal beyond that in motion"),
         EffectParameter("distance", axis.kind.position_unit, "path over which it has fallen to 1/e"),
     )
-    variants = tuple(variant(max(share * axis.reach, shortest)) for share in PATHS)
-    price = math.log(len(variants))
-    return Candidate(AxisEffect.PRESLIDING, axis.place, parameters, variants, contribution, price=price)
+    tried = [max(share * axis.reach, shortest) for share in PATHS]
+    return shaped_by(axis, AxisEffect.PRESLIDING, parameters, series, tried, price=math.log(len(tried)))
 
 
 def friction_load(axis: AxisModel) -> Candidate:
@@ -76,26 +68,19 @@ def friction_warming(axis: AxisModel) -> Candidate:
         within = np.clip(abs(constant), TIMES[0] * time[-1], TIMES[-1] * time[-1] * WIDER)
         return np.asarray(direction * (1 - np.exp(-time / within)))
 
-    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
-        return axis.alone(values[0] * series(float(values[1])))
-
-    def variant(constant: float) -> Variant:
-        return Variant(axis.alone(series(constant)[:, None]), lambda found: np.append(found, constant))
-
     parameters = (
         EffectParameter("change", axis.unit(), "of the Coulomb friction, once warm"),
         EffectParameter("time", "s", "in which 63 % of the change have come"),
     )
-    variants = tuple(variant(share * time[-1]) for share in TIMES)
-    price = math.log(len(variants))
-    return Candidate(AxisEffect.FRICTION_WARMING, axis.place, parameters, variants, contribution, price=price)
+    tried = [share * time[-1] for share in TIMES]
+    return shaped_by(axis, AxisEffect.FRICTION_WARMING, parameters, series, tried, price=math.log(len(tried)))
 
 
 def torque_filter(axis: AxisModel) -> Candidate:
     """A drive whose effort follows what is reported as a filter of first order does."""
 
     def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
-        return axis.alone(_led(axis.effort, float(values[0]), axis.sample_time) - axis.effort)
+        return axis.alone(led(axis.effort, float(values[0]), axis.sample_time) - axis.effort)
 
     slope = differentiate(axis.effort, axis.sample_time, SEVEN)
     parameters = (
@@ -103,11 +88,3 @@ def torque_filter(axis: AxisModel) -> Candidate:
     )
     variants = (Variant(axis.alone(slope[:, None])),)
     return Candidate(AxisEffect.TORQUE_FILTER, axis.place, parameters, variants, contribution, least=0.0, price=RARER)
-
-
-def _led(series: Array, time: float, sample_time: float) -> Array:
-    """A series (N,) before a filter of first order, as it must have been: u + T u', by its spectrum."""
-    length = fft.next_fast_len(len(series) + LED_BACK, real=True)
-    closed = np.pad(series, (0, length - len(series)), mode="linear_ramp", end_values=series[0])
-    ahead = 1 + 2j * np.pi * fft.rfftfreq(length, sample_time) * time
-    return np.asarray(fft.irfft(fft.rfft(closed) * ahead, length)[: len(series)])

@@ -80,9 +80,28 @@ def linear(
     effect: str,
     parameters: Sequence[EffectParameter],
     *columns: Array,
-    least: float | None = None,
     where: str | None = None,
 ) -> Candidate:
     """An effect whose columns (N,) are all there is; at the axis, or as `where` names it."""
     variant = Variant(axis.alone(np.stack(columns, axis=1)))
-    return Candidate(effect, where or axis.place, tuple(parameters), (variant,), least=least)
+    return Candidate(effect, where or axis.place, tuple(parameters), (variant,))
+
+
+def shaped_by(
+    axis: AxisModel,
+    effect: str,
+    parameters: tuple[EffectParameter, EffectParameter],
+    series: Callable[[float], Array],
+    tried: Sequence[float],
+    *,
+    price: float = 0.0,
+) -> Candidate:
+    """An effect of a size times a series (N,) of one more number, of which some are tried first."""
+
+    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
+        return axis.alone(values[0] * series(float(values[1])))
+
+    def variant(number: float) -> Variant:
+        return Variant(axis.alone(series(number)[:, None]), lambda found: np.append(found, number))
+
+    return Candidate(effect, axis.place, parameters, tuple(map(variant, tried)), contribution, price=price)

@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.axis.candidates import LONGEST_HOLD, axis_candidates
+from ident.diagnosis.axis.candidates import axis_candidates
 from ident.diagnosis.axis.dependences import axis_dependences
 from ident.diagnosis.axis.model import AxisModel
 from ident.diagnosis.axis.motion import AxisMotion, with_repeats
 from ident.diagnosis.axis.reference import Reference, Scale, Signals, axis_signals, own_columns, refuse_other_axes
+from ident.diagnosis.delays import HELD
 from ident.diagnosis.law.dependence import Dependence, across
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant
@@ -75,7 +76,7 @@ def delayed_axes(found: Refit, problem: Problem, axes: Sequence[AxisSignals], sc
     late = []
     for axis, scale in zip(axes, scales, strict=True):
         lag, std = (0.0, 0.0) if scale.hold is None else values[axis.named(LAG)]
-        late.append(abs((scale.hold or 0.0) + lag) - SURELY * std > LONGEST_HOLD)
+        late.append(abs((scale.hold or 0.0) + lag) - SURELY * std > HELD)
     return late
 
 

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from ident.diagnosis.delays import HELD
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate, Variant
 from ident.diagnosis.vehicle.askew import beside_sliding, stands_askew
 from ident.diagnosis.vehicle.context import FORMULAS_KEPT, MODEL_COLUMNS, Context
 from ident.diagnosis.vehicle.contribution import Cause, acting_in, contribution_of, side_by_side
-from ident.diagnosis.vehicle.lag import HELD
 from ident.diagnosis.vehicle.library import (
     DRIFTS,
     ONE_SIDED,

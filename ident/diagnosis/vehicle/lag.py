@@ -25,9 +25,6 @@ LAG_NAME: Final = "lag"
 LAG_STD: Final = 0.25
 """Standard deviation of it beforehand [samples]: a torque that is held acts half a sample late."""
 
-HELD: Final = 0.55
-"""Samples up to which it is what sampling does."""
-
 
 def lag_columns(sources: Sequence[Source], context: Context) -> list[Array]:
     """What a lag of one sample adds to the rows of every block, (N,) to first order."""
