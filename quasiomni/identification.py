@@ -44,7 +44,7 @@ def identify(
         bool, typer.Option("--axis", help="The record is of servo axes: time, position, effort. Writes axis.toml.")
     ] = False,
     cutoff: Annotated[
-        float | None, typer.Option(min=0.0, help="Of the position filter of axes [Hz]. Default: from the record.")
+        float | None, typer.Option(min=1e-3, help="Of the position filter of axes [Hz]. Default: from the record.")
     ] = None,
 ) -> None:
     """Identify the parameters from recorded frames or records alone; writes parameters.toml and report.html.
