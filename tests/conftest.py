@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -60,6 +62,22 @@ LONGEST = (
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     places = {Path(__file__).parent / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: places.get(item.path, len(places)))
+
+
+@pytest.fixture(scope="session")
+def need() -> Callable[..., str]:
+    """Path of a system program, of a Debian package; without it the test skips, but not in CI."""
+
+    def find(program: str, package: str = "") -> str:
+        path = shutil.which(program)
+        if path is None:
+            message = f"{program} is not installed" + (f" (Debian: {package})" if package else "")
+            if os.environ.get("QUASIOMNI_CI"):
+                pytest.fail(message)
+            pytest.skip(message)
+        return path
+
+    return find
 
 
 @pytest.fixture(scope="session")

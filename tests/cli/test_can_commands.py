@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import subprocess
 import sys
 import time
@@ -73,11 +71,10 @@ def test_a_program_on_a_bus_that_nobody_serves_is_told_so(tmp_path: Path) -> Non
     assert "quasiomni emulate" in " ".join(done.stderr.split())
 
 
-def test_an_emulator_takes_faults_from_a_script_and_live_and_candump_sees_them(tmp_path: Path) -> None:
-    if shutil.which("candump") is None:
-        if os.environ.get("QUASIOMNI_CI"):
-            pytest.fail("candump is not installed (Debian: can-utils)")
-        pytest.skip("candump is not installed (Debian: can-utils)")
+def test_an_emulator_takes_faults_from_a_script_and_live_and_candump_sees_them(
+    tmp_path: Path, need: Callable[..., str]
+) -> None:
+    need("candump", "can-utils")
     bus, script = f"unix:{tmp_path / 'bus'}", tmp_path / "faults.txt"
     script.write_text("# nodes that come and go\npower@drive_fl:from=2s,to=2.5s\n")
     serving = quasiomni("emulate", "--bus", bus, "--fault", script)

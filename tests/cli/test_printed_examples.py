@@ -11,7 +11,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -140,7 +140,10 @@ def test_the_faults_of_the_bench_are_injected_as_printed(terminals: Terminals) -
     assert "is up on unix:/tmp/can0" in terminals.output(serving)
 
 
-def test_the_emulator_of_the_readme_serves_and_takes_faults_as_printed(terminals: Terminals) -> None:
+def test_the_emulator_of_the_readme_serves_and_takes_faults_as_printed(
+    terminals: Terminals, need: Callable[..., str]
+) -> None:
+    need("candump", "can-utils")
     printed = commands(blocks(section("README.md", "Test your own master against the emulated vehicle"))[0])
     fault = next(line for line in printed if "can fault" in line)
     for line in printed[: printed.index(fault) + 1]:

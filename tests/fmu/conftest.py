@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,21 +19,6 @@ from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 Build = Callable[[FmiVersion, Inputs], Path]
 
 VARIANTS = [(version, inputs) for version in FmiVersion for inputs in Inputs]
-
-
-@pytest.fixture(scope="session")
-def need() -> Callable[[str], str]:
-    """Path of a system program; without it the test skips, but not in CI."""
-
-    def find(program: str) -> str:
-        path = shutil.which(program)
-        if path is None:
-            if os.environ.get("QUASIOMNI_CI"):
-                pytest.fail(f"{program} is not installed")
-            pytest.skip(f"{program} is not installed")
-        return path
-
-    return find
 
 
 @pytest.fixture(scope="session")

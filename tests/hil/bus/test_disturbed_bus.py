@@ -120,9 +120,9 @@ class Half:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def programs() -> None:
-    if not (shutil.which("candump") and shutil.which("cangen")):
-        pytest.skip("candump and cangen are not installed (Debian: can-utils)")
+def programs(need: Callable[..., str]) -> None:
+    for program in ("candump", "cangen"):
+        need(program, "can-utils")
 
 
 def drive(master: Master, clock: Clock, cycles: int, half: Half) -> None:
