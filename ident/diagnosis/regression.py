@@ -184,11 +184,11 @@ class Regression:
                 best.setdefault(self.owners[variant], variant)
         return list(best.values())
 
-    def white(self, whitener: Whitener, given: Sequence[int]) -> White:
-        """Whitened rows, variants that are given beside the baseline."""
+    def white(self, whitener: Whitener, given: Sequence[int], columns: Array | None = None) -> White:
+        """Whitened rows, variants that are given beside the baseline; columns (n, K) of all candidates, or others."""
         rows = self.rows
         taken = self.columns_of(given)
-        values = np.column_stack([rows.target, rows.baseline, taken, rows.columns])
+        values = np.column_stack([rows.target, rows.baseline, taken, rows.columns if columns is None else columns])
         white = whitener.apply(rows, values)
         confirming, stretch = rows.confirming, self.stretch
         if self._prior:

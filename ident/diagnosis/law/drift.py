@@ -13,17 +13,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.directions import VISIBLE
 from ident.diagnosis.findings import Cause
 from ident.diagnosis.law.answer import law_answer
 from ident.diagnosis.law.dependence import Basis, Dependence, Variable
 from ident.diagnosis.law.learning import Designs
 from ident.diagnosis.law.stage import SCALE, Law, next_law
+from ident.diagnosis.linear import orthonormal
 from ident.diagnosis.probability import Calibration, Ranked
 from ident.diagnosis.problem import Block, Candidate, Problem
 from ident.diagnosis.refit import Part
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import make_rows
 from ident.diagnosis.settings import Settings
+from ident.effects.laws import COUNT
 from ident.records.repeats import repeats_of
 
 Array = NDArray[np.float64]
@@ -42,7 +45,42 @@ def time_law(problems: Sequence[Problem], settings: Settings, seed: int) -> Law 
         return None
     single = tuple(_deviations(problem, numbers) for problem in problems)
     regression = Regression(single[0], make_rows(*single), settings, seed)
-    return next_law(single, regression, Designs(single, regression.rows), ())
+    law = next_law(single, regression, Designs(single, regression.rows), ())
+    return None if law is None else _anchored(problems, law, settings, seed)
+
+
+def _anchored(problems: Sequence[Problem], law: Law, settings: Settings, seed: int) -> Law:
+    """A law of time with its constant, of which what differs between repeats says nothing.
+
+    It is the one that the fitted rows ask for beside the parameters, and beside what is known of those. Where a
+    parameter absorbs it, as Coulomb friction does of a law times the direction, the law has no mean in these rows.
+
+    Args:
+        problems: to fit and to confirm, with all that repeats.
+        law: from what differs between repeats.
+        settings, seed: of the regression.
+    """
+    bare = [replace(problem, candidates=(), dependences=()) for problem in problems]
+    regression = Regression(bare[0], make_rows(*bare), settings, seed)
+    parts = [one for problem in problems for one in problem.dependences if one.key == law.dependence.key]
+    design = regression.rows.stack([one for part in parts for one in part.design(law.learnt.knots.basis)], COUNT)
+    # The functions sum to one, so that all coefficients together move the law by a constant.
+    shift = _constant(regression, design.sum(axis=1), design @ law.learnt.weights)
+    learnt = replace(law.learnt, weights=law.learnt.weights + shift, whole=law.learnt.whole + shift)
+    return replace(law, learnt=learnt)
+
+
+def _constant(regression: Regression, column: Array, known: Array) -> float:
+    """How much of a column (n,) fitted rows hold beside what is known (n,); if they show none, less the mean of that."""
+    pair = np.column_stack([column, known])
+    white = regression.white(regression.colour_beside(pair, order=0), (), pair)
+    fitted = ~white.confirming
+    basis = orthonormal(white.baseline[fitted])
+    whole, target = white.columns[fitted, 0], (white.target - white.columns[:, 1])[fitted]
+    left = whole - basis @ (basis.T @ whole)
+    if left @ left > VISIBLE**2 * (whole @ whole):
+        return float(left @ target) / float(left @ left)
+    return -float(whole @ white.columns[fitted, 1]) / max(float(whole @ whole), np.finfo(float).tiny)
 
 
 def without_drift(problem: Problem, law: Law) -> Problem:

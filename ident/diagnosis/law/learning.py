@@ -53,7 +53,7 @@ class Learnt:
         weights: (K,) coefficients, learnt from the fitted rows alone.
         whole: (K,) the same from all rows.
         covariance: (K, K) of those.
-        shape: (n,) what it adds to the whitened rows beside the baseline, by all rows.
+        shape: (n + known,) what it adds to the whitened rows beside the baseline, by all rows.
         scale: by which all evidence was divided, as the noise along the function scatters more than white noise.
     """
 
@@ -97,11 +97,11 @@ class Learner:
     def __init__(self, regression: Regression, whitener: Whitener, taken: Sequence[int]) -> None:
         rows = regression.rows
         self.regression, self._whitener, self.rows = regression, whitener, rows
-        design = np.column_stack([rows.target, rows.baseline, regression.columns_of(tuple(taken))])
-        white = whitener.apply(rows, design)
-        self._target, self._model = white[:, 0], white[:, 1:]
-        self.fitted = ~rows.confirming
-        self._part, self._all = self._beside(self.fitted), self._beside(np.ones(len(rows), dtype=bool))
+        nothing = np.zeros((len(rows), 0))
+        white = regression.white(whitener, tuple(taken), nothing)
+        self._target, self._model, self._stretch = white.target, white.baseline, white.stretch
+        self.fitted = ~white.confirming
+        self._part, self._all = self._beside(self.fitted), self._beside(np.ones(len(self.fitted), dtype=bool))
 
     def learn(self, index: int, design: Array, knots: Knots) -> Learnt | None:
         """A dependence; None where the fitted rows show nothing of it.
@@ -111,7 +111,7 @@ class Learner:
             design: (n, K) its columns in the rows.
             knots: of its function.
         """
-        white = self._whitener.apply(self.rows, design)
+        white = self._white(design)
         left = self._part.without(white[self.fitted])
         span = knots.period or knots.ends[1] - knots.ends[0]
         best = max((_fit(left, self._part, knots.prior(share * span)) for share in LENGTHS), key=lambda fit: fit.log)
@@ -142,10 +142,15 @@ class Learner:
         ]
         return max(found, default=1.0)
 
+    def _white(self, design: Array) -> Array:
+        """Columns (n, K) as the rows have them; what is known of the parameters says nothing of a law."""
+        known = np.zeros((len(self.fitted) - len(self.rows), design.shape[1]))
+        return np.vstack([self._whitener.apply(self.rows, design), known])
+
     def _beside(self, chosen: Mask) -> _Beside:
         basis = orthonormal(self._model[chosen])
         target = self._target[chosen]
-        return _Beside(basis, target - basis @ (basis.T @ target), self.regression.stretch[chosen])
+        return _Beside(basis, target - basis @ (basis.T @ target), self._stretch[chosen])
 
 
 @dataclass(frozen=True)

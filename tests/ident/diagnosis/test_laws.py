@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -14,9 +15,12 @@ from hypothesis import strategies as st
 
 from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.diagnosis import Verdict
-from ident.diagnosis.law.dependence import path_since_reversal
+from ident.diagnosis.law.dependence import Dependence, Partner, Variable, path_since_reversal
+from ident.diagnosis.law.drift import time_law
 from ident.diagnosis.law.formula import formula_of
 from ident.diagnosis.law.spline import knots_around, knots_over
+from ident.diagnosis.problem import Nominal
+from ident.diagnosis.settings import Settings
 from ident.effects.laws import COUNT, LAWS, coefficient
 from ident.plant.terms import State
 
@@ -156,3 +160,43 @@ def test_slow_noise_of_the_effort_is_no_law_of_time(machine: Make) -> None:
         plain = machine()
         records = [plain.drive(seed), plain.drive(seed + 1)]
         assert diagnose_axis(records[:1], records[1:], seed=1).verdict is Verdict.NONE
+
+
+@pytest.mark.parametrize("judged", [True, False])
+def test_a_drift_has_the_constant_that_a_judged_model_leaves_and_none_that_a_free_one_absorbs(
+    world: type[Any], judged: bool
+) -> None:
+    """What differs between repeats says nothing of it: half of it was taken off once, and a changed parameter named."""
+
+    def drift(time: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        return np.asarray(3.0 - np.exp(-time / 20))
+
+    problems = []
+    for part in (0, 1):
+        problem = world(seed=5).problem(part)
+        times = [np.arange(len(block.target)) * block.sample_time for block in problem.blocks]
+        columns = [block.baseline[:, 0] for block in problem.blocks]
+        dependence = Dependence(
+            where="place",
+            variable=Variable.TIME,
+            partner=Partner.DIRECTION,
+            unit_x="s",
+            unit_y="Nm",
+            arguments=tuple(time[:, None] for time in times),
+            design=lambda basis, pairs=(times, columns): [
+                basis(time) * column[:, None] for time, column in zip(*pairs, strict=True)
+            ],
+        )
+        blocks = tuple(
+            replace(block, target=block.target + drift(time) * column)
+            for block, time, column in zip(problem.blocks, times, columns, strict=True)
+        )
+        nominal = Nominal(np.array([1.0, -2.0, 0.5]), np.full(3, 1e-3)) if judged else None
+        problems.append(replace(problem, blocks=blocks, dependences=(dependence,), nominal=nominal))
+    law = time_law(problems, Settings(), 1)
+    assert law is not None
+    knots = law.learnt.knots
+    found = knots.basis(np.linspace(*knots.ends, 50)) @ law.learnt.weights
+    expected = drift(np.linspace(*knots.ends, 50))
+    assert found - found.mean() == pytest.approx(expected - expected.mean(), abs=0.15)
+    assert found.mean() == pytest.approx(expected.mean() if judged else 0.0, abs=0.15)
