@@ -71,7 +71,7 @@ def _anchored(problems: Sequence[Problem], law: Law, settings: Settings, seed: i
 
 
 def _constant(regression: Regression, column: Array, known: Array) -> float:
-    """How much of a column (n,) fitted rows hold beside what is known (n,); if they show none, less the mean of that."""
+    """How much of a column (n,) fitted rows hold beside what is known (n,); if they show none, less its mean."""
     pair = np.column_stack([column, known])
     white = regression.white(regression.colour_beside(pair, order=0), (), pair)
     fitted = ~white.confirming
