@@ -119,6 +119,7 @@ class EffectKind:
         places: where it can be.
         parameters: the first is its size, zero (or, for `slip`, that of the floor) without the effect.
         term: makes what it adds to the equations, from name, place and values.
+        words: what is said of it beside its place, with its parameters in braces.
         usual: its size in practice for a vehicle, by place: one that people do meet, and see.
         units_at: units of the size that differ from the table's, by place.
         sign: of its size.
@@ -135,6 +136,7 @@ class EffectKind:
     places: tuple[str, ...]
     parameters: tuple[EffectParameter, ...]
     term: Callable[[str, str, Mapping[str, Expression]], EffectTerm]
+    words: str
     usual: Callable[[VehicleDescription, str], float]
     units_at: Mapping[str, str] = field(default_factory=dict)
     sign: Sign = Sign.EITHER

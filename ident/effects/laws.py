@@ -123,6 +123,7 @@ def _kind(rank: int, name: str, term: type[_LawTerm], unit_x: str, unit_y: str) 
             *(EffectParameter(coefficient(index), unit_y, "coefficient of a B-spline") for index in range(COUNT)),
         ),
         term=term,
+        words="a law without a name, {scale} of what was found",
         usual=lambda vehicle, where: 1.0,
         adding=(),
         always=False,

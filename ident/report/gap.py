@@ -16,7 +16,8 @@ from ident.diagnosis.vehicle.outcome import HORIZON
 from ident.report import digits
 from ident.report.digits import plain
 from ident.report.gap_figures import Figure, map_figure, residual_figures
-from ident.report.gap_summary import gap_line, next_text, verdict_line
+from ident.report.gap_summary import gap_line, next_text
+from ident.report.headline import headline
 from ident.report.page import render, script_json
 from ident.writing import write_whole
 
@@ -80,7 +81,7 @@ def render_gap_report(content: GapReport) -> str:
     return render(
         "gap.html.j2",
         verdict=str(diagnosis.verdict),
-        headline=verdict_line(diagnosis, findings),
+        headline=headline(diagnosis, findings.events),
         gap=diagnosis.gap,
         unseen=diagnosis.unseen,
         horizon=HORIZON,

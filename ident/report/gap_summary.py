@@ -7,20 +7,15 @@ from typing import Final
 
 from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Share, Verdict
 from ident.diagnosis.findings import Cause, Findings
+from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.report.digits import percent, plain, significant, unit_text, with_std
-from ident.report.law_text import law_line, law_name
+from ident.report.headline import headline
+from ident.report.law_text import law_line
 
 MOST_LINES: Final = 10
 MOST_EVENTS: Final = 3
 
-_VERDICTS: Final = {
-    Verdict.EFFECT: "The model lacks {names}.",
-    Verdict.LAW: "The model lacks {names}.",
-    Verdict.NONE: "Nothing is missing: what is left is noise, as far as these records can tell.",
-    Verdict.UNKNOWN: "Something is missing that the library has no name for.",
-}
-
-_UNSEEN: Final = {"repeated": "Held-out steps, times the noise", "lane_change": "Lane change, times the noise"}
+_UNSEEN: Final = {REPEATED: "Held-out steps, times the noise", LANE_CHANGE: "Lane change, times the noise"}
 
 
 def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
@@ -38,7 +33,7 @@ def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
         lines.append(f"These records cannot show: {', '.join(diagnosis.invisible)}.")
     lines.append(f"Next: {next_text(diagnosis)}")
     causes = _shortened([cause_line(effect) for effect in diagnosis.effects], MOST_LINES - 1 - len(lines))
-    return [verdict_line(diagnosis, findings), *causes, *lines]
+    return [headline(diagnosis, findings.events), *causes, *lines]
 
 
 def _shortened(causes: Sequence[str], room: int) -> list[str]:
@@ -47,17 +42,6 @@ def _shortened(causes: Sequence[str], room: int) -> list[str]:
         return list(causes)
     shown = room - 1
     return [*causes[:shown], f"  and {len(causes) - shown} more (--report FILE shows them)"]
-
-
-def verdict_line(diagnosis: Diagnosis, findings: Findings) -> str:
-    """The verdict in one sentence."""
-    if diagnosis.verdict is Verdict.NONE and findings.events:
-        return "Nothing is missing that both drives show."
-    names = " and ".join(
-        f"{plain(effect.name)} ({effect.where})" if effect.law is None else law_name(effect.law, effect.where)
-        for effect in diagnosis.effects
-    )
-    return _VERDICTS[diagnosis.verdict].format(names=names)
 
 
 def cause_line(effect: NamedEffect) -> str:

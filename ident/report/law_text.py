@@ -36,9 +36,9 @@ _VARIABLES: Final = MappingProxyType(
 )
 
 
-def law_name(law: LawAnswer, where: str) -> str:
-    """What it is and where, as part of a sentence."""
-    return f"{_FORCES[law.partner].format(x=variable_text(law))} ({where})"
+def law_words(law: LawAnswer) -> str:
+    """What it is and how large, as part of a sentence."""
+    return f"{_FORCES[law.partner].format(x=variable_text(law))}, {_swing(law)}"
 
 
 def variable_text(law: LawAnswer) -> str:
@@ -49,13 +49,17 @@ def variable_text(law: LawAnswer) -> str:
 
 def law_line(effect: NamedEffect, law: LawAnswer) -> str:
     """A law as a line under the verdict: how large, as what formula, what it closes, what else it may be."""
-    y, std = law.curve[:, 1], law.curve[:, 2]
-    swing = f"from {significant(float(y.min()))} to {significant(float(y.max()))} {unit_text(law.unit_y)}"
+    std = law.curve[:, 2]
     formula = f", {law.formula} of x = {variable_text(law)}" if law.formula else ""
     sure = f" (± {significant(float(np.median(std)))})"
     others = ", ".join(f"{other.variable or other.name}@{other.where}" for other in effect.alternatives)
     other = f"; might as well be {others}" if others else ""
     near = "" if law.nearest is None else f"; nearest name {law.nearest}, which misses {percent(law.distance or 0.0)}"
     closes = percent(effect.gap_closed_held_out)
-    head = f"  {effect.probability:.0%} law@{effect.where}: {swing}{sure} over {variable_text(law)}{formula}"
+    head = f"  {effect.probability:.0%} law@{effect.where}: {_swing(law)}{sure} over {variable_text(law)}{formula}"
     return f"{head}; closes {closes} of the gap{other}{near}"
+
+
+def _swing(law: LawAnswer) -> str:
+    y = law.curve[:, 1]
+    return f"from {significant(float(y.min()))} to {significant(float(y.max()))} {unit_text(law.unit_y)}"

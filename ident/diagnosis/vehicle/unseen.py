@@ -19,6 +19,10 @@ from ident.estimate.filters import Processing
 from ident.records.record import Record, Step, base_step
 from ident.vehicle.description import VehicleDescription
 
+REPEATED: Final = "repeated"
+LANE_CHANGE: Final = "lane_change"
+"""The steps that a diagnosis compares, and those in which nothing repeats."""
+
 
 def unseen_gaps(
     findings: Findings,
@@ -71,5 +75,5 @@ def _changes_lane(step: str) -> bool:
 
 
 _CHOSEN: Final[Mapping[str, Callable[[str], bool]]] = MappingProxyType(
-    {"repeated": lambda step: not _changes_lane(step), "lane_change": _changes_lane}
+    {REPEATED: lambda step: not _changes_lane(step), LANE_CHANGE: _changes_lane}
 )

@@ -21,5 +21,6 @@ EFFECT: Final = EffectKind(
     places=with_groups(STEERING, WHEEL_PLACES),
     parameters=(EffectParameter("imbalance", "Nm", "friction is d_c + imbalance forward, d_c - imbalance backward"),),
     term=_AsymmetricCoulomb,
+    words="Coulomb friction {imbalance} beyond its mean forward, as much below it backward",
     usual=lambda vehicle, where: 0.3 * coulomb_friction(vehicle, where),
 )

@@ -23,5 +23,6 @@ EFFECT: Final = EffectKind(
         EffectParameter("imbalance", "Nm s/rad", "friction is d_v + imbalance forward, d_v - imbalance backward"),
     ),
     term=_AsymmetricViscous,
+    words="viscous friction {imbalance} beyond its mean forward, as much below it backward",
     usual=lambda vehicle, where: 0.5 * viscous_friction(vehicle, where),
 )

@@ -22,6 +22,7 @@ EFFECT: Final = EffectKind(
     places=with_groups(DRIVES, STEERING),
     parameters=(EffectParameter("gap", "rad", "whole play, at the wheel or at the steering axis"),),
     term=_Backlash,
+    words="a play of {gap}",
     usual=lambda vehicle, where: 0.03,
     sign=Sign.NOT_NEGATIVE,
     always=False,

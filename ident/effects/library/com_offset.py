@@ -26,6 +26,7 @@ EFFECT: Final = EffectKind(
         EffectParameter("y", "m", "centre of mass left of the centre", 0.0),
     ),
     term=_CentreOfMass,
+    words="centre of mass {x} ahead and {y} left of the centre",
     usual=lambda vehicle, where: vehicle.geometry.wheelbase / 8,
     adding=("x", "y"),
 )

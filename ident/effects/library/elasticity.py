@@ -30,6 +30,7 @@ EFFECT: Final = EffectKind(
     places=with_groups(DRIVES, STEERING),
     parameters=(EffectParameter("compliance", "rad/Nm", "twist per torque, at the wheel or at the steering axis"),),
     term=_Elasticity,
+    words="a spring that twists by {compliance}",
     usual=_usual,
     sign=Sign.NOT_NEGATIVE,
     always=False,

@@ -50,6 +50,7 @@ EFFECT: Final = EffectKind(
         EffectParameter("time", "s", "in which 63 % of the change have come", 300.0, positive=True),
     ),
     term=_FrictionWarming,
+    words="friction that changes by {change} of itself within {time} of motion",
     usual=lambda vehicle, where: -0.2,
     always=False,
 )

@@ -34,6 +34,7 @@ EFFECT: Final = EffectKind(
     places=PARAMETER_NAMES,
     parameters=(EffectParameter("change", "1", "true value over the model's, minus one"),),
     term=_ParameterChange,
+    words="off by {change} of the model's value",
     usual=_usual,
     always=False,  # the parameters themselves can be set
     same_records=MappingProxyType({"scaled@every torque": ("all parameters of the vehicle file",)}),

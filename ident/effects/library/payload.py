@@ -33,6 +33,7 @@ EFFECT: Final = EffectKind(
         EffectParameter("inertia", "kg m^2", "its inertia about the vertical axis", 0.0),
     ),
     term=_Payload,
+    words="{mass} more mass over the centre, of an inertia of {inertia}",
     usual=lambda vehicle, where: 0.05 * vehicle.prior["m_ch"],
     adding=("mass", "inertia"),
 )

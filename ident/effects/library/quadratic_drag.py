@@ -43,6 +43,7 @@ EFFECT: Final = EffectKind(
     places=with_groups(WHEEL_PLACES, CHASSIS),
     parameters=(EffectParameter("coefficient", "Nm s^2/rad^2", "resistance is coefficient times v abs(v)"),),
     term=_QuadraticDrag,
+    words="drag that grows with the square of the speed, {coefficient}",
     usual=_usual,
     units_at=MappingProxyType({"chassis": "N s^2/m^2"}),
 )

@@ -41,5 +41,6 @@ EFFECT: Final = EffectKind(
     places=(*with_groups(STEERING), *CHASSIS),
     parameters=(EffectParameter("torque", "Nm", "resistance of the contact patches to turning on the spot"),),
     term=_Scrub,
+    words="contact patches that resist turning on the spot by {torque}",
     usual=_usual,
 )

@@ -25,6 +25,7 @@ EFFECT: Final = EffectKind(
         EffectParameter("friction", "1", "friction coefficient of the floor, or of the tyre, instead of the usual"),
     ),
     term=EffectTerm,
+    words="contacts that slide at a friction coefficient of {friction}",
     usual=lambda vehicle, where: 0.25 * vehicle.limits.floor_friction,
     adding=(),  # coefficients of friction of one floor do not add up
     always=False,

@@ -34,6 +34,7 @@ EFFECT: Final = EffectKind(
         EffectParameter("direction", "rad", "heading in the world that points uphill", 0.0),
     ),
     term=_Slope,
+    words="a floor inclined by {angle}, uphill towards a heading of {direction}",
     usual=_usual,
     polar=("angle", "direction"),  # the angle is small enough for a length
 )

@@ -26,5 +26,6 @@ EFFECT: Final = EffectKind(
     places=with_groups(STEERING),
     parameters=(EffectParameter("offset", "rad", "angle reported minus true angle"),),
     term=_SteeringOffset,
+    words="an angle reported {offset} too large",
     usual=lambda vehicle, where: 0.01,
 )

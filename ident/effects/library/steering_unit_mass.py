@@ -43,5 +43,6 @@ EFFECT: Final = EffectKind(
     places=CHASSIS,
     parameters=(EffectParameter("mass", "kg", "of each wheel unit, at the wheel contact, so off its steering axis"),),
     term=_SteeringUnitMass,
+    words="{mass} of each wheel unit off its steering axis",
     usual=lambda vehicle, where: 0.01 * vehicle.prior["m_ch"],
 )

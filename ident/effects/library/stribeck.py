@@ -26,5 +26,6 @@ EFFECT: Final = EffectKind(
         EffectParameter("velocity", "rad/s", "rate at which it has fallen to 1/e", 0.3, positive=True),
     ),
     term=_Stribeck,
+    words="{amplitude} more friction at rest, most of it gone above {velocity}",
     usual=lambda vehicle, where: 0.4 * coulomb_friction(vehicle, where),
 )

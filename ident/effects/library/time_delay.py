@@ -23,6 +23,7 @@ EFFECT: Final = EffectKind(
     places=with_groups(DRIVES, ENCODERS),
     parameters=(EffectParameter("delay", "s", "torque acts, or angle is reported, so much later"),),
     term=_TimeDelay,
+    words="{delay} late",
     usual=lambda vehicle, where: 0.02,
     always=False,
     same_records=MappingProxyType({"unsynchronised@torque": DRIVES, "unsynchronised@alpha": ENCODERS}),

@@ -27,5 +27,6 @@ EFFECT: Final = EffectKind(
     places=with_groups(DRIVES),
     parameters=(EffectParameter("bias", "Nm", "torque at the motor shaft beyond the torque reported"),),
     term=_TorqueBias,
+    words="{bias} of torque at the motor shaft that is not reported",
     usual=lambda vehicle, where: 0.08 * vehicle.limits.rated_torque,
 )

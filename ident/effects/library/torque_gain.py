@@ -28,6 +28,7 @@ EFFECT: Final = EffectKind(
     places=with_groups(DRIVES),
     parameters=(EffectParameter("error", "1", "torque at the shaft is (1 + error) times the torque reported"),),
     term=_TorqueGain,
+    words="torque off by {error} of what is reported",
     usual=lambda vehicle, where: 0.05,
     same_records=MappingProxyType(
         {"scaled@torque": DRIVES, "sign_flipped@torque": DRIVES, "scaled@every torque": ("drives",)}

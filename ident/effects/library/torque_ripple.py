@@ -32,6 +32,7 @@ EFFECT: Final = EffectKind(
         EffectParameter("phase", "rad", "at motor angle zero", 0.0),
     ),
     term=_TorqueRipple,
+    words="a torque ripple of {amplitude}, {order} periods a turn",
     usual=lambda vehicle, where: 0.12 * vehicle.limits.rated_torque,
     polar=("amplitude", "phase"),
 )

@@ -40,6 +40,7 @@ EFFECT: Final = EffectKind(
         EffectParameter("phase", "rad", "wheel angle of the largest radius, negative", 0.0),
     ),
     term=_Eccentricity,
+    words="a radius that varies by {amplitude} over a turn",
     usual=lambda vehicle, where: 0.003 * vehicle.geometry.wheel_radius,
     polar=("amplitude", "phase"),
 )

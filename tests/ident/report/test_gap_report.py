@@ -128,7 +128,7 @@ def test_the_map_leaves_out_what_does_not_matter_and_puts_opposites_beside_each_
 
 
 def test_the_page_says_what_was_found_and_loads_nothing(page: str, findings: Findings) -> None:
-    assert "The model lacks scrub (chassis)." in page
+    assert "Vehicle: contact patches that resist turning on the spot by 2.9" in page
     assert "drive a circle" in page
     assert "m.toml" in page
     head = page[: page.index("<script")]
