@@ -9,10 +9,10 @@ import numpy as np
 import typer
 
 from hil.exam.answer_file import open_cases
-from hil.exam.cases import Composition
+from hil.exam.drawing import Composition
 from hil.exam.folder import ExamFolder
 from hil.exam.score_figures import confusion_svg, reliability_svg
-from hil.exam.score_report import score_exam, score_json, score_markdown, summary_lines
+from hil.exam.score_report import score_exams, score_json, score_markdown, summary_lines
 from hil.exam.scoring import removable
 from hil.exam.sizes import load_rows, load_sizes, replaced, table_text
 from ident.errors import UserError
@@ -53,6 +53,8 @@ def seal(
     none: Annotated[int, typer.Option(min=0, help="Cases without any.")] = _DEFAULT.none,
     unknown: Annotated[int, typer.Option(min=0, help="Cases with one the library lacks.")] = _DEFAULT.unknown,
     invisible: Annotated[int, typer.Option(min=0, help="Cases with one below the noise.")] = _DEFAULT.invisible,
+    laws: Annotated[int, typer.Option(min=0, help="Cases with a law that has no name.")] = _DEFAULT.laws,
+    faults: Annotated[int, typer.Option(min=0, help="Cases whose records are at fault.")] = _DEFAULT.faults,
     excitations: Annotated[
         int, typer.Option(min=1, help="Pairs of campaigns, to fit and to confirm, that the cases share.")
     ] = _DEFAULT.excitations,
@@ -77,7 +79,7 @@ def seal(
 
     world = world_of(vehicle, engine)
     table = load_sizes(stored_sizes(world, sizes))
-    composition = Composition(effects, pairs, none, unknown, invisible, excitations)
+    composition = Composition(effects, pairs, none, unknown, invisible, laws, faults, excitations)
     order = SealingOrder(out, world, stored_model(world, model), composition, key, first_seed, jobs, scheduler)
     with bar("sealing") as shown:
         sealed = seal(order, table, shown)
@@ -143,9 +145,18 @@ def calibrate(
 
 
 @exam.command("score")
-def score_command(folder: FolderArgument, key: KeyOption = None) -> None:
-    """Open the sealed answer and score; writes score.md, score.json, reliability.svg and confusion.svg."""
-    report = score_exam(ExamFolder(folder), np.random.default_rng(0), key)
+def score_command(
+    folders: Annotated[list[Path], typer.Argument(help="Folders of exams; several are counted as one, and by world.")],
+    key: KeyOption = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the score. Default: that of the exam; several need one.")
+    ] = None,
+) -> None:
+    """Open the sealed answers and score; writes score.md, score.json, reliability.svg and confusion.svg."""
+    if out is None and len(folders) > 1:
+        raise UserError("Several exams have no one folder for their score.", "Name one: --out FOLDER.")
+    target = out or folders[0]
+    report = score_exams([ExamFolder(folder) for folder in folders], np.random.default_rng(0), key)
     for line in summary_lines(report):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     for name, text in (
@@ -154,8 +165,8 @@ def score_command(folder: FolderArgument, key: KeyOption = None) -> None:
         ("reliability.svg", reliability_svg(report.score.bins)),
         ("confusion.svg", confusion_svg(report.score.confusion, report.score.wished)),
     ):
-        write_whole(text, folder / name)
-    console.print(f"Written: {folder / 'score.md'}, score.json, reliability.svg, confusion.svg", soft_wrap=True)
+        write_whole(text, target / name)
+    console.print(f"Written: {target / 'score.md'}, score.json, reliability.svg, confusion.svg", soft_wrap=True)
 
 
 def _require_cluster(scheduler: str | None) -> None:

@@ -23,7 +23,7 @@ from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.diagnosis.vehicle.unseen import unseen_gaps
 from ident.effects.extended import ExtendedModel
 from ident.errors import RecordError, UserError
-from ident.faults import Fault, find_faults
+from ident.faults import sure_faults
 from ident.parameters_file import read_model, write_model
 from ident.records.axis_record import AxisRecord, read_axis_record
 from ident.records.record import Record
@@ -31,7 +31,7 @@ from ident.report.faults import fault_lines, write_fault_report
 from ident.report.gap import GapReport, write_gap_report
 from ident.report.gap_summary import summary_lines
 from ident.stages import Stage, untold
-from ident.vehicle.description import VehicleDescription, find_data_file
+from ident.vehicle.description import find_data_file
 from ident.vehicle.geometry import Geometry
 from ident.writing import refuse_folder, refuse_inputs
 
@@ -226,7 +226,7 @@ def _vehicle_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
     )
     _refuse_repeated([part for record in (*records, *confirming) for part in _of_vehicle(record)], same_rate=True)
     stage("looking for faults of the records")
-    faults = _faults((*records, *confirming), vehicle)
+    faults = sure_faults(whole_records((*records, *confirming)), vehicle)
     notes = (told,) if told else ()
     if faults:
         return Answer(None, faulty(faults), notes=notes)
@@ -237,12 +237,6 @@ def _vehicle_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
     named = diagnosis.verdict.explains
     extended = extended_model(found.findings, vehicle.prior, given=given) if named else None
     return Answer(found.findings, diagnosis, extended, notes, vehicle.geometry)
-
-
-def _faults(records: Sequence[Record], vehicle: VehicleDescription) -> list[Fault]:
-    """Of all records, each once, that make everything fit when they are undone, or that nothing can undo."""
-    found = [fault for record in whole_records(records) for fault in find_faults(record, vehicle) if fault.sure]
-    return list({(fault.name, fault.channel, fault.step): fault for fault in found}.values())
 
 
 def _refuse_repeated(parts: Sequence[_Stretch], *, same_rate: bool) -> None:

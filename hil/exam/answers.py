@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,27 +9,36 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Final
 
-import numpy as np
-
 from hil.exam.cases import Case, Injected, Kind
-from hil.exam.folder import ExamFolder
-from hil.exam.identity import Identities, Identity
-from hil.exam.said import Said, said_from
+from hil.exam.identity import Identity
+from hil.exam.said import Said
 from hil.exam.statistics import Z95
 from ident.diagnosis.findings import LAW
 from ident.diagnosis.vehicle.library import DRIFTS, SHAPES
-from ident.errors import UserError
 
 CONFIDENT: Final = 0.5
 """Probability from which on a single name counts as a confident one."""
 
+
+ALIKE: Final = 0.98
+"""Cosine of what two causes add to the records, from which they count as the same."""
+
+LAW_VARIABLES: Final = MappingProxyType(
+    {"law_rate": "rate", "law_angle": "angle", "law_angle_direction": "angle", "law_angle_rate": "angle"}
+)
+"""Laws that an exam draws -> on what they depend."""
+
+_JOINTS: Final = MappingProxyType({"drive": "wheel", "drives": "wheels", "encoder": "steering", "encoders": "steering"})
+"""A drive turns the wheel of its corner, an encoder reads the steering axis of its side."""
 
 _TURNED: Final = frozenset(str(name) for name, shape in SHAPES.items() if shape.angle is not None)
 """Effects with a direction or a phase: half a turn of it is the other sign of the size."""
 
 _SPECIAL: Final = MappingProxyType({Kind.INVISIBLE: " (invisible)", Kind.UNKNOWN: " (no candidate)"})
 
-_VERDICTS: Final = MappingProxyType({Kind.NONE: "none", Kind.INVISIBLE: "none", Kind.UNKNOWN: "unknown"})
+_VERDICTS: Final = MappingProxyType(
+    {Kind.NONE: "none", Kind.INVISIBLE: "none", Kind.UNKNOWN: "unknown", Kind.LAW: "law", Kind.FAULT: "fault"}
+)
 
 
 @dataclass(frozen=True)
@@ -186,11 +194,45 @@ class Answer:
         return all(len(_set(effect)) > 1 or effect["probability"] < CONFIDENT for effect in self.said.effects)
 
     @property
+    def fault_named(self) -> bool:
+        """The fault of the records is the one named first, or what the record bears as well."""
+        return bool(self.said.faults) and f"{self.single.name}@{self.single.where}" in self.said.faults[0]
+
+    @property
+    def law_place(self) -> bool:
+        """The law is put where it is, or where these records do not tell it from."""
+        return any(_corner(where) == _corner(self.single.where) for where in self._places)
+
+    @property
+    def law_variable(self) -> bool:
+        """The law is said to depend on what it does, or on what these records do not tell from it.
+
+        A name is as good where it closes all but what a cosine of ALIKE leaves: the shape drawn is near one.
+        """
+        if not self.said.effects:
+            return False
+        first = self.said.effects[0]
+        if first.get("law") is None:
+            return self.law_place and float(first["gap_closed_held_out"] or 0.0) >= ALIKE**2
+        told = {first["law"]["variable"], *(other.get("variable") for other in first.get("alternatives", ()))}
+        return self.law_place and LAW_VARIABLES[self.single.name] in told
+
+    @property
+    def _places(self) -> list[str]:
+        if not self.said.effects:
+            return []
+        first = self.said.effects[0]
+        return [str(first["where"]), *(str(other["where"]) for other in first.get("alternatives", ()))]
+
+    @property
     def statements(self) -> list[tuple[float, bool]]:
         """Every probability stated, and whether a true effect has that name, or one that no record tells from it.
 
         Of an effect that the library lacks, a law without a name is right.
         """
+        if self.case.kind is Kind.LAW:
+            right = self.law_variable
+            return [(float(effect["probability"]), right or effect["name"] == LAW) for effect in self.said.effects]
         nameless = self.case.kind is Kind.UNKNOWN
         known = [frozenset({LAW})] if nameless else [identity.names for identity in self.identities]
         return [
@@ -219,45 +261,10 @@ class Answer:
         return MappingProxyType({name: value for name, value in wrong.items() if math.isfinite(value)})
 
 
-def read_answers(
-    folder: ExamFolder, cases: Sequence[Case], known: Sequence[Identities], *, removed: bool = False
-) -> list[Answer]:
-    """The answers of the diagnosing side beside the truth.
-
-    Args:
-        folder: of the exam.
-        cases: from its answer.
-        known: identities of every pair of campaigns.
-        removed: the answers with the true candidate removed.
-
-    Raises:
-        UserError: there is no diagnosis.
-    """
-    said = {
-        case.identifier: said_from(json.loads(path.read_text(encoding="utf-8")))
-        for case in cases
-        if (path := folder.diagnosis(case.identifier, removed)).is_file()
-    }
-    if not said:
-        raise UserError(f"{folder.path} holds no diagnoses.", "Diagnose first: quasiomni exam diagnose FOLDER.")
-    return [
-        Answer(case, said[case.identifier], known[case.excitation].of_case(case))
-        for case in cases
-        if case.identifier in said
-    ]
-
-
-def permuted(answers: Sequence[Answer], generator: np.random.Generator) -> list[Answer]:
-    """The same answers beside the truths of other cases."""
-    order = generator.permutation(len(answers)).tolist()
-    return [Answer(one.case, answers[other].said, one.identities) for one, other in zip(answers, order, strict=True)]
-
-
-def chance(answers: Sequence[Answer]) -> float:
-    """Expected share of right names over all permutations of the answers, of the cases with one effect."""
-    asked = [answer for answer in answers if answer.case.kind is Kind.EFFECT]
-    hits = [Answer(one.case, other.said, one.identities).right for one in asked for other in answers]
-    return sum(hits) / len(hits) if hits else math.nan
+def _corner(where: str) -> str:
+    """The joint that a place is at."""
+    kind, mark, corner = where.partition("_")
+    return f"{_JOINTS.get(kind, kind)}{mark}{corner}"
 
 
 def _set(effect: Mapping[str, Any]) -> frozenset[str]:

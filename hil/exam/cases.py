@@ -1,23 +1,14 @@
-"""Cases of an exam: which effect, where, how large, with which noise; drawn at random, balanced, in shuffled order."""
+"""Cases of an exam: which effect, where, how large, with which noise."""
 
 from __future__ import annotations
 
 import enum
-import itertools
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Final
-
-import numpy as np
-
-from hil.exam.sizes import EffectSize, SizeTable
-from ident.errors import UserError
 
 SIZES: Final = (0.2, 0.5, 1.0)
 """Of the effects of an exam, in noise units."""
-
-UNKNOWN_SIZES: Final = (0.5, 1.0, 2.0)
-"""Of the effects that have no candidate, in noise units."""
 
 SEEDS_PER_CASE: Final = 2
 
@@ -30,6 +21,8 @@ class Kind(enum.StrEnum):
     NONE = "none"
     UNKNOWN = "unknown"
     INVISIBLE = "invisible"
+    LAW = "law"
+    FAULT = "fault"
 
 
 @dataclass(frozen=True)
@@ -37,15 +30,17 @@ class Injected:
     """An effect of a case.
 
     Attributes:
-        name, where: which.
-        parameter: that says how large it is.
-        size: of that parameter [SI].
+        name, where: which effect, or law without a name; of a fault of the record, its name and its channel.
+        parameter: that says how large it is; of a fault, the step that it is confined to.
+        size: of that parameter [SI]; of a law, in noise units; of a fault, whatever its value is.
+        values: further numbers of a law.
     """
 
     name: str
     where: str
     parameter: str
     size: float
+    values: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -84,126 +79,3 @@ def case_from_json(entry: dict[str, Any]) -> Case:
     """The case of `Case.as_json`."""
     effects = tuple(Injected(**effect) for effect in entry["effects"])
     return Case(**{**entry, "kind": Kind(entry["kind"]), "effects": effects})
-
-
-@dataclass(frozen=True)
-class Composition:
-    """How many cases of each kind, and how many pairs of campaigns they share.
-
-    One excitation shows some effects better than another and leaves the wheels askew in its own way: rates of cases
-    that all drive the same one are those of that excitation.
-    """
-
-    effects: int = 240
-    pairs: int = 24
-    none: int = 60
-    unknown: int = 40
-    invisible: int = 24
-    excitations: int = 24
-
-    @property
-    def total(self) -> int:
-        """Of all kinds."""
-        return self.effects + self.pairs + self.none + self.unknown + self.invisible
-
-    @property
-    def driven(self) -> int:
-        """Excitations that some case drives."""
-        return min(self.excitations, self.total)
-
-
-def draw_cases(
-    table: SizeTable,
-    composition: Composition,
-    noise: Callable[[int], int],
-    generator: np.random.Generator,
-    names: np.random.Generator | None = None,
-) -> list[Case]:
-    """Cases in shuffled order.
-
-    Args:
-        table: what size each effect has in noise units.
-        composition: how many of which kind.
-        noise: seed by number of a case; with the next one it is that case's alone.
-        generator: of everything that is drawn.
-        names: of the identifiers, which everybody sees; None: the same.
-
-    Raises:
-        UserError: the table has no effect of a kind that is asked for.
-    """
-    questions = [
-        *_singles(table.visible, composition.effects, SIZES, Kind.EFFECT, generator),
-        *_pairs(table.visible, composition.pairs, generator),
-        *((Kind.NONE, (), 0.0) for _ in range(composition.none)),
-        *_singles(table.unknown, composition.unknown, UNKNOWN_SIZES, Kind.UNKNOWN, generator),
-        *_hidden(table.invisible, composition.invisible, generator),
-    ]
-    order = generator.permutation(len(questions))
-    identifiers = _identifiers(len(questions), names or generator)
-    cases = []
-    for number, (position, identifier) in enumerate(zip(order.tolist(), identifiers, strict=True)):
-        kind, effects, noise_units = questions[position]
-        cases.append(Case(identifier, kind, effects, noise_units, noise(number), number % composition.driven))
-    return cases
-
-
-_Question = tuple[Kind, tuple[Injected, ...], float]
-
-
-def _identifiers(count: int, generator: np.random.Generator) -> list[str]:
-    found: dict[str, None] = {}
-    while len(found) < count:
-        found[generator.bytes(6).hex()] = None
-    return list(found)
-
-
-def _by_name(rows: Sequence[EffectSize], generator: np.random.Generator) -> list[Iterator[EffectSize]]:
-    """For each name, its places over and over, in random order."""
-    names = list(dict.fromkeys(row.name for row in rows))
-    if not names:
-        raise UserError("The size table has no effect of a kind that the exam asks for.", "Ask for none of them.")
-    rounds: list[Iterator[EffectSize]] = []
-    for name in names:
-        places = [row for row in rows if row.name == name]
-        rounds.append(itertools.cycle([places[index] for index in generator.permutation(len(places))]))
-    return rounds
-
-
-def _singles(
-    rows: Sequence[EffectSize], count: int, sizes: Sequence[float], kind: Kind, generator: np.random.Generator
-) -> Iterator[_Question]:
-    """Names in turn; each name runs through the sizes, and through its places."""
-    if not count:
-        return
-    rounds = _by_name(rows, generator)
-    for number in range(count):
-        turn, name = divmod(number, len(rounds))
-        size = sizes[(turn + name) % len(sizes)]
-        yield kind, (_injected(next(rounds[name]), size, generator),), size
-
-
-def _pairs(rows: Sequence[EffectSize], count: int, generator: np.random.Generator) -> Iterator[_Question]:
-    """Two effects of different names, both as large as the largest size."""
-    if not count:
-        return
-    rounds = _by_name(rows, generator)
-    for _ in range(count):
-        first, second = generator.choice(len(rounds), size=2, replace=False)
-        chosen = (_injected(next(rounds[index]), SIZES[-1], generator) for index in (first, second))
-        yield Kind.PAIR, tuple(chosen), SIZES[-1]
-
-
-def _hidden(rows: Sequence[EffectSize], count: int, generator: np.random.Generator) -> Iterator[_Question]:
-    """Effects that these campaigns do not show, as large as they are in practice."""
-    if not count:
-        return
-    rounds = _by_name(rows, generator)
-    for number in range(count):
-        row = next(rounds[number % len(rounds)])
-        sign = generator.choice([-1.0, 1.0]) if row.signed else 1.0
-        yield Kind.INVISIBLE, (Injected(row.name, row.where, row.parameter, sign * row.largest),), 0.0
-
-
-def _injected(row: EffectSize, noise_units: float, generator: np.random.Generator) -> Injected:
-    sign = generator.choice([-1.0, 1.0]) if row.signed else 1.0
-    return Injected(row.name, row.where, row.parameter, float(sign * row.physical(noise_units)))

@@ -18,9 +18,11 @@ from hil.exam.folder import RECORDS, ExamFolder, read_exam
 from hil.exam.record_bytes import record_from_bytes
 from hil.exam.workers import run_all
 from ident.diagnosis.alone import closed_alone
+from ident.diagnosis.diagnosis import faulty
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.vehicle.diagnose import VehicleDiagnosis, diagnose_vehicle
 from ident.errors import UserError
+from ident.faults import sure_faults
 from ident.parameters_file import read_model
 from ident.vehicle.description import load_vehicle
 from ident.writing import write_whole
@@ -148,9 +150,13 @@ def diagnose_case(
             file.write_text(text, encoding="utf-8")
         described, judged = load_vehicle(files[0]), read_model(files[1])
     started = time.process_time()
-    records = [record_from_bytes(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
     effects = [name for name in EffectName if name != removed]
     try:
+        records = [record_from_bytes(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
+        faults = sure_faults(records, described)
+        if faults:
+            content = {**faulty(faults).as_json(), "seconds": time.process_time() - started}
+            return identifier, json.dumps(content).encode()
         found = diagnose_vehicle(records[:1], records[1:], described, judged, effects=effects)
         content = {**found.diagnosis.as_json(), "seconds": time.process_time() - started}
         content |= {} if removed else {"alone": _alone(found)}

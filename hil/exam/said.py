@@ -30,12 +30,13 @@ class Said:
     """What the diagnosing side said of one case.
 
     Attributes:
-        verdict: `effect`, `law`, `none`, `unknown` or `failed`.
+        verdict: `effect`, `law`, `none`, `unknown`, `fault` or `failed`.
         effects: as in `diagnosis.json`, most probable first; none unless the verdict is `effect` or `law`.
         invisible: names that the records cannot show.
         closed: share of the removable held-out gap that the whole answer closes.
         seconds: processor time [s].
         alone: what every name closes by itself.
+        faults: `name@channel` of every fault of the records, and what else each may be called.
     """
 
     verdict: str
@@ -44,6 +45,7 @@ class Said:
     closed: float = math.nan
     seconds: float = math.nan
     alone: tuple[Alone, ...] = ()
+    faults: tuple[frozenset[str], ...] = ()
 
 
 def said_from(content: Mapping[str, Any]) -> Said:
@@ -55,6 +57,7 @@ def said_from(content: Mapping[str, Any]) -> Said:
         invisible=tuple(content["invisible"]),
         closed=_number(content["gap"]["closed"]),
         seconds=_number(content.get("seconds")),
+        faults=tuple(frozenset((f"{one['name']}@{one['channel']}", *one["also"])) for one in content.get("faults", ())),
         alone=tuple(Alone(one["name"], _number(one["refitted"]), _number(one["held"])) for one in alone),
     )
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from hil.exam.answer_file import open_cases
-from hil.exam.answers import chance, permuted, read_answers
+from hil.exam.answer_sets import chance, permuted, read_answers
+from hil.exam.answers import Answer
 from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.identity import exam_identities
 from hil.exam.score_names import ASKED, PERMUTED, RIGHT
@@ -28,24 +30,27 @@ class ScoreReport:
         permuted: of the same answers beside other truths.
         chance: share that is expected of them, over all permutations.
         without: rates of the run without the true candidate; empty where there was none.
-        world: vehicle and engine that the cases were driven with, in words.
-        first_seed: that the cases follow from, of an exam that is not sealed; None: it is.
+        worlds: vehicle and engine that the cases were driven with, in words, of every exam.
+        first_seeds: that the cases follow from, of exams that are not sealed.
+        sources: score of each world by itself, where there are several.
     """
 
     score: Score
     permuted: Rate
     chance: float
     without: Mapping[str, Rate]
-    world: str
-    first_seed: int | None
+    worlds: tuple[str, ...]
+    first_seeds: tuple[int, ...] = ()
+    sources: Mapping[str, Score] = field(default_factory=dict)
 
     @property
     def origin(self) -> str:
         """What was driven, and whether whoever diagnosed could know the cases."""
-        if self.first_seed is None:
-            return f"Driven by {self.world}. Sealed: the cases were drawn from a secret."
-        known = f"the cases follow from seed {self.first_seed}, whoever diagnosed could know them"
-        return f"Driven by {self.world}. Not sealed: {known}."
+        driven = f"Driven by {', '.join(self.worlds)}."
+        if not self.first_seeds:
+            return f"{driven} Sealed: the cases were drawn from a secret."
+        seeds = ", ".join(map(str, self.first_seeds))
+        return f"{driven} Not sealed: the cases follow from seed {seeds}, whoever diagnosed could know them."
 
     @property
     def rates(self) -> dict[str, Rate]:
@@ -57,29 +62,53 @@ class ScoreReport:
         return f"chance, {self.chance:.3f}" if name == PERMUTED else ASKED.get(name, "")
 
 
-def score_exam(folder: ExamFolder, generator: np.random.Generator, key: Path | None) -> ScoreReport:
-    """Open the answer and score all that was diagnosed.
+def score_exams(folders: Sequence[ExamFolder], generator: np.random.Generator, key: Path | None) -> ScoreReport:
+    """Open the answers and score all that was diagnosed; several exams count as one, and by their worlds.
 
     Args:
-        folder: of the exam.
+        folders: of the exams.
         generator: draws one permutation of the answers.
-        key: file that the exam was sealed with; None for one that is not sealed.
+        key: file that the exams were sealed with; None for those that are not sealed.
 
     Raises:
-        UserError: there is no exam, no diagnosis, the answer is another one, or the key is.
+        UserError: there is no exam, no diagnosis, an answer is another one, or the key is.
     """
-    exam, cases = read_exam(folder), open_cases(folder, key)
-    known = exam_identities(folder)
-    answers = read_answers(folder, cases, known)
-    without = folder.diagnosed(removed=True)
+    opened = [_opened(folder, key) for folder in folders]
+    answers = [answer for one in opened for answer in one.answers]
+    missing: Counter[str] = Counter()
+    for one in opened:
+        missing.update(one.missing)
+    worlds = tuple(dict.fromkeys(one.world for one in opened))
+    by_world = {world: [a for one in opened if one.world == world for a in one.answers] for world in worlds}
+    without = [answer for one in opened for answer in one.without]
     return ScoreReport(
-        score=score(answers, missing_cases(folder, cases)),
+        score=score(answers, missing),
         permuted=score(permuted(answers, generator)).rates[RIGHT],
         chance=chance(answers),
-        without=removal_rates(read_answers(folder, cases, known, removed=True)) if without else {},
-        world=exam.world,
-        first_seed=exam.first_seed,
+        without=removal_rates(without) if without else {},
+        worlds=worlds,
+        first_seeds=tuple(one.first_seed for one in opened if one.first_seed is not None),
+        sources={world: score(own) for world, own in by_world.items()} if len(opened) > 1 else {},
     )
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """One exam with its answers, those without the true candidate, and the cases that have none."""
+
+    world: str
+    first_seed: int | None
+    answers: Sequence[Answer]
+    without: Sequence[Answer]
+    missing: Mapping[str, int]
+
+
+def _opened(folder: ExamFolder, key: Path | None) -> _Opened:
+    exam, cases = read_exam(folder), open_cases(folder, key)
+    known = exam_identities(folder)
+    without = read_answers(folder, cases, known, removed=True) if folder.diagnosed(removed=True) else []
+    answers = read_answers(folder, cases, known)
+    return _Opened(exam.world, exam.first_seed, answers, without, missing_cases(folder, cases))
 
 
 def summary_lines(report: ScoreReport) -> list[str]:
@@ -100,7 +129,8 @@ def score_markdown(report: ScoreReport, title: str) -> str:
     parts += ["| what | measured | asked |", "|---|---|---|"]
     parts += [f"| {name} | {rate} | {report.asked(name)} |" for name, rate in report.rates.items()]
     parts += [f"| {name} | {_text(value)} | {report.asked(name)} |" for name, value in score.numbers.items()]
-    parts += ["", *_groups("size in noise units", score.by_size), *_groups("true effect", score.by_name)]
+    parts += ["", *_sources(report.sources)]
+    parts += [*_groups("size in noise units", score.by_size), *_groups("true effect", score.by_name)]
     parts += ["## Confusion", "", *_confusion(score.confusion), ""]
     parts += ["## Two effects", "", *_pairs(score.pairs), ""]
     parts += ["## Reliability", "", "| stated probability | right |", "|---|---|"]
@@ -113,9 +143,13 @@ def score_json(report: ScoreReport) -> str:
     """All numbers; a rate is hits, cases, value and the ends of its interval."""
     score = report.score
     content = {
-        "world": report.world,
-        "sealed": report.first_seed is None,
-        "first_seed": report.first_seed,
+        "worlds": list(report.worlds),
+        "sealed": not report.first_seeds,
+        "first_seeds": list(report.first_seeds),
+        "sources": {
+            world: {name: _plain(rate) for name, rate in own.rates.items() if rate.cases}
+            for world, own in report.sources.items()
+        },
         "cases": score.cases,
         "rates": {name: _plain(rate) for name, rate in report.rates.items() if rate.cases},
         "numbers": {name: _finite(value) for name, value in score.numbers.items()},
@@ -159,6 +193,17 @@ def _groups(what: str, groups: Mapping[str, Group]) -> list[str]:
     for name, group in groups.items():
         numbers = (_text(value) for value in (group.set_size, group.closed_right, group.closed_wrong))
         lines.append(f"| {name} | {group.right} | {group.covered} | {group.silent} | {' | '.join(numbers)} |")
+    return [*lines, ""]
+
+
+def _sources(sources: Mapping[str, Score]) -> list[str]:
+    """Every rate by the world that its cases were driven in."""
+    if not sources:
+        return []
+    names = list(dict.fromkeys(name for own in sources.values() for name, rate in own.rates.items() if rate.cases))
+    lines = ["## By world", "", f"| | {' | '.join(sources)} |", "|---" * (1 + len(sources)) + "|"]
+    for name in names:
+        lines.append(f"| {name} | {' | '.join(str(own.rates[name]) for own in sources.values())} |")
     return [*lines, ""]
 
 

@@ -154,6 +154,10 @@ def _other_rates(answers: Sequence[Answer]) -> dict[str, Rate]:
         names.INVISIBLE: rate([answer.unseen for answer in _of(answers, Kind.INVISIBLE)]),
         names.BOTH: rate([answer.both for answer in pairs]),
         names.BOTH_COVERED: rate([answer.both_covered for answer in pairs]),
+        names.LAW_PLACE: rate([answer.law_place for answer in _of(answers, Kind.LAW)]),
+        names.LAW_VARIABLE: rate([answer.law_variable for answer in _of(answers, Kind.LAW)]),
+        names.FAULTS: rate([answer.fault_named for answer in _of(answers, Kind.FAULT)]),
+        names.FAULTS_FALSE: rate([bool(a.said.faults) for a in answers if a.case.kind is not Kind.FAULT]),
         names.FAILURES: rate([answer.said.verdict == FAILED for answer in answers]),
     }
 
@@ -167,6 +171,7 @@ def _numbers(answers: Sequence[Answer], single: Sequence[Answer]) -> dict[str, f
         names.CLOSED_RIGHT_LARGE: _median([answer.closed for answer in _true(large)]),
         names.CLOSED_WRONG: _median([value for values in wrong for value in values.values()]),
         names.CLOSED_WORST: _median([max(values.values()) for values in wrong if values]),
+        names.LAW_CLOSED: _median([max(answer.said.closed, 0.0) for answer in _of(answers, Kind.LAW)]),
         names.CLOSED_MISTAKEN: _median([answer.closed for answer in single if answer.named and not answer.covered]),
         names.SECONDS: _mean([answer.said.seconds for answer in answers]),
         names.SECONDS_MOST: max((answer.said.seconds for answer in answers), default=math.nan),

@@ -13,9 +13,13 @@ from typing import Final
 
 from emulator.effects import INJECTORS, Unlibraried, Wanted
 from hil.exam.answer_file import answer_hash, answer_text, key_of_exam, open_answer, undriven_text
-from hil.exam.cases import Case, Composition, Injected, Kind, draw_cases
+from hil.exam.cases import Case, Injected, Kind
+from hil.exam.corruptions import corruption_of
+from hil.exam.drawing import Composition, draw_cases
+from hil.exam.drawn_laws import law_effect
 from hil.exam.driving import drive
 from hil.exam.folder import RECORDS, Exam, ExamFolder, read_exam, write_exam
+from hil.exam.identity import planned_record
 from hil.exam.key import Key, make_key
 from hil.exam.lots import Lots, lots_of_key, lots_of_seed
 from hil.exam.plans import ExamPlans, plan_exam, plans_from_text, plans_text
@@ -37,8 +41,6 @@ SALT: Final = 16
 """Length of the salt of an exam [bytes]."""
 
 _EPOCH: Final = (0, 0)
-
-_KINDS: Final = (Kind.EFFECT, Kind.PAIR, Kind.NONE, Kind.UNKNOWN, Kind.INVISIBLE)
 
 
 @dataclass(frozen=True)
@@ -132,13 +134,30 @@ def _hide_order(folder: ExamFolder, exam: Exam) -> None:
 def drive_case(plans: str, world: World, cycle: float, case: Case) -> tuple[str, tuple[bytes, bytes] | str]:
     """Both records of a case, or why the vehicle cannot be driven with its effects; runs in a worker."""
     both = _plans(plans, world.vehicle, cycle)
-    effects = [effect_of(injected) for injected in case.effects]
     try:
-        fit = drive(both.fit, world, case.seed, effects)
-        confirm = drive(both.confirm, world, case.seed + 1, effects)
+        effects = _effects(case, both, world)
+        records = [
+            drive(plan, world, case.seed + index, effects) for index, plan in enumerate((both.fit, both.confirm))
+        ]
     except UserError as error:
         return case.identifier, f"{error.what} {error.remedy}\n"
+    for fault in case.effects if case.kind is Kind.FAULT else ():
+        corruption = corruption_of(fault.name, fault.where, fault.parameter, fault.size)
+        records = [corruption.apply(record) for record in records]
+    fit, confirm = records
     return case.identifier, (record_bytes(fit), record_bytes(confirm))
+
+
+def _effects(case: Case, plans: ExamPlans, world: World) -> list[Wanted]:
+    """What the vehicle of a case has."""
+    match case.kind:
+        case Kind.FAULT:
+            return []
+        case Kind.LAW:
+            planned = planned_record(plans.fit, load_vehicle(world.vehicle).prior)
+            return [law_effect(law, planned) for law in case.effects]
+        case _:
+            return [effect_of(injected) for injected in case.effects]
 
 
 def effect_of(injected: Injected) -> Wanted:
@@ -211,13 +230,10 @@ def _refuse_other_lots(exam: Exam, order: SealingOrder) -> None:
 
 def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
     wanted = order.composition
-    asked = dict(
-        zip(_KINDS, (wanted.effects, wanted.pairs, wanted.none, wanted.unknown, wanted.invisible), strict=True)
-    )
     held = Counter(case.kind for case in cases)
-    ours = (order.world.vehicle, order.world.engine, wanted.driven, Counter(asked))
+    ours = (order.world.vehicle, order.world.engine, wanted.driven, Counter(wanted.asked))
     if (exam.vehicle, exam.engine, len(exam.plans), held) != ours:
-        kinds = ", ".join(f"{held[kind]} {kind}" for kind in _KINDS)
+        kinds = ", ".join(f"{held[kind]} {kind}" for kind in wanted.asked)
         raise UserError(
             f"{order.out} holds another exam: {kinds} of {exam.world} on {len(exam.plans)} excitations.",
             "Go on with it as it was begun, or name another folder (--out).",

@@ -51,6 +51,12 @@ def find_faults(record: Record, vehicle: VehicleDescription) -> tuple[Fault, ...
         return _found(record, vehicle)
 
 
+def sure_faults(records: Sequence[Record], vehicle: VehicleDescription) -> list[Fault]:
+    """Of several records, each fault once: those that make everything fit when undone, or that nothing can undo."""
+    found = [fault for record in records for fault in find_faults(record, vehicle) if fault.sure]
+    return list({(fault.name, fault.channel, fault.step): fault for fault in found}.values())
+
+
 def _found(record: Record, vehicle: VehicleDescription) -> tuple[Fault, ...]:
     segments, faults = _by_themselves(list(record.segments))
     pairs = reduced(segments)

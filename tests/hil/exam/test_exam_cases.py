@@ -11,7 +11,8 @@ import pytest
 
 from emulator.effects import inject
 from emulator.prototype import load_prototype
-from hil.exam.cases import SIZES, Case, Composition, Kind, case_from_json, draw_cases
+from hil.exam.cases import SIZES, Case, Kind, case_from_json
+from hil.exam.drawing import Composition, draw_cases
 from hil.exam.sealing import SealingOrder, effect_of, seal
 from hil.exam.sizes import EffectSize, SizeTable, load_rows, table_text
 from hil.exam.world import stored_model, stored_sizes, world_of
@@ -24,7 +25,15 @@ PROTOTYPE = world_of("prototype", None)
 
 def test_there_are_as_many_of_each_kind_as_asked_for(cases: list[Case]) -> None:
     counts = Counter(case.kind for case in cases)
-    assert counts == {Kind.EFFECT: 240, Kind.PAIR: 24, Kind.NONE: 60, Kind.UNKNOWN: 40, Kind.INVISIBLE: 24}
+    assert counts == {
+        Kind.EFFECT: 240,
+        Kind.PAIR: 24,
+        Kind.NONE: 60,
+        Kind.UNKNOWN: 40,
+        Kind.INVISIBLE: 24,
+        Kind.LAW: 32,
+        Kind.FAULT: 16,
+    }
 
 
 def test_effects_and_sizes_are_balanced(cases: list[Case], table: SizeTable) -> None:
@@ -53,7 +62,8 @@ def test_at_least_four_effects_have_no_candidate(table: SizeTable) -> None:
 def test_the_emulator_can_have_every_effect_that_is_drawn(cases: list[Case]) -> None:
     prototype = load_prototype()
     for case in cases:
-        inject(prototype, [effect_of(injected) for injected in case.effects], 1e-3)
+        if case.kind not in (Kind.LAW, Kind.FAULT):
+            inject(prototype, [effect_of(injected) for injected in case.effects], 1e-3)
 
 
 def test_identifiers_are_unique_and_seeds_are_not_shared(cases: list[Case]) -> None:
@@ -115,7 +125,9 @@ def test_a_world_without_a_table_or_a_model_says_what_writes_them(tmp_path: Path
 
 def test_a_kind_without_effects_is_refused(table: SizeTable) -> None:
     with pytest.raises(UserError, match="no effect of a kind"):
-        draw_cases(SizeTable((), (), ()), Composition(4, 0, 0, 0, 0), range(9).__getitem__, np.random.default_rng(0))
+        draw_cases(
+            SizeTable((), (), ()), Composition(4, 0, 0, 0, 0, 0, 0), range(9).__getitem__, np.random.default_rng(0)
+        )
 
 
 def test_every_excitation_is_driven_as_often_as_another(cases: list[Case]) -> None:
@@ -131,7 +143,7 @@ def test_no_kind_of_case_keeps_to_a_few_excitations(cases: list[Case]) -> None:
 
 
 def test_an_exam_has_no_more_excitations_than_cases(table: SizeTable) -> None:
-    few = Composition(effects=2, pairs=0, none=1, unknown=0, invisible=0)
+    few = Composition(effects=2, pairs=0, none=1, unknown=0, invisible=0, laws=0, faults=0)
     assert few.driven == 3
     assert {case.excitation for case in draw_cases(table, few, range(9).__getitem__, np.random.default_rng(1))} == {
         0,
@@ -142,7 +154,7 @@ def test_an_exam_has_no_more_excitations_than_cases(table: SizeTable) -> None:
 
 def test_an_exam_without_cases_is_refused_before_anything_is_planned(table: SizeTable, tmp_path: Path) -> None:
     order = SealingOrder(
-        tmp_path / "exam", PROTOTYPE, PROTOTYPE.model_file, Composition(0, 0, 0, 0, 0), None, 1, 1, None
+        tmp_path / "exam", PROTOTYPE, PROTOTYPE.model_file, Composition(0, 0, 0, 0, 0, 0, 0), None, 1, 1, None
     )
     with pytest.raises(UserError, match="without cases"):
         seal(order, table, lambda *_: None)

@@ -1,4 +1,4 @@
-"""An exam of three cases from drawing to score, with the command line, in processes of their own."""
+"""An exam of five cases from drawing to score, with the command line, in processes of their own."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from ident.records.files import read_record
 
 pytestmark = pytest.mark.slow
 
-CASES = ["--effects", "1", "--pairs", "0", "--none", "1", "--unknown", "1", "--invisible", "0", "--excitations", "2"]
+KINDS = {"effects": 1, "pairs": 0, "none": 1, "unknown": 1, "invisible": 0, "laws": 1, "faults": 1}
+CASES = [*(part for kind, count in KINDS.items() for part in (f"--{kind}", str(count))), "--excitations", "2"]
 
 
 def quasiomni(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -66,8 +67,8 @@ def test_the_exam_is_diagnosed_and_scored(folder: ExamFolder) -> None:
         diagnosed = quasiomni("exam", "diagnose", str(folder.path), "--jobs", "1", *option)
         assert diagnosed.returncode == 0, diagnosed.stderr
     answers = [json.loads(folder.diagnosis(name).read_text()) for name in read_exam(folder).identifiers]
-    assert all(answer["verdict"] in ("effect", "none", "unknown") for answer in answers)
-    assert all(len(answer["alone"]) > 10 for answer in answers)
+    assert all(answer["verdict"] in ("effect", "law", "none", "unknown", "fault") for answer in answers)
+    assert all(len(answer["alone"]) > 10 for answer in answers if answer["verdict"] != "fault")
     assert len(list((folder.path / "diagnoses_without").iterdir())) == 1
     scored = quasiomni("exam", "score", str(folder.path), *key_of(folder))
     assert scored.returncode == 0, scored.stderr

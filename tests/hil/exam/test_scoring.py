@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from hil.exam import score_names as names
-from hil.exam.answers import Answer, chance, permuted, read_answers
+from hil.exam.answer_sets import chance, permuted, read_answers
+from hil.exam.answers import Answer
 from hil.exam.cases import Case, Injected, Kind
 from hil.exam.folder import ExamFolder
 from hil.exam.identity import Identities, Identity
@@ -68,7 +69,7 @@ def apart(name: str = "torque_bias") -> Identity:
 
 def test_someone_who_knows_scores_everything(answers: list[Answer]) -> None:
     result = score(answers)
-    none_is_good = (names.FALSE_ALARMS, names.FAILURES)
+    none_is_good = (names.FALSE_ALARMS, names.FAILURES, names.FAULTS_FALSE)
     for name, rate in result.rates.items():
         if name != names.RIGHT_SET:
             assert rate.value == (0.0 if name in none_is_good else 1.0), name
@@ -299,7 +300,7 @@ def test_an_answer_is_read_as_it_was_written() -> None:
 
 def test_the_score_is_written_for_people_and_programs(answers: list[Answer]) -> None:
     result = score(answers, {"slip@chassis, size 1: not driven": 2})
-    report = ScoreReport(result, result.rates[names.RIGHT], chance(answers), removal_rates(answers[:0]), WORLD, None)
+    report = ScoreReport(result, result.rates[names.RIGHT], chance(answers), removal_rates(answers[:0]), (WORLD,))
     assert "asked at least 0.90" in "\n".join(summary_lines(report))
     assert "2 without an answer" in summary_lines(report)[0]
     page = score_markdown(report, "Exam")
@@ -314,11 +315,12 @@ def test_the_score_says_whether_the_cases_could_be_known(
     answers: list[Answer], first_seed: int | None, words: str
 ) -> None:
     result = score(answers)
-    report = ScoreReport(result, result.rates[names.RIGHT], chance(answers), {}, WORLD, first_seed)
+    seeds = () if first_seed is None else (first_seed,)
+    report = ScoreReport(result, result.rates[names.RIGHT], chance(answers), {}, (WORLD,), seeds)
     assert words in summary_lines(report)[1]
     assert words in score_markdown(report, "Exam")
     assert WORLD in summary_lines(report)[1]
-    assert json.loads(score_json(report))["world"] == WORLD
+    assert json.loads(score_json(report))["worlds"] == [WORLD]
     assert json.loads(score_json(report))["sealed"] is (first_seed is None)
 
 
@@ -339,3 +341,59 @@ def test_an_answer_is_judged_by_the_excitation_that_its_case_drove(tmp_path: Pat
     alike = {("torque_bias@drive_fl", True): ["asymmetric_coulomb@wheel_fl"]}
     (answer,) = read_answers(folder, [case], [Identities({}), Identities(alike)])
     assert answer.identity.names == {"torque_bias", "asymmetric_coulomb"}
+
+
+def law_case(name: str, where: str, entry: dict[str, Any], closed: float = 0.9) -> Answer:
+    case = Case("id", Kind.LAW, (Injected(name, where, "scale", 1.5),), 1.5, 1, 0)
+    return Answer(case, Said("law", (entry,), closed=closed), (Identity(frozenset({name}), frozenset({where})),))
+
+
+def law_said(where: str, variable: str, **others: Any) -> dict[str, Any]:
+    entry = {"name": "law", "where": where, "probability": 0.9, "ambiguity_set": ["law"], "gap_closed_held_out": 0.9}
+    return {**entry, "alternatives": [], "law": {"variable": variable}, **others}
+
+
+def test_a_law_is_right_by_place_and_by_variable_or_by_what_no_record_tells_from_them() -> None:
+    right = law_case("law_angle", "wheel_fl", law_said("wheel_fl", "angle"))
+    assert right.law_place
+    assert right.law_variable
+    elsewhere = law_case("law_angle", "wheel_fl", law_said("wheel_rl", "angle"))
+    assert not elsewhere.law_place
+    assert not elsewhere.law_variable
+    other = law_case("law_angle", "steering_left", law_said("steering_left", "rate"))
+    assert other.law_place
+    assert not other.law_variable
+    alternative = {"variable": "angle", "where": "steering_left"}
+    assert law_case(
+        "law_angle", "steering_left", law_said("steering_left", "rate", alternatives=[alternative])
+    ).law_variable
+
+
+def test_a_name_does_for_a_law_where_it_closes_as_much_and_stands_at_its_joint() -> None:
+    name = {"name": "torque_ripple", "where": "drive_fl", "probability": 0.9, "ambiguity_set": ["torque_ripple"]}
+    assert law_case("law_angle", "wheel_fl", {**name, "gap_closed_held_out": 0.97, "law": None}).law_variable
+    assert not law_case("law_angle", "wheel_fl", {**name, "gap_closed_held_out": 0.8, "law": None}).law_variable
+    assert not law_case("law_angle", "wheel_rr", {**name, "gap_closed_held_out": 0.97, "law": None}).law_variable
+
+
+def test_a_fault_is_named_first_or_by_what_the_record_bears_as_well() -> None:
+    case = Case("id", Kind.FAULT, (Injected("scaled", "torque_fl", "", 3.0),), 0.0, 1, 0)
+    known = (Identity(frozenset({"scaled"}), frozenset({"torque_fl"})),)
+    named = Said("fault", faults=(frozenset({"torque_gain@drive_fl", "scaled@torque_fl"}), frozenset({"frozen@beta"})))
+    second = Said("fault", faults=(frozenset({"frozen@beta"}), frozenset({"scaled@torque_fl"})))
+    assert Answer(case, named, known).fault_named
+    assert not Answer(case, second, known).fault_named
+    assert not Answer(case, Said("none"), known).fault_named
+    assert score([Answer(case, second, known)]).rates[names.FAULTS_FALSE].cases == 0
+
+
+def test_exams_of_several_worlds_are_counted_together_and_each_by_itself(answers: list[Answer]) -> None:
+    wrong = [replace(each, said=Said("none")) for each in answers]
+    sources = {"one": score(answers), "other": score(wrong)}
+    whole = score([*answers, *wrong])
+    report = ScoreReport(whole, whole.rates[names.RIGHT], 0.1, {}, ("one", "other"), (1, 2), sources)
+    page, content = score_markdown(report, "Exam"), json.loads(score_json(report))
+    assert "Driven by one, other. Not sealed: the cases follow from seed 1, 2" in page
+    assert f"| {names.RIGHT} | 1.00 [0.98, 1.00] (240/240) | 0.00 [0.00, 0.02] (0/240) |" in page
+    assert content["rates"][names.RIGHT][:2] == [240, 480]
+    assert content["sources"]["other"][names.RIGHT][:2] == [0, 240]

@@ -12,8 +12,9 @@ import pytest
 
 from hil.exam import sealing
 from hil.exam.answer_file import answer_hash, answer_text, open_answer, open_cases, undriven_text
-from hil.exam.cases import Case, Composition, draw_cases
+from hil.exam.cases import Case
 from hil.exam.diagnosing import refuse_undiagnosed
+from hil.exam.drawing import Composition, draw_cases
 from hil.exam.folder import Exam, ExamFolder, read_exam, write_exam
 from hil.exam.key import Key, make_key, read_key
 from hil.exam.lots import lots_of_key, lots_of_seed
@@ -27,7 +28,7 @@ pytest.importorskip("cryptography")
 
 SALT = bytes(16)
 PROTOTYPE = world_of("prototype", None)
-FEW = Composition(effects=3, pairs=1, none=2, unknown=1, invisible=1, excitations=2)
+FEW = Composition(effects=3, pairs=1, none=2, unknown=1, invisible=1, laws=1, faults=1, excitations=2)
 
 
 @pytest.fixture

@@ -1,0 +1,145 @@
+"""Laws that no library has, drawn for an exam: place, variable, and a shape from a random smooth process.
+
+How far the function reaches, where its coefficients stand and how fast it changes are drawn as well, so that the
+diagnosis tries none of what was injected. Its size is what the parameters of the model leave of it, in noise units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hil.exam.cases import Injected
+from hil.exam.sizes import SizeTable
+from ident.diagnosis.linear import least_squares, rms
+from ident.effects import Effect, make_effect
+from ident.effects.laws import COUNT, coefficient
+from ident.plant.places import STEERING, WHEEL_PLACES, rows_of
+from ident.records.record import Record
+
+Array = NDArray[np.float64]
+
+MEASURE: Final = "asymmetric_coulomb"
+"""The effect whose size says how many Nm are a noise unit at a joint: it pushes with its size wherever that moves."""
+
+LENGTHS: Final = (0.1, 0.6)
+"""Over which a function changes, as a share of the range of its variable; of a periodic one, of the period."""
+
+SLACK: Final = 0.5
+"""Largest share of the range by which the coefficients reach beyond it, on either side."""
+
+MOVING: Final = 0.02
+"""Part of its largest rate from which a joint counts as moving."""
+
+_LAWS: Final[Mapping[str, tuple[str, ...]]] = {
+    "law_rate": (*STEERING, "steering", *WHEEL_PLACES, "wheels"),
+    "law_angle": (*STEERING, *WHEEL_PLACES),
+    "law_angle_direction": (*STEERING, "steering"),
+    "law_angle_rate": STEERING,
+}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Motion of a joint in the steps of a plan, moving samples alone: angle [rad], rate [rad/s], acceleration."""
+
+    angle: Array
+    rate: Array
+    acceleration: Array
+
+
+def draw_laws(table: SizeTable, sizes: Sequence[float], generator: np.random.Generator) -> list[Injected]:
+    """Laws in turn over names, places drawn; the size of each is in noise units.
+
+    Args:
+        table: of the world.
+        sizes: of the laws.
+        generator: of everything else.
+    """
+    names = list(_LAWS)
+    return [
+        _drawn(
+            names[index % len(names)], str(generator.choice(_LAWS[names[index % len(names)]])), size, table, generator
+        )
+        for index, size in enumerate(sizes)
+    ]
+
+
+def _drawn(name: str, where: str, size: float, table: SizeTable, generator: np.random.Generator) -> Injected:
+    row = next(row for row in table.visible if (row.name, row.where) == (MEASURE, where))
+    length = math.exp(generator.uniform(math.log(LENGTHS[0]), math.log(LENGTHS[1])))
+    before, behind = generator.uniform(0.0, SLACK, size=2).tolist()
+    numbers = {"unit": row.physical(1.0), "before": before, "behind": behind}
+    periodic = name == "law_angle" and where in WHEEL_PLACES
+    shape = _smooth(length if periodic else length / (1 + before + behind), periodic, generator)
+    coefficients = {coefficient(index): round(float(value), 5) for index, value in enumerate(shape)}
+    return Injected(name, where, "scale", size, numbers | coefficients)
+
+
+def _smooth(length: float, periodic: bool, generator: np.random.Generator) -> Array:
+    """(COUNT,) of a Gaussian process of unit variance over [0, 1]."""
+    distance = np.subtract.outer(np.arange(COUNT), np.arange(COUNT)) / (COUNT if periodic else COUNT - 3)
+    if periodic:
+        distance = np.sin(np.pi * distance) / np.pi
+    powers, vectors = np.linalg.eigh(np.exp(-0.5 * (distance / length) ** 2))
+    return np.asarray(vectors @ (np.sqrt(np.maximum(powers, 0.0)) * generator.normal(size=COUNT)))
+
+
+def law_effect(injected: Injected, planned: Record) -> Effect:
+    """The law as a vehicle has it that drives a plan.
+
+    Args:
+        injected: as drawn.
+        planned: what the plan drives.
+    """
+    numbers = dict(injected.values)
+    unit, before, behind = (numbers.pop(name) for name in ("unit", "before", "behind"))
+    joints = [_joint(planned, row - 3) for row in rows_of(injected.where)]
+    periodic = injected.name == "law_angle" and injected.where in WHEEL_PLACES
+    variables = [joint.rate if injected.name == "law_rate" else joint.angle for joint in joints]
+    if periodic:
+        period, start, step = 2 * math.pi, 0.0, 2 * math.pi / COUNT
+    else:
+        low, high = min(x.min() for x in variables), max(x.max() for x in variables)
+        reach = high - low
+        period, step = 0.0, reach * (1 + before + behind) / (COUNT - 3)
+        start = low - before * reach - step
+    values = {"scale": 1.0, "start": start, "step": step, "period": period}
+    law = make_effect(injected.name, injected.where, values | numbers)
+    left = [_left(law, joint, x) for joint, x in zip(joints, variables, strict=True)]
+    scale = injected.size * unit / max(rms(np.concatenate(left)), np.finfo(float).tiny)
+    return make_effect(injected.name, injected.where, values | {"scale": scale} | numbers)
+
+
+def _joint(planned: Record, joint: int) -> Joint:
+    """Motion of one of the six joints where it moves."""
+    parts = []
+    for segment in planned.segments:
+        angle = segment.steering_angles[:, joint] if joint < 2 else segment.wheel_angles[:, joint - 2]
+        rate = np.gradient(angle, segment.sample_time)
+        parts.append(np.stack([angle, rate, np.gradient(rate, segment.sample_time)]))
+    angle, rate, acceleration = np.hstack(parts)
+    moving = np.abs(rate) > MOVING * np.abs(rate).max()
+    return Joint(angle[moving], rate[moving], acceleration[moving])
+
+
+def _left(law: Effect, joint: Joint, x: Array) -> Array:
+    """What friction and inertia of the model leave of a law [Nm], its scale being one."""
+    places = law["start"] + law["step"] * np.arange(COUNT)
+    distance = x[:, None] - places
+    if law["period"] > 0:
+        distance = (distance + law["period"] / 2) % law["period"] - law["period"] / 2
+    else:
+        distance = np.clip(x, places[1], places[-2])[:, None] - places
+    size = np.abs(distance / law["step"])
+    basis = (np.maximum(2 - size, 0) ** 3 - 4 * np.maximum(1 - size, 0) ** 3) / 6
+    torque = basis @ np.array([law[coefficient(index)] for index in range(COUNT)])
+    partner = {"law_angle_direction": np.sign(joint.rate), "law_angle_rate": joint.rate}.get(law.name, 1.0)
+    absorbed = np.stack([np.sign(joint.rate), joint.rate, joint.acceleration], axis=1)
+    series = torque * partner
+    return np.asarray(series - absorbed @ least_squares(absorbed, series))
