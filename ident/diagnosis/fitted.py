@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from ident.diagnosis.linear import least_squares, rms
 from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.refit import Refit, refit
 from ident.diagnosis.regression import Regression
-from ident.diagnosis.remainder import held_out_gap, noise_floors
+from ident.diagnosis.remainder import held_out_gap, held_out_gap_of_means, noise_floors
 from ident.diagnosis.search import Found
 from ident.diagnosis.whitening import Predictor, Whitener
 
@@ -59,11 +59,14 @@ class Fitted:
     @property
     def reached(self) -> frozenset[str]:
         """Labels of the blocks in which an effect acts."""
-        columns = [self.rows.layout[variant] for variant in self.found.variants]
+        return frozenset[str]().union(*(self.reached_by(index) for index in range(self.count)))
+
+    def reached_by(self, index: int) -> frozenset[str]:
+        """Labels of the blocks in which one effect acts."""
+        column = self.rows.layout[self.found.variants[index]]
         return frozenset(
             block.label
             for problem in self.problems
-            for column in columns
             for block, acting in zip(
                 problem.blocks, problem.candidates[column.candidate].variants[column.variant].columns, strict=True
             )
@@ -84,11 +87,11 @@ class Fitted:
     @cached_property
     def exactly(self) -> Gap:
         """With all effects, as their exact forms."""
-        return self.measured(self.floors)
+        return held_out_gap(self.rows, self.floors, self.untouched, self._extended_models)
 
-    def measured(self, floors: Array) -> Gap:
-        """The same with the noise of every block as given."""
-        return held_out_gap(self.rows, floors, self.untouched, self._extended_models)
+    def measured(self, floors: Array, labels: Collection[str]) -> Gap:
+        """The same of the means over the repeats, in blocks of some labels, with the noise of every block as given."""
+        return held_out_gap_of_means(self.rows, floors, self.untouched, self._extended_models, labels)
 
     @cached_property
     def whole(self) -> Gap:
@@ -111,22 +114,32 @@ class Fitted:
 
         Whether an effect is worth its place is judged by this: what a refit can do without it is no reason for it.
         """
-        return self._shares(held=False)
+        without = [self.gap(self.others(index)).after for index in range(self.count)]
+        return [_share(self.whole, after) for after in without]
 
     @cached_property
     def lacking(self) -> list[float]:
-        """The same with the values of a model that is judged held: what they lack without the effect."""
-        return self._shares(held=True) if self._is_given else self.closed
+        """The same of the means over the repeats, the values of a model that is judged held: what they lack."""
+        whole = self._gap_of_means(self.found.variants)
+        without = [self._gap_of_means(self.others(index), held=self._is_given).after for index in range(self.count)]
+        return [_share(whole, after) for after in without]
 
-    def _shares(self, *, held: bool) -> list[float]:
-        without = [self.gap(self.others(index), held=held).after for index in range(self.count)]
-        whole, removable = self.whole, self.removable
-        return [(after**2 - whole.after**2) / removable if removable > 0 else 0.0 for after in without]
+    def gap(self, variants: Sequence[int]) -> Gap:
+        """Held-out gap with some effects, as their columns."""
+        return held_out_gap(self.rows, self.floors, self.untouched, self._held_out_models(variants))
 
-    def gap(self, variants: Sequence[int], *, held: bool = False) -> Gap:
-        """Held-out gap with some effects, as their columns; `held`: what is known of the baseline is taken as exact."""
+    def _gap_of_means(
+        self, variants: Sequence[int], *, held: bool = False, labels: Collection[str] | None = None
+    ) -> Gap:
+        """The same of the means over the repeats; `held`: what is known of the baseline is taken as exact."""
         models = self._held_out_models(variants, held=held)
-        return held_out_gap(self.rows, self.floors, self.untouched, models)
+        return held_out_gap_of_means(self.rows, self.floors, self.untouched, models, labels)
+
+    def closed_where_it_acts(self, index: int) -> float:
+        """Share of what can be removed of the means over the repeats that an effect closes where it acts, held out."""
+        labels = self.reached_by(index)
+        whole = self._gap_of_means(self.found.variants, labels=labels)
+        return _share(whole, self._gap_of_means(self.others(index), labels=labels).after)
 
     def held_out(self) -> HeldOut:
         """What was fitted without the confirming rows."""
@@ -179,8 +192,7 @@ class Fitted:
     def closed_by_drift(self) -> float:
         """Share of the removable held-out gap that what follows time closes, the other effects given."""
         without = held_out_gap(self.rows, self.floors, self.untouched, self._drifting(self._extended_models))
-        removable = self.exactly.before**2 - self.exactly.floor**2
-        return (without.after**2 - self.exactly.after**2) / removable if removable > 0 else 0.0
+        return _share(self.exactly, without.after)
 
     def _drifting(self, models: Sequence[Array]) -> Sequence[Array]:
         """Models of all blocks that say nothing of a drift that was taken off the targets, parameters refitted."""
@@ -197,6 +209,12 @@ class Fitted:
             model + block.baseline @ absorbed - (0.0 if block.drift is None else block.drift)
             for (block, _), model in zip(self.rows.blocks, models, strict=True)
         ]
+
+
+def _share(whole: Gap, without: float) -> float:
+    """Of the removable gap that goes when what leaves a gap `without` it is added; 0 where nothing is removable."""
+    removable = whole.before**2 - whole.floor**2
+    return (without**2 - whole.after**2) / removable if removable > 0 else 0.0
 
 
 def _weights(regression: Regression, found: Found) -> Whitener:

@@ -97,7 +97,8 @@ def _judged_once(
     starts = [searched, *([Shaped(problems, regression, ())] if searched.taken else [])]
     found = [judgement, *(one for start in starts if (one := _with_laws(start, designs, concluded_from)) is not None)]
     floors = np.min([one.fitted.floors for one in found], axis=0)
-    return min(found, key=lambda one: one.cost(floors))
+    acting = frozenset[str]().union(*(one.fitted.reached for one in found))
+    return min(found, key=lambda one: one.cost(floors, acting))
 
 
 def _judged(searched: Shaped, laws: tuple[Law, ...], limits: Limits, seed: int) -> Judgement:

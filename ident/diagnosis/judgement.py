@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -74,21 +74,23 @@ class Judgement:
 
     def incomplete(self) -> bool:
         """Whether something is left beside the effects that a law may explain."""
-        left = self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeating() > 1
+        left = self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeats_by_no_accident()
         return left or self.fitted.exactly.after**2 > 1 + self.limits.measurable
 
-    def cost(self, floors: Array) -> tuple[float, int]:
+    def cost(self, floors: Array, labels: Collection[str]) -> tuple[float, int]:
         """Of an explanation: log of the held-out gap that it leaves, and what its causes cost, and their number.
 
         A law, which can be anything, costs more than a name, which says more; what nobody knows costs as much as a law.
 
         Args:
             floors: noise of every block, the same for all explanations that are compared.
+            labels: of the blocks in which some of them act: the others say nothing for or against any.
         """
         laws = len(self.laws)
         unknown = self._verdict() is Verdict.UNKNOWN
         price = self.limits.law * (laws + unknown) + self.limits.name * (self.fitted.count - laws)
-        return round(50 * (math.log(max(self.fitted.measured(floors).after, 1.0)) + price)) / 50, self.fitted.count
+        left = self.fitted.measured(floors, labels).after
+        return round(50 * (math.log(max(left, 1.0)) + price)) / 50, self.fitted.count
 
     def refuted(self) -> frozenset[str]:
         """Effects of no size of which another candidate is what comes along with them, and those that are none."""
@@ -109,7 +111,8 @@ class Judgement:
         closed = self.fitted.closed
         widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
         refuted = [index for index in widened if self._measurable() or self._log_predictive(index) < self.limits.sure]
-        bent = [index for index in range(self.fitted.count) if self._law(index) and closed[index] < self.limits.law]
+        laws = [index for index in range(self.fitted.count) if self._law(index)]
+        bent = [index for index in laws if self.fitted.closed_where_it_acts(index) < self.limits.law]
         for superfluous in (refuted, bent):
             if superfluous:
                 return self.fitted.others(min(superfluous, key=lambda index: closed[index]))
@@ -240,8 +243,17 @@ class Judgement:
     def _surely_repeating(self) -> bool:
         """Whether that is more than may be, in a coordinate in which it is no accident of the noise."""
         large = {label for label, excess in self._excesses().items() if excess > 1}
-        found = chances(self.rows, self.fitted.floors, self.fitted.after.blocks) if large else {}
-        return any(found[label] * len(found) < self.limits.chance for label in large)
+        return bool(large & self._no_accidents)
+
+    def _repeats_by_no_accident(self) -> bool:
+        """Whether something repeats in both records in some coordinate, however little, that noise does not explain."""
+        return any(self._lasts.get(label, 0.0) > 0 for label in self._no_accidents)
+
+    @cached_property
+    def _no_accidents(self) -> frozenset[str]:
+        """Coordinates of which noise does not explain what repeats in them."""
+        found = chances(self.rows, self.fitted.floors, self.fitted.after.blocks)
+        return frozenset(label for label, chance in found.items() if chance * len(found) < self.limits.chance)
 
     def _excesses(self) -> Mapping[str, float]:
         """The same by coordinate."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,19 +50,53 @@ def mostly_tolerated(block: Block, floor: float) -> bool:
 
 def held_out_gap(rows: Rows, floors: Array, before: Series, after: Series) -> Gap:
     """Rms over all samples of the confirming blocks, each over its noise."""
+    return _gap(rows, floors, (before, after), _samples, rows_with=None)
+
+
+def held_out_gap_of_means(
+    rows: Rows, floors: Array, before: Series, after: Series, labels: Collection[str] | None = None
+) -> Gap:
+    """The same of the means over the repeats, over what noise leaves of them: that is what the rows say of a cause.
+
+    Args:
+        rows: of the blocks.
+        floors: rms of the noise of every block.
+        before, after: models of every block's target, (N,).
+        labels: of the blocks; None: all.
+    """
+    return _gap(rows, floors, (before, after), _means, rows_with=labels)
+
+
+def _gap(
+    rows: Rows,
+    floors: Array,
+    models: tuple[Series, Series],
+    seen: Callable[[Kept, Array], Array],
+    rows_with: Collection[str] | None,
+) -> Gap:
     sums, count = np.zeros(3), 0
     for index, (block, kept) in enumerate(rows.blocks):
-        if not rows.confirming[rows.block_slices[index]].any():
+        left_out = rows_with is not None and block.label not in rows_with
+        if left_out or not rows.confirming[rows.block_slices[index]].any():
             continue
-        samples = kept.samples.ravel()
         floor = floors[index]
-        for place, model in enumerate((before[index], after[index])):
-            power = float(np.sum(((block.target - model)[samples] / floor) ** 2))
-            sums[place] += max(power, len(samples)) if mostly_tolerated(block, floor) else power
-        sums[2] += len(samples)
-        count += len(samples)
+        for place, model in enumerate(models):
+            left = seen(kept, block.target - model[index])
+            power = float(np.sum((left / floor) ** 2))
+            sums[place] += max(power, len(left)) if mostly_tolerated(block, floor) else power
+        sums[2] += len(left)
+        count += len(left)
     mean = np.sqrt(sums / count) if count else np.zeros(3)
     return Gap(float(mean[0]), float(mean[1]), float(mean[2]))
+
+
+def _samples(kept: Kept, residual: Array) -> Array:
+    return np.asarray(residual[kept.samples.ravel()])
+
+
+def _means(kept: Kept, residual: Array) -> Array:
+    """Over the repeats (m,), blown up to the noise of a single one."""
+    return np.asarray(math.sqrt(len(kept.samples)) * kept.mean(residual))
 
 
 def shares(rows: Rows, floors: Array, before: Series) -> tuple[Share, ...]:

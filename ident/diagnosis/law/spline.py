@@ -45,13 +45,19 @@ class Knots:
         return self.start + self.step, self.start + self.step * (COUNT - 2)
 
     def basis(self, x: Array) -> Array:
-        """Values (..., COUNT) of the B-splines at x (...)."""
-        if self.period:
-            turns = (np.asarray(x)[..., None] - self.places) / self.period
-            u = (turns - np.round(turns)) * self.period / self.step
-        else:
-            u = (np.clip(x, *self.ends)[..., None] - self.places) / self.step
-        return kernel(u)
+        """Values (..., COUNT) of the B-splines at x (...): of each x, four are not zero."""
+        whole = np.ravel(x if self.period else np.clip(x, *self.ends))
+        place = (whole - self.start) / self.step
+        first = np.floor(place).astype(np.int64)
+        if not self.period:
+            first = np.clip(first, 1, COUNT - 3)
+        t = place - first
+        weights = ((1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3)
+        found = np.zeros((len(whole), COUNT))
+        rows = np.arange(len(whole))
+        for index, weight in enumerate(weights):
+            found[rows, (first + index - 1) % COUNT] = weight / 6
+        return found.reshape(*np.shape(x), COUNT)
 
     def prior(self, length: float) -> Array:
         """Factor L (COUNT, R) of the covariance L Lᵀ of the coefficients, of unit variance about a straight line.
@@ -71,12 +77,6 @@ class Knots:
             return np.asarray(wave)
         along = np.linspace(-1.0, 1.0, COUNT)
         return np.column_stack([wave, np.ones(COUNT), along])
-
-
-def kernel(u: Array) -> Array:
-    """The uniform cubic B-spline, (2 - |u|)³/6 outside of 1 and within 2; the sum over all integers is 1."""
-    size = np.abs(u)
-    return np.asarray((np.maximum(2 - size, 0) ** 3 - 4 * np.maximum(1 - size, 0) ** 3) / 6)
 
 
 def knots_over(low: float, high: float) -> Knots:

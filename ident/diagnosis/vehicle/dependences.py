@@ -82,28 +82,29 @@ def _dependence(
     def design(basis: Basis) -> Sequence[Array | None]:
         found: list[Array | None] = []
         for source, lever in zip(sources, levers, strict=True):
-            if lever is None:
-                found += [None] * len(source.coordinates)
-                continue
-            inputs = context.inputs(source)
-            columns = sum(
-                (_partner(inputs, joint, law.partner) * lever[:, joint].T)[:, :, None]
-                * basis(_variable(inputs, joint, law, source.time))[None]
-                for joint in joints
-            )
-            filtered = context.filtered(np.moveaxis(np.asarray(columns), 0, 1), source)
-            found += [column if column.any() else None for column in np.moveaxis(filtered, 1, 0)]
+            columns: list[Array | None] = [None] * len(source.coordinates)
+            rows = _acting(lever, joints)
+            if lever is not None and rows:
+                inputs = context.inputs(source)
+                torques = sum(
+                    (_partner(inputs, joint, law.partner) * lever[:, joint][:, rows].T)[:, :, None]
+                    * basis(_variable(inputs, joint, law, source.time))[None]
+                    for joint in joints
+                )
+                filtered = context.filtered(np.moveaxis(np.asarray(torques), 0, 1), source)
+                for place, row in enumerate(rows):
+                    columns[row] = filtered[:, place] if filtered[:, place].any() else None
+            found += columns
         return found
 
     arguments: list[Array | None] = []
     for source, lever in zip(sources, levers, strict=True):
-        if lever is None:
-            arguments += [None] * len(source.coordinates)
-            continue
-        inputs = context.inputs(source)
-        x = np.stack([_variable(inputs, joint, law, source.time)[:: source.factor] for joint in joints], axis=1)
-        acts = [bool(lever[:, joints, row].any()) for row in range(len(source.coordinates))]
-        arguments += [x if one else None for one in acts]
+        of_rows: list[Array | None] = [None] * len(source.coordinates)
+        for row in _acting(lever, joints):
+            inputs = context.inputs(source)
+            x = [_variable(inputs, joint, law, source.time)[:: source.factor] for joint in joints]
+            of_rows[row] = np.stack(x, axis=1)
+        arguments += of_rows
     turn = {"": 0.0, "wheel": 2 * math.pi, "motor": 2 * math.pi / context.geometry.gear_ratio}[law.turn]
     return Dependence(
         where=where,
@@ -116,6 +117,11 @@ def _dependence(
         of=law.turn,
         period=turn,
     )
+
+
+def _acting(lever: Array | None, joints: Sequence[int]) -> list[int]:
+    """Rows of a source in which a torque at some joints is anything."""
+    return [] if lever is None else np.flatnonzero(lever[:, joints].any(axis=(0, 1))).tolist()
 
 
 def _levers(source: Source, context: Context) -> Array | None:

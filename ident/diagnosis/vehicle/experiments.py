@@ -81,9 +81,10 @@ def hidden_effects(driven: Driven, visibility: Visibility) -> frozenset[EffectNa
 
 def _splitting(key: str, rivals: Sequence[str], driven: Driven, visibility: Visibility) -> str | None:
     """Of the experiments not driven yet, the first that leaves none of the rivals alike."""
+    effect = key.partition("@")[0]
     for name in _open(driven):
-        sight = visibility[name].get(key)
-        if sight is not None and sight.visible and not set(sight.alike_effects(key.partition("@")[0])) & set(rivals):
+        sight = visibility.of(name, (effect, *rivals)).get(key)
+        if sight is not None and sight.visible and not set(sight.alike_effects(effect)) & set(rivals):
             return DIAGNOSTIC[name].advice
     return None
 
@@ -92,7 +93,10 @@ def _showing(invisible: Sequence[str], driven: Driven, visibility: Visibility) -
     """Of the experiments not driven yet, the one that shows most of what is invisible."""
     if not invisible:
         return None
-    shown = {name: [effect for effect in invisible if _seen(effect, visibility[name])] for name in _open(driven)}
+    shown = {
+        name: [effect for effect in invisible if _seen(effect, visibility.of(name, invisible))]
+        for name in _open(driven)
+    }
     best = max(shown, key=lambda name: len(shown[name]), default=None)
     if best is None or not shown[best]:
         return None

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -110,36 +109,49 @@ def _are_alike(first: Array, second: Array) -> bool:
     return bool(np.linalg.norm(cosines) > ALIKE and np.linalg.norm(cosines, 2) > ALIKE)
 
 
+_FORETOLD: Final = frozenset(EffectName) - {EffectName.PARAMETER_CHANGE, EffectName.SLIP}
+"""Effects that the equations say something of before a record is there: sliding is found in records."""
+
+
 @dataclass
 class Visibility:
-    """What every experiment shows of one vehicle, computed when it is first asked for: half a second each.
+    """What every experiment shows of one vehicle, computed when it is first asked for: half a second for all effects.
 
     Attributes:
         vehicle: geometry is taken as true, parameters as its file guesses them.
     """
 
     vehicle: VehicleDescription
-    _found: dict[str, Mapping[str, Sight]] = field(default_factory=dict)
+    _found: dict[tuple[str, frozenset[str]], Mapping[str, Sight]] = field(default_factory=dict)
+    _plain: dict[frozenset[str], Problem] = field(default_factory=dict)
 
     def __getitem__(self, experiment: str) -> Mapping[str, Sight]:
         """What the four steps show together with one diagnostic experiment; without any for the name `four steps`."""
-        if experiment not in self._found:
-            extra = DIAGNOSTIC.get(experiment)
-            four = self._four
-            joined = four if extra is None else _joined(four, _problem(extra.drives, extra.given, self.vehicle))
-            self._found[experiment] = sights(joined)
-        return self._found[experiment]
+        return self.of(experiment, _FORETOLD)
 
-    @cached_property
-    def _four(self) -> Problem:
-        return _problem(FOUR, (), self.vehicle)
+    def of(self, experiment: str, effects: Collection[str]) -> Mapping[str, Sight]:
+        """The same as if there were only some effects, by name."""
+        asked = experiment, frozenset(map(str, effects))
+        if asked not in self._found:
+            extra, four = DIAGNOSTIC.get(experiment), self._four(asked[1])
+            joined = (
+                four if extra is None else _joined(four, _problem(extra.drives, extra.given, self.vehicle, asked[1]))
+            )
+            self._found[asked] = sights(joined)
+        return self._found[asked]
+
+    def _four(self, effects: frozenset[str]) -> Problem:
+        if effects not in self._plain:
+            self._plain[effects] = _problem(FOUR, (), self.vehicle, effects)
+        return self._plain[effects]
 
 
-def _problem(drives: Sequence[Drive], given: Sequence[Effect], vehicle: VehicleDescription) -> Problem:
+def _problem(
+    drives: Sequence[Drive], given: Sequence[Effect], vehicle: VehicleDescription, effects: Collection[str]
+) -> Problem:
     # At the vehicle file's parameters: an experiment of few steps does not show all of them.
-    unseen = (EffectName.PARAMETER_CHANGE, EffectName.SLIP)  # sliding is found in records, not foretold
-    effects = [name for name in EffectName if name not in unseen]
-    problem = build_problem([ideal_record(drives, vehicle)], vehicle, vehicle.prior, given=given, effects=effects)
+    names = [name for name in EffectName if name in effects and name in _FORETOLD]
+    problem = build_problem([ideal_record(drives, vehicle)], vehicle, vehicle.prior, given=given, effects=names)
     return replace(problem, nominal=None)
 
 
