@@ -147,8 +147,9 @@ class _Decoder:
         pdo, item, offset = _locate(node, PdoDirection.TRANSMIT, index)
         rows = self._rows(node, pdo, self._cycle)
         self._refuse_gaps(node, self._cycle[rows])
-        cycles, first = np.unique(self._cycle[rows], return_index=True)
-        return self._values(rows[first][cycles < self._count], item, offset)
+        # Cycles are counted in the order of the frames: the first one of each is where the number changes.
+        first = np.flatnonzero(np.diff(self._cycle[rows], prepend=-1))
+        return self._values(rows[first], item, offset)
 
     def _commands(self, node: Node) -> FloatArray:
         pdo, item, offset = _locate(node, PdoDirection.RECEIVE, Index.TARGET_TORQUE)
@@ -176,7 +177,7 @@ class _Decoder:
         return rows
 
     def _refuse_gaps(self, node: Node, cycles: NDArray[np.int64]) -> None:
-        missing = np.setdiff1d(np.arange(self._count), cycles)
+        missing = _absent(cycles, self._count)
         if len(missing):
             times = ", ".join(f"{cycle * self._network.cycle_period:.3f} s" for cycle in missing[:5])
             raise RecordError(
@@ -187,7 +188,8 @@ class _Decoder:
 
     def _refuse_lost_commands(self, node: Node, latched: NDArray[np.int64]) -> None:
         """A master that commands in every cycle does so in each; one that only sends changes is believed."""
-        silent = np.setdiff1d(np.arange(1, self._count), latched)
+        silent = _absent(latched, self._count)
+        silent = silent[silent > 0]
         if 0 < len(silent) < _MOSTLY * self._count:
             raise RecordError(
                 f"{self._path}: no command to {node.label} in {len(silent)} of {self._count} cycles "
@@ -198,6 +200,13 @@ class _Decoder:
     def _values(self, rows: NDArray[np.intp], item: MappedObject, offset: int) -> NDArray[np.int64]:
         raw = np.ascontiguousarray(self._table.data[rows, offset : offset + item.bits // 8])
         return raw.view(f"<{item.code}").ravel().astype(np.int64)
+
+
+def _absent(cycles: NDArray[np.int64], count: int) -> NDArray[np.intp]:
+    """Numbers below `count` that are not among some."""
+    present = np.zeros(count, dtype=bool)
+    present[cycles] = True
+    return np.flatnonzero(~present)
 
 
 def _locate(node: Node, direction: PdoDirection, index: int) -> tuple[Pdo, MappedObject, int]:
