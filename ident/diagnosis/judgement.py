@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.chance import chances
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.fitted import Fitted
@@ -23,7 +22,8 @@ from ident.diagnosis.limits import Limits
 from ident.diagnosis.probability import calibration, rank
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
-from ident.diagnosis.remainder import lasting, mostly_tolerated, repeated, shares
+from ident.diagnosis.remainder import repeated, shares
+from ident.diagnosis.repeating import Repeating
 from ident.diagnosis.search import Found
 from ident.diagnosis.steady import log_unsteady
 
@@ -65,7 +65,7 @@ class Judgement:
             after=self.fitted.after,
             significance=min(slot.evidence.significance for slot in (self.found.rest, *self.found.slots)),
             remainder=self.fitted.rest,
-            lasting=self._repeating() > 1,
+            lasting=self._repeats.most > 1,
             repeated_before=self._sizes(self.fitted.judged()),
             repeated_after=self._sizes(self.fitted.after.blocks),
             problem=self.problems[0],
@@ -74,7 +74,7 @@ class Judgement:
 
     def incomplete(self) -> bool:
         """Whether something is left beside the effects that a law may explain."""
-        left = self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeats_by_no_accident()
+        left = self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeats.by_no_accident
         return left or self.fitted.exactly.after**2 > 1 + self.limits.measurable
 
     def cost(self, floors: Array, labels: Collection[str]) -> tuple[float, int]:
@@ -106,7 +106,7 @@ class Judgement:
 
         None at all where nothing repeats and the gap is within what a record without repeats tells of its noise.
         """
-        if not self._lasts and not self._measurable():
+        if not self._repeats.sizes and not self._measurable():
             return ()
         closed = self.fitted.closed
         widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
@@ -156,7 +156,7 @@ class Judgement:
 
     def _verdict(self) -> Verdict:
         if not self.found.variants:
-            left = self._predictable() or self._surely_repeating() or self._far_off()
+            left = self._predictable() or self._repeats.surely or self._far_off()
             return Verdict.UNKNOWN if left else Verdict.NONE
         unexplained = self._predictable() and self._explained() < self.limits.explained
         strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
@@ -173,7 +173,7 @@ class Judgement:
 
         Or hardly nearer, where nothing repeats that would tell noise from what is left.
         """
-        least = -self.limits.widening if self._lasts else self.limits.most
+        least = -self.limits.widening if self._repeats.sizes else self.limits.most
         return self._measurable() and self.fitted.exactly.closed < least
 
     def _foreign(self) -> bool:
@@ -183,7 +183,9 @@ class Judgement:
         moves in its coupling too.
         """
         foreign = {block.label for block, _ in self.rows.blocks if not block.baseline.any()}
-        lasts = {label for label, size in self._lasts.items() if label in foreign and size > self.limits.foreign}
+        lasts = {
+            label for label, size in self._repeats.sizes.items() if label in foreign and size > self.limits.foreign
+        }
         return bool(lasts & self.fitted.reached) or (bool(lasts) and self._named < self.limits.nearly)
 
     def _unsteady(self) -> bool:
@@ -222,7 +224,7 @@ class Judgement:
 
     def _surest(self) -> float:
         """Where something repeats that all effects leave, the name of the strongest may be part of another cause."""
-        return self._named if self.limits.humble and self._repeating() > 1 else 1.0
+        return self._named if self.limits.humble and self._repeats.most > 1 else 1.0
 
     def _predictable(self) -> bool:
         """Whether a smooth function of the states predicts what the effects leave, and it is no trifle."""
@@ -232,43 +234,14 @@ class Judgement:
 
     def _lasting(self) -> bool:
         """Whether what repeats is above its limit, and the effects close too little to have that pardoned."""
-        excess = self._repeating()
+        excess = self._repeats.most
         needed = self.limits.named if excess <= self.limits.far else self.limits.nearly
         return excess > 1 and self._named < needed
 
-    def _repeating(self) -> float:
-        """What the model leaves and repeats in every record, over the noise, in units of what may."""
-        return max(self._excesses().values(), default=0.0)
-
-    def _surely_repeating(self) -> bool:
-        """Whether that is more than may be, in a coordinate in which it is no accident of the noise."""
-        large = {label for label, excess in self._excesses().items() if excess > 1}
-        return bool(large & self._no_accidents)
-
-    def _repeats_by_no_accident(self) -> bool:
-        """Whether something repeats in both records in some coordinate, however little, that noise does not explain."""
-        return any(self._lasts.get(label, 0.0) > 0 for label in self._no_accidents)
-
     @cached_property
-    def _no_accidents(self) -> frozenset[str]:
-        """Coordinates of which noise does not explain what repeats in them."""
-        found = chances(self.rows, self.fitted.floors, self.fitted.after.blocks)
-        return frozenset(label for label, chance in found.items() if chance * len(found) < self.limits.chance)
-
-    def _excesses(self) -> Mapping[str, float]:
-        """The same by coordinate."""
-        blocks = zip(self.rows.blocks, self.fitted.floors, strict=True)
-        creeping = {block.label for (block, _), floor in blocks if mostly_tolerated(block, floor)}
-        stricter = self.found.variants and self._measurable()
-        usual = self.limits.beside if stricter else self.limits.repeating
-        return {
-            label: size / (self.limits.creeping if label in creeping else usual) for label, size in self._lasts.items()
-        }
-
-    @cached_property
-    def _lasts(self) -> Mapping[str, float]:
-        """What the model leaves and repeats in every record, over the noise, by coordinate."""
-        return lasting(self.rows, self.fitted.floors, self.fitted.after.blocks)
+    def _repeats(self) -> Repeating:
+        stricter = bool(self.found.variants) and self._measurable()
+        return Repeating(self.rows, self.fitted.floors, self.fitted.after.blocks, self.limits, stricter=stricter)
 
     def _sizes(self, models: Sequence[Array]) -> Mapping[str, float]:
         return repeated(self.rows, self.fitted.floors, models)
