@@ -21,6 +21,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from ident.estimate.equations import ROWS, RowsOfStep
 from ident.estimate.filters import Processing, differentiate, moving_rows
@@ -44,16 +45,13 @@ FREEDOM: Final = 3.0
 UNSTATED: Final = 0.1
 """Standard uncertainty of a prior value that comes without one, relative to it."""
 
-NULL: Final = 100.0
-"""By so many standard deviations of the prior the fit may go from it freely; it decides what no step excites."""
-
 COUNT: Final = len(PARAMETER_NAMES)
 ORDERS: Final = np.array([2 if unit.startswith("kg") else unit.count("s/rad") for unit in PARAMETER_UNITS.values()])
 """Derivative of the angles that a parameter multiplies."""
 DRIVES: Final = len(WHEELS)
 WHEEL_ROWS: Final = slice(5, 9)
 PUNCTUAL: Final = np.zeros(DRIVES)
-REWEIGHTED: Final = 3
+REWEIGHTED: Final = 8
 """Fits with weights from the one before; more change nothing."""
 
 
@@ -187,8 +185,8 @@ def fit_balances(
     columns = stretch**ORDERS
     misfits = np.full(len(balances), unmodelled**2)
     values = prior.values
-    for _ in range(1 if unmodelled == UNMODELLED else REWEIGHTED):
-        values = _solved(balances, prior, told, misfits, columns)
+    for _ in range(REWEIGHTED):
+        values = _solved(balances, prior, values, told, misfits, columns)
         left = [balance.misfit(each, columns * values) for balance, each in zip(balances, told, strict=True)]
         misfits = unmodelled**2 + np.array(left)
     triples = zip(balances, mixings, misfits, strict=True)
@@ -202,10 +200,16 @@ def fit_balances(
 
 
 def _solved(
-    balances: Sequence[Balance], prior: Parameters, told: Sequence[Array], misfits: Array, columns: Array
+    balances: Sequence[Balance],
+    prior: Parameters,
+    values: Array,
+    told: Sequence[Array],
+    misfits: Array,
+    columns: Array,
 ) -> Array:
-    """Least squares, every balance weighted by its misfit, with a prior where none tells."""
-    precision = 1 / (NULL * prior_std(prior)) ** 2
+    """Least squares, every balance weighted by its misfit and the prior by how far from it the values were."""
+    away = ((values - prior.values) / prior_std(prior)) ** 2
+    precision = (FREEDOM + 1) / (FREEDOM + away) / prior_std(prior) ** 2
     normal, right = np.diag(precision), prior.values * precision
     for balance, each, misfit in zip(balances, told, misfits, strict=True):
         power = balance.torque_power(each)
@@ -215,8 +219,15 @@ def _solved(
         normal = normal + scale * balance.moments[:COUNT, :COUNT] * np.outer(columns, columns)
         right = right + scale * columns * (balance.moments[:COUNT, COUNT:] @ each)
     root = 1 / np.sqrt(np.diag(normal))
+    scaled, wanted = normal * np.outer(root, root), root * right
     # Where nothing but the prior tells a combination it may drown in rounding: least norm then.
-    return np.asarray(root * np.linalg.lstsq(normal * np.outer(root, root), root * right, rcond=None)[0])
+    found = np.linalg.lstsq(scaled, wanted, rcond=None)[0]
+    if np.any(found < 0):
+        # Masses, inertias and frictions are not negative, and torques of the wrong sign must not make them so.
+        powers, turn = np.linalg.eigh(scaled)
+        half = np.sqrt(np.maximum(powers, np.finfo(float).eps * powers[-1]))
+        found = nnls(half[:, None] * turn.T, (turn.T @ wanted) / half)[0]
+    return np.asarray(root * found)
 
 
 def prior_std(prior: Parameters) -> Array:
