@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -52,11 +52,13 @@ class Ranked:
         probabilities: of every candidate by key, most probable first; what is missing to one is no effect.
         names: of every effect by name, whatever its place.
         alike: keys that are the same as the one taken in these records, itself first.
+        log_evidence: of every candidate by key, against nothing in this place, the greatest first.
     """
 
     probabilities: Mapping[str, float]
     names: Mapping[str, float]
     alike: tuple[str, ...]
+    log_evidence: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def probability(self) -> float:
@@ -88,7 +90,8 @@ def rank(regression: Regression, slot: Slot, variant: int, settings: Calibration
         names[name] = names.get(name, 0.0) + probability
     ordered = dict(sorted(names.items(), key=lambda entry: -entry[1]))
     same = tuple(regression.key(other) for other in alike(regression, slot, variant))
-    return Ranked(probabilities, ordered, same)
+    evidence = dict(sorted(zip(keys, slot.log_evidence.tolist(), strict=True), key=lambda entry: -entry[1]))
+    return Ranked(probabilities, ordered, same, evidence)
 
 
 def alike(regression: Regression, slot: Slot, variant: int) -> list[int]:

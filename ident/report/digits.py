@@ -8,6 +8,9 @@ from typing import Final
 SIGNIFICANT: Final = 2
 """Significant digits of a standard deviation."""
 
+BEYOND: Final = 1e4
+"""Multiple from which its size says nothing."""
+
 MISSING: Final = "–"
 """Stands where there is no number."""
 
@@ -46,6 +49,11 @@ def significant(value: float, count: int = 3) -> str:
         return "0"
     decimals = max(0, count - 1 - math.floor(math.log10(abs(value))))
     return f"{value:.{decimals}f}"
+
+
+def times(value: float) -> str:
+    """A multiple of three significant digits; one beyond all bounds as no more than that."""
+    return f"over {BEYOND:.0f}" if value >= BEYOND else significant(value)
 
 
 def unit_text(unit: str) -> str:

@@ -20,7 +20,7 @@ _FORCES: Final = MappingProxyType(
     }
 )
 
-_VARIABLES: Final = MappingProxyType(
+VARIABLES: Final = MappingProxyType(
     {
         "rate": "the speed",
         "angle": "the position",
@@ -38,13 +38,23 @@ _VARIABLES: Final = MappingProxyType(
 
 def law_words(law: LawAnswer) -> str:
     """What it is and how large, as part of a sentence."""
-    return f"{_FORCES[law.partner].format(x=variable_text(law))}, {_swing(law)}"
+    return f"{law_kind(law.partner, law.variable, law.of)}, {_swing(law)}"
+
+
+def law_kind(partner: str, variable: str, of: str = "") -> str:
+    """What a law is, without its size."""
+    return _FORCES[partner].format(x=variable_name(variable, of))
 
 
 def variable_text(law: LawAnswer) -> str:
     """What it depends on."""
-    text = _VARIABLES[law.variable]
-    return f"{text} ({plain(law.of)})" if law.of else text
+    return variable_name(law.variable, law.of)
+
+
+def variable_name(variable: str, of: str = "") -> str:
+    """A variable in words, and whose it is where it is not the place's own."""
+    text = VARIABLES[variable]
+    return f"{text} ({plain(of)})" if of else text
 
 
 def law_line(effect: NamedEffect, law: LawAnswer) -> str:

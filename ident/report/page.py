@@ -38,6 +38,7 @@ def _environment() -> jinja2.Environment:
         digits=digits.digits,
         percent=digits.percent,
         significant=digits.significant,
+        times=digits.times,
         unit=digits.unit_text,
         with_std=digits.with_std,
         plain=digits.plain,
