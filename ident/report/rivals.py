@@ -1,0 +1,181 @@
+"""What else was considered, and how far behind it is: bars of log evidence in the place of each cause."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
+
+from ident.diagnosis.findings import Cause, Findings
+from ident.diagnosis.law.dependence import Partner
+from ident.report.digits import percent, plain, significant
+from ident.report.headline import place_words
+from ident.report.law_text import VARIABLES, law_kind
+
+MOST: Final = 6
+"""Bars of one chart."""
+
+HIDDEN: Final = 0.0005
+"""Probability below which a number says nothing."""
+
+EVIDENCE: Final = "log evidence"
+PROBABILITY: Final = "probability"
+"""What the length of bars says."""
+
+_PLAIN: Final = MappingProxyType(
+    {
+        "_".join(part for part in ("law", variable, partner) if part): law_kind(partner, variable)
+        for variable in VARIABLES
+        for partner in Partner
+    }
+)
+"""Laws of the own motion of a place in words, by the names that they have as effects."""
+
+NOTHING: Final = "nothing"
+OTHERS: Final = "all others together"
+
+
+class Standing(StrEnum):
+    """Of a contender: the one taken, one that these records do not tell from it, or another."""
+
+    TAKEN = "taken"
+    SAME = "same"
+    OTHER = "other"
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A contender.
+
+    Attributes:
+        name: in words, with its place.
+        standing: beside the one taken.
+        value: log evidence or probability.
+        length: of the bar, as a share of the chart's width.
+        text: of the value.
+        probability: in words; empty where there is none.
+    """
+
+    name: str
+    standing: Standing
+    value: float
+    length: float
+    text: str
+    probability: str = ""
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Bars, the longest first.
+
+    Attributes:
+        title: what they compete for.
+        unit: EVIDENCE or PROBABILITY.
+        bars: at least one.
+        clear: what they come to, in words; empty where there is nothing to say.
+    """
+
+    title: str
+    unit: str
+    bars: tuple[Bar, ...]
+    clear: str
+
+
+def rival_charts(findings: Findings) -> list[Chart]:
+    """What competes with each cause, names and laws apart, then what was not believed."""
+    charts = [*(chart for cause in findings.causes for chart in _of_cause(cause, findings)), _doubtful(findings)]
+    return [chart for chart in charts if chart is not None]
+
+
+def _of_cause(cause: Cause, findings: Findings) -> Iterator[Chart | None]:
+    """By log evidence. That of laws and that of names are of noises of other colours: they do not compare."""
+    ranked = cause.ranked
+    if cause.law is None:
+        yield _by_evidence(cause, findings, "In", ranked.log_evidence, ranked.alike)
+        return
+    yield _by_evidence(cause, findings, "Laws in", cause.law.odds, cause.law.same)
+    yield _by_evidence(cause, findings, "Names in", ranked.log_evidence, ranked.alike)
+
+
+def _by_evidence(
+    cause: Cause, findings: Findings, kind: str, evidence: Mapping[str, float], alike: Sequence[str]
+) -> Chart | None:
+    taken, laws = cause.candidate.key, _laws(cause, findings)
+    same = frozenset(alike) - {taken}
+    values = {key: value for key, value in evidence.items() if math.isfinite(value)}
+    ordered = sorted(values.items(), key=lambda entry: -entry[1])[:MOST]
+    if not ordered:
+        return None
+    largest = max(ordered[0][1], 1.0)
+    bars = tuple(
+        Bar(
+            name=_name(key, laws),
+            standing=_standing(key, taken, same),
+            value=value,
+            length=max(value, 0.0) / largest,
+            text=significant(value, 3),
+            probability=_probability(key, cause, same),
+        )
+        for key, value in ordered
+    )
+    return Chart(f"{kind} the place of {_name(taken, laws)}", EVIDENCE, bars, _lead(bars))
+
+
+def _standing(key: str, taken: str, same: frozenset[str]) -> Standing:
+    if key == taken:
+        return Standing.TAKEN
+    return Standing.SAME if key in same else Standing.OTHER
+
+
+def _probability(key: str, cause: Cause, same: frozenset[str]) -> str:
+    if key == cause.candidate.key:
+        return percent(cause.probability)
+    if key in same:
+        return "the same in these records"
+    probability = cause.ranked.probabilities.get(key)
+    return "" if probability is None else _small(probability)
+
+
+def _small(probability: float) -> str:
+    return percent(probability) if probability >= HIDDEN else f"below {percent(HIDDEN)}"
+
+
+def _lead(bars: Sequence[Bar]) -> str:
+    """Of the one taken over the best that is not the same."""
+    taken = next((bar.value for bar in bars if bar.standing is Standing.TAKEN), None)
+    best = max((bar.value for bar in bars if bar.standing is Standing.OTHER), default=None)
+    if taken is None or best is None:
+        return ""
+    where = "ahead of" if taken >= best else "behind"
+    return f"{significant(abs(taken - best), 3)} {where} the best that can be told from it"
+
+
+def _doubtful(findings: Findings) -> Chart | None:
+    """By probability; with nothing at all and what is not listed they make one."""
+    found = findings.doubtful
+    if not found:
+        return None
+    listed = dict(list(found.items())[: MOST - 2])
+    rest = sum(found.values()) - sum(listed.values())
+    shares = {NOTHING: max(1 - sum(found.values()), 0.0)} | listed | ({OTHERS: rest} if rest > HIDDEN else {})
+    bars = tuple(
+        Bar(_name(key, {}), Standing.TAKEN if key == NOTHING else Standing.OTHER, value, value, _small(value))
+        for key, value in sorted(shares.items(), key=lambda entry: -entry[1])
+    )
+    title = "Beside the causes" if findings.causes else "In the place of nothing"
+    return Chart(title, PROBABILITY, bars, "not believed; chance, or the records that confirm, speak against it")
+
+
+def _laws(cause: Cause, findings: Findings) -> Mapping[str, str]:
+    """Laws in words, without their places, by key."""
+    known = [*findings.problem.dependences, *([cause.law.dependence] if cause.law is not None else [])]
+    return {one.key: law_kind(one.partner, one.variable, one.of) for one in known}
+
+
+def _name(key: str, laws: Mapping[str, str]) -> str:
+    name, at, where = key.partition("@")
+    words = laws.get(key) or _PLAIN.get(name) or plain(name)
+    return f"{words}, {place_words(where)}" if at else name
