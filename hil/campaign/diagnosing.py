@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from hil.campaign.asked import asked_again, asked_of_run
 from hil.campaign.axes import assumed_kinds, axis_models
 from hil.campaign.folder import describe, sources_of
 from hil.campaign.reading import first_run, read_of, whole_records
@@ -27,6 +28,7 @@ from ident.faults import sure_faults
 from ident.parameters_file import read_model, write_model
 from ident.records.axis_record import AxisRecord, read_axis_record
 from ident.records.record import Record
+from ident.report.commands import Asked
 from ident.report.faults import fault_lines, write_fault_report
 from ident.report.gap import GapReport, write_gap_report
 from ident.report.gap_summary import summary_lines
@@ -88,6 +90,7 @@ class Answer:
         notes: what the reader must know, a line each.
         geometry: of the vehicle that was diagnosed; None for axes.
         axes: models of axes with the effects that are named; empty for a vehicle, or where none is.
+        asked: what commands that come next need; None for records at fault.
     """
 
     findings: Findings | None
@@ -96,6 +99,7 @@ class Answer:
     notes: tuple[str, ...] = ()
     geometry: Geometry | None = None
     axes: tuple[AxisModelEntry, ...] = ()
+    asked: Asked | None = None
 
     @property
     def summary(self) -> list[str]:
@@ -154,7 +158,8 @@ def write_answer(order: DiagnosisOrder, answer: Answer) -> list[Path]:
         if answer.findings is None:
             write_fault_report(answer.diagnosis.faults, (*fitted, *confirmed), order.report)
         else:
-            write_gap_report(GapReport(answer.findings, answer.diagnosis, fitted, confirmed, judged), order.report)
+            found = (answer.findings, answer.diagnosis, fitted, confirmed, judged)
+            write_gap_report(GapReport(*found, answer.asked, answer.geometry), order.report)
         written.append(order.report)
     if order.extended is not None and answer.model is not None:
         write_model(answer.model, order.extended, _provenance(order), geometry=answer.geometry)
@@ -210,7 +215,7 @@ def _axis_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
     diagnosis = findings.diagnosis()
     places = [axis.named("axis") for axis in records[0].axes]
     axes = axis_models(findings, places) if diagnosis.verdict.explains else []
-    return Answer(findings, diagnosis, notes=assumed_kinds(records), axes=tuple(axes))
+    return Answer(findings, diagnosis, notes=assumed_kinds(records), axes=tuple(axes), asked=asked_again(order))
 
 
 def _vehicle_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
@@ -236,7 +241,8 @@ def _vehicle_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
     diagnosis = replace(found.diagnosis, unseen=unseen_gaps(found.findings, records, confirming, vehicle, given))
     named = diagnosis.verdict.explains
     extended = extended_model(found.findings, vehicle.prior, given=given) if named else None
-    return Answer(found.findings, diagnosis, extended, notes, vehicle.geometry)
+    asked = asked_of_run(order, first, vehicle)
+    return Answer(found.findings, diagnosis, extended, notes, vehicle.geometry, asked=asked)
 
 
 def _refuse_repeated(parts: Sequence[_Stretch], *, same_rate: bool) -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from markupsafe import Markup
 from plotly import offline
@@ -14,16 +14,27 @@ from ident.diagnosis.diagnosis import Diagnosis
 from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.vehicle.outcome import HORIZON
 from ident.report import digits
+from ident.report.commands import Asked, next_commands
+from ident.report.curves import cause_curves
 from ident.report.digits import plain
-from ident.report.gap_figures import Figure, map_figure, residual_figures
-from ident.report.gap_summary import gap_line, next_text
-from ident.report.headline import headline
+from ident.report.gap_figures import map_figure, residual_figures
+from ident.report.gap_summary import next_text
+from ident.report.headline import ABOVE, effect_words, headline, place_words
+from ident.report.judged import judged_steps, scale_ticks
 from ident.report.page import render, script_json
+from ident.report.rivals import rival_charts
+from ident.report.sketch import axis_sketch, mark_of, vehicle_sketch
+from ident.vehicle.geometry import Geometry
 from ident.writing import write_whole
 
 BIASED: Final = 2.0
 """Shift of a parameter, in standard deviations, from which it is said to be biased."""
 
+LARGEST: Final = 2
+"""Traces that stand with the answer; the others follow below."""
+
+AXIS: Final = "axis"
+"""With it the coordinates of servo axes begin."""
 
 REPEATS: Final = 0.05
 """What repeats, in units of the noise, from which it is worth a line."""
@@ -38,6 +49,8 @@ class GapReport:
         diagnosis: the answer.
         records, confirm: names of the records.
         model: name of the model under test; None where the parameters were refitted.
+        asked: what commands that come next need beside that; None: the names above alone.
+        geometry: of the vehicle, for the proportions of its sketch; None where it is not at hand.
     """
 
     findings: Findings
@@ -45,6 +58,14 @@ class GapReport:
     records: Sequence[str]
     confirm: Sequence[str]
     model: str | None = None
+    asked: Asked | None = None
+    geometry: Geometry | None = None
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes, where the records are of axes."""
+        names = dict.fromkeys(block.coordinate for block in self.findings.problem.blocks)
+        return tuple(name for name in names if name.partition("_")[0] == AXIS)
 
 
 @dataclass(frozen=True)
@@ -75,36 +96,67 @@ class Row:
 def render_gap_report(content: GapReport) -> str:
     """The whole page as a string; scripts, styles and data inline, nothing is loaded from anywhere."""
     findings, diagnosis = content.findings, content.diagnosis
-    figures: dict[str, Figure] = {"map": map_figure(diagnosis.where)} if _has_gap(diagnosis) else {}
-    residuals = residual_figures(findings)
-    figures |= {key: figure for key, _, figure in residuals}
+    curves, residuals = cause_curves(findings), residual_figures(findings)
+    figures = {curve.key: curve.figure for curve in curves} | {key: figure for key, _, figure in residuals}
+    if _has_gap(diagnosis):
+        figures["map"] = map_figure(diagnosis.where)
+    titles = [(key, title) for key, title, _ in residuals]
     return render(
         "gap.html.j2",
-        verdict=str(diagnosis.verdict),
-        headline=headline(diagnosis, findings.events),
-        gap=diagnosis.gap,
-        unseen=diagnosis.unseen,
-        horizon=HORIZON,
-        gap_text=gap_line(findings, diagnosis),
-        next=next_text(diagnosis),
-        rows=[_row(cause, content) for cause in findings.causes],
-        believed=diagnosis.verdict.explains,
-        sizeless=[cause.candidate.key for cause in findings.causes if cause.sizeless],
-        doubtful=_doubtful(findings),
-        events=findings.events,
-        residuals=[(key, title) for key, title, _ in residuals],
-        parameters=_parameters(findings),
-        remainder=findings.remainder,
-        repeated=_repeated(findings),
-        significance=findings.significance,
-        invisible=diagnosis.invisible,
-        judged=content.model,
-        records=content.records,
-        confirm=content.confirm,
-        has_map="map" in figures,
+        sketch=_sketch(content),
+        curves=curves,
+        charts=rival_charts(findings),
+        largest=titles[:LARGEST],
+        residuals=titles[LARGEST:],
         figures=script_json(figures),
         plotly=Markup(offline.get_plotlyjs()),
+        **_answer(content),
+        **_details(content),
     )
+
+
+def _answer(content: GapReport) -> dict[str, Any]:
+    """What is said first."""
+    findings, diagnosis = content.findings, content.diagnosis
+    lines = judged_steps(diagnosis)
+    return {
+        "headline": headline(diagnosis, findings.events),
+        "verdict": str(diagnosis.verdict),
+        "significance": findings.significance,
+        "gap": diagnosis.gap,
+        "effects": [(place_words(one.where), effect_words(one), one) for one in diagnosis.effects],
+        "judged_steps": lines,
+        "ticks": scale_ticks(lines),
+        "above": ABOVE,
+        "horizon": HORIZON,
+        "next": next_text(diagnosis),
+        "commands": next_commands(diagnosis, content.asked or Asked(content.records, content.confirm, content.model)),
+        "invisible": diagnosis.invisible,
+    }
+
+
+def _details(content: GapReport) -> dict[str, Any]:
+    """What stands below."""
+    findings = content.findings
+    return {
+        "rows": [_row(cause, content) for cause in findings.causes],
+        "believed": content.diagnosis.verdict.explains,
+        "sizeless": [cause.candidate.key for cause in findings.causes if cause.sizeless],
+        "events": findings.events,
+        "parameters": _parameters(findings),
+        "remainder": findings.remainder,
+        "repeated": _repeated(findings),
+        "judged": content.model,
+        "records": content.records,
+        "confirm": content.confirm,
+        "has_map": _has_gap(content.diagnosis),
+    }
+
+
+def _sketch(content: GapReport) -> Markup:
+    """With the places of what is part of the answer; what is merely nearest is marked nowhere."""
+    marks = [mark_of(number, one) for number, one in enumerate(content.diagnosis.effects, 1)]
+    return axis_sketch(marks, content.axes) if content.axes else vehicle_sketch(marks, content.geometry)
 
 
 def write_gap_report(content: GapReport, path: Path) -> None:
@@ -137,11 +189,6 @@ def _row(cause: Cause, content: GapReport) -> Row:
         rivals=", ".join(rivals) or "–",
         biased=", ".join(f"{symbol} by {shift:+.1f} std" for symbol, shift in biased) or "–",
     )
-
-
-def _doubtful(findings: Findings) -> Mapping[str, float]:
-    """The best that were not believed, at most six."""
-    return dict(list(findings.doubtful.items())[:6])
 
 
 def _parameters(findings: Findings) -> list[tuple[str, str, str, str]]:

@@ -16,7 +16,7 @@ from ident.diagnosis.problem import Block, Channel
 from ident.diagnosis.remainder import ALL, noise_floors
 from ident.diagnosis.rows import kept_rows, make_rows
 from ident.report.digits import percent, significant, unit_text
-from ident.report.figures import MODELLED, RESIDUAL, packed
+from ident.report.figures import MODELLED, RESIDUAL, STUCK, packed
 
 Array = NDArray[np.float64]
 Figure = dict[str, Any]
@@ -80,8 +80,8 @@ def residual_figures(findings: Findings) -> list[tuple[str, str, Figure]]:
     held_out = findings.held_out
     blocks, before, after = held_out.problem.blocks, held_out.before, held_out.after
     rows = make_rows(replace(held_out.problem, candidates=()))
-    floors = noise_floors(rows, after, rows.target - rows.stack(list(after)))
-    sizes = [_size(*one) for one in zip(blocks, before, floors.tolist(), strict=True)]
+    floors = noise_floors(rows, after, rows.target - rows.stack(list(after))).tolist()
+    sizes = [_size(*one) for one in zip(blocks, before, floors, strict=True)]
     shown = [index for index in np.argsort(sizes)[::-1].tolist() if kept_rows(blocks[index]).samples.size]
     for index in shown[:MOST_RESIDUALS]:
         block = blocks[index]
@@ -90,8 +90,14 @@ def residual_figures(findings: Findings) -> list[tuple[str, str, Figure]]:
             models["with the causes"] = after[index]
         channel = "" if block.channel is Channel.DYNAMIC else f" ({block.channel})"
         title = f"{block.step} · {block.coordinate}{channel}: {significant(sizes[index], 2)} times the noise"
-        drawn.append((f"residual-{index}", title, _residual(block, models)))
+        drawn.append((f"residual-{index}", title, _residual(block, models, floors[index])))
     return drawn
+
+
+def _shade(half: float) -> Figure:
+    """Over the whole width, so far about zero."""
+    edges = {"x0": 0, "x1": 1, "xref": "paper", "y0": -half, "y1": half, "yref": "y"}
+    return {"type": "rect", "layer": "below", "fillcolor": STUCK, "line": {"width": 0}, **edges}
 
 
 def _size(block: Block, model: Array, floor: float) -> float:
@@ -100,8 +106,10 @@ def _size(block: Block, model: Array, floor: float) -> float:
     return float(np.sqrt(np.mean(left**2))) / floor if left.size else 0.0
 
 
-def _residual(block: Block, models: Mapping[str, Array]) -> Figure:
+def _residual(block: Block, models: Mapping[str, Array], floor: float) -> Figure:
+    """What models leave of a block, over the band of twice the noise of a mean of its repeats."""
     kept = kept_rows(block)
+    band = 2 * floor / math.sqrt(len(kept.samples))
     step = max(1, math.ceil(kept.samples.shape[1] / MOST_SAMPLES))
     time = (kept.samples[0] * block.sample_time)[::step]
     gaps = np.flatnonzero(np.diff(kept.runs[::step]) != 0) + 1
@@ -124,6 +132,7 @@ def _residual(block: Block, models: Mapping[str, Array]) -> Figure:
         "hovermode": "x unified",
         "xaxis": {"title": {"text": "time, repeats averaged [s]" if len(kept.samples) > 1 else "time [s]"}},
         "yaxis": {"title": {"text": f"measured - model [{unit_text(block.unit)}]"}, "zeroline": True},
+        "shapes": [_shade(band)],
     }
     colours = ((RESIDUAL, 1.2), (MODELLED, 1.6))
     lines = [line(model, name, *style) for (name, model), style in zip(models.items(), colours, strict=False)]

@@ -17,6 +17,7 @@ from ident.diagnosis.findings import Findings
 from ident.diagnosis.judge import judge
 from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant
 from ident.effects import EffectParameter
+from ident.report.commands import Asked
 from ident.report.gap import GapReport, render_gap_report
 from ident.report.gap_figures import map_figure, residual_figures
 from ident.report.gap_summary import summary_lines
@@ -136,6 +137,44 @@ def test_the_page_says_what_was_found_and_loads_nothing(page: str, findings: Fin
     shown = drawn(page)
     assert set(shown) == {"map", *(key for key, _, _ in residual_figures(findings))}
     assert all(f'id="{key}"' in page for key in shown)
+
+
+def test_nothing_on_the_page_is_fetched_and_no_style_names_another_place(page: str) -> None:
+    outside = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+    assert "url(" not in outside
+    assert "@import" not in outside
+    assert not re.search(r'(src|href)="(?!#|data:)', outside)
+    assert all("src=" not in tag for tag in re.findall(r"<script[^>]*>", page))
+
+
+def test_the_answer_comes_first_and_the_details_below(page: str) -> None:
+    order = ["summary", "rivals", "steps", "before-and-after", "next", "where", "causes", "parameters", "provenance"]
+    places = [page.index(f'<section id="{name}">') for name in order]
+    assert places == sorted(places)
+    assert all(f'href="#{name}"' in page for name in order[1:])
+    assert 'data-place="chassis" class="marked"' in page
+    assert page.count('class="marked"') == 1
+
+
+def test_what_is_not_named_is_marked_nowhere(findings: Findings) -> None:
+    for verdict in (Verdict.UNKNOWN, Verdict.NONE):
+        other = replace(findings, verdict=verdict, causes=findings.causes if verdict is Verdict.UNKNOWN else ())
+        page = render_gap_report(GapReport(other, other.diagnosis(), ("one",), (), None))
+        assert 'class="marked"' not in page
+        assert "No place is marked" in page
+
+
+def test_the_band_of_a_trace_is_twice_the_noise_of_the_mean_of_its_repeats(findings: Findings) -> None:
+    _, _, figure = residual_figures(findings)[0]
+    (band,) = figure["layout"]["shapes"]
+    assert band["y1"] == -band["y0"] == pytest.approx(2 * 1.0 / np.sqrt(REPEATS), rel=0.1)
+
+
+def test_commands_on_the_page_are_for_the_records_that_were_diagnosed(findings: Findings) -> None:
+    asked = Asked(["my run"], ["b.csv"], run="my run")
+    page = render_gap_report(GapReport(findings, findings.diagnosis(), ["my run"], ["b.csv"], None, asked))
+    assert "quasiomni diagnose &#39;my run&#39; --confirm b.csv --extended extended.toml" in page
+    assert "quasiomni fmu &#39;my run&#39; --model extended.toml" in page
 
 
 def test_everything_in_the_map_adds_up(page: str) -> None:
