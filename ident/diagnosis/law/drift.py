@@ -65,8 +65,11 @@ def _anchored(problems: Sequence[Problem], law: Law, settings: Settings, seed: i
     parts = [one for problem in problems for one in problem.dependences if one.key == law.dependence.key]
     design = regression.rows.stack([one for part in parts for one in part.design(law.learnt.knots.basis)], COUNT)
     # The functions sum to one, so that all coefficients together move the law by a constant.
-    shift = _constant(regression, design.sum(axis=1), design @ law.learnt.weights)
-    learnt = replace(law.learnt, weights=law.learnt.weights + shift, whole=law.learnt.whole + shift)
+    constant = design.sum(axis=1)
+    weights, whole = (
+        learnt + _constant(regression, constant, design @ learnt) for learnt in (law.learnt.weights, law.learnt.whole)
+    )
+    learnt = replace(law.learnt, weights=weights, whole=whole)
     return replace(law, learnt=learnt)
 
 
