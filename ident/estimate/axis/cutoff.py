@@ -24,7 +24,8 @@ def position_cutoff(record: AxisRecord, least: float) -> float:
     """Cutoff for the positions of a record [rad/s]: where the noise of their second derivative begins to prevail.
 
     The power spectrum of the acceleration falls with the motion and rises with the fourth power of the frequency where
-    only noise is left; its smoothed minimum lies between, and the smallest over the axes is taken.
+    only noise is left; its smoothed minimum lies between, and the smallest over the axes is taken. Below the frequency
+    at which the axis is fastest nothing is looked for: a motion without slow parts has little acceleration there too.
 
     Args:
         record: of any axes.
@@ -41,5 +42,6 @@ def _quietest(position: Array, rate: float) -> float:
     length = max(16, len(acceleration) // SPECTRUM_SEGMENTS)
     frequency, power = signal.welch(acceleration, rate, nperseg=min(length, len(acceleration)), detrend="constant")
     bands = frequency[1 : 1 + max(1, int(len(frequency) / BAND))]
-    level = [np.mean(power[(frequency >= low) & (frequency <= BAND * low)]) for low in bands]
-    return float(bands[int(np.argmin(level))])
+    level = np.array([np.mean(power[(frequency >= low) & (frequency <= BAND * low)]) for low in bands])
+    fastest = int(np.argmax(level / bands**2))
+    return float(bands[fastest + int(np.argmin(level[fastest:]))])
