@@ -1,6 +1,6 @@
 """Published records of real machines, read from local copies of their repositories into records of servo axes, SI.
 
-No record is part of this project. Each is in a public repository; a copy of it lies in a folder named as the repository.
+No record is part of this project. Each is in a public repository; a copy lies in a folder named as the repository.
 What has no uniform time is put on one by straight lines between samples, at the interval that it has for the most part.
 """
 
@@ -150,9 +150,9 @@ def read_tiago_torso(path: Path) -> Motion:
 
 
 def read_double_pendulum(path: Path) -> Motion:
-    """Shoulder and elbow, torque as their drives measure it."""
+    """Shoulder and elbow, torque as their drives measure it: the last two columns, however many are before."""
     raw = _table(path)
-    return Motion(raw[:, 0], _numbered(raw[:, 1:3]), _numbered(raw[:, 13:15]))
+    return Motion(raw[:, 0], _numbered(raw[:, 1:3]), _numbered(raw[:, -2:]))
 
 
 def read_simple_pendulum(path: Path) -> Motion:
