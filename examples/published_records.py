@@ -197,7 +197,7 @@ def read_mill(path: Path) -> Motion:
     wanted = [f"{axis}1_{what}" for what in ("ActualPosition", "CurrentFeedback") for axis in _MILL_AXES]
     raw = np.loadtxt(path, delimiter=",", skiprows=1, usecols=[names.index(name) for name in wanted])
     position, effort = (dict(zip(_MILL_AXES, part.T, strict=True)) for part in (raw[:, :2] * 1e-3, raw[:, 2:]))
-    return Motion(np.arange(len(raw)) * _MILL_INTERVAL, position, effort, AxisKind.LINEAR)
+    return Motion(np.arange(len(raw), dtype=np.float64) * _MILL_INTERVAL, position, effort, AxisKind.LINEAR)
 
 
 _FIGAROH: Final = ("thanhndv212/figaroh-examples", "that of FIGAROH, as its README says")
