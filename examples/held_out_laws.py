@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -19,6 +19,7 @@ import numpy as np
 from held_out_columns import LAWS, Array, Axis, Columns, axes_of, baseline
 from numpy.typing import NDArray
 from published_machines import ROWS, read_row
+from scipy import signal
 
 from ident.records.axis_record import AxisRecord
 
@@ -27,17 +28,33 @@ RATE: Final = 4.0
 """Rows an oscillation at the cutoff."""
 BLOCKS: Final = 10
 """Of a record without another to confirm it; every second one is held out."""
+ORDER: Final = 8
+"""Of the autoregression that whitens rows where that is asked for."""
 ENOUGH: Final = 0.98
 """A law that leaves more than this part of the rms is no further one."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """One record, and the rows of it that are fitted and held out."""
+    """One record, the rows of it, and which of them are held out.
+
+    Attributes:
+        axis: of the record.
+        rows: (n,) samples.
+        held: (n,) held out, or fitted.
+        whitening: (p,) weights of a row and those before it; (1,) leaves them alone.
+    """
 
     axis: Axis
-    fitted: NDArray[np.int64]
-    held: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    held: NDArray[np.bool_]
+    whitening: Array
+
+    def of(self, values: Array, held: bool) -> Array:
+        """Columns or the effort (N, ...) in the rows that are held out or fitted, but for the first ones."""
+        white = signal.lfilter(self.whitening, 1.0, self.axis.smooth(values)[self.rows], axis=0)
+        whole = np.arange(len(self.rows)) >= len(self.whitening) - 1
+        return np.asarray(white[whole & (self.held == held)])
 
 
 def parts_of(fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord], name: str, cutoff: float) -> list[Part]:
@@ -49,21 +66,29 @@ def parts_of(fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord], name: str
         rows = np.arange(0, len(record), step)[5:-5]
         odd = (rows * BLOCKS // len(record)) % 2 == 1
         held = odd if not confirm else np.full(len(rows), at >= len(fit))
-        parts.append(Part(axes_of(record, cutoff)[number], rows[~held], rows[held]))
+        parts.append(Part(axes_of(record, cutoff)[number], rows, held, np.ones(1)))
     return parts
 
 
+def whitened(parts: Sequence[Part]) -> list[Part]:
+    """The same rows behind an autoregression of what the baseline leaves of them, one for all."""
+    kept = [baseline(part.axis) for part in parts]
+    solution = _solution(_matrix(kept, parts, held=False), _effort(parts, held=False))
+    left = [
+        part.axis.smooth(part.axis.effort - np.column_stack(of) @ solution)[part.rows]
+        for part, of in zip(parts, kept, strict=True)
+    ]
+    lagged = np.vstack([np.column_stack([one[ORDER - lag : -lag] for lag in range(1, ORDER + 1)]) for one in left])
+    colour = np.linalg.lstsq(lagged, np.concatenate([one[ORDER:] for one in left]))[0]
+    return [replace(part, whitening=np.r_[1.0, -colour]) for part in parts]
+
+
 def _matrix(columns: Sequence[Columns], parts: Sequence[Part], held: bool) -> Array:
-    return np.vstack(
-        [
-            part.axis.smooth(np.column_stack(of))[part.held if held else part.fitted]
-            for part, of in zip(parts, columns, strict=True)
-        ]
-    )
+    return np.vstack([part.of(np.column_stack(of), held) for part, of in zip(parts, columns, strict=True)])
 
 
 def _effort(parts: Sequence[Part], held: bool) -> Array:
-    return np.concatenate([part.axis.smooth(part.axis.effort)[part.held if held else part.fitted] for part in parts])
+    return np.concatenate([part.of(part.axis.effort, held) for part in parts])
 
 
 def _solution(matrix: Array, effort: Array) -> Array:
@@ -116,6 +141,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="where the repositories are")
     parser.add_argument("machines", nargs="*", help="of which machines, all by default")
+    parser.add_argument("--whiten", action="store_true", help="weigh rows as their noise is coloured")
     given = parser.parse_args()
     for row in ROWS:
         if given.machines and row.machine not in given.machines:
@@ -123,7 +149,8 @@ def main() -> None:
         fit, confirm = read_row(row, given.folder)
         for axis in fit[0].axes:
             parts = parts_of(fit, confirm, axis.name, row.cutoff)
-            for line in report(f"{row.machine} {row.title} {axis.named('axis')}", parts):
+            title = f"{row.machine} {row.title} {axis.named('axis')}"
+            for line in report(title, whitened(parts) if given.whiten else parts):
                 print(line, flush=True)
 
 
