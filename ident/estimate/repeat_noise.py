@@ -93,9 +93,10 @@ def propagated_noise(noise: RepeatNoise, influence: Array, samples: NDArray[np.i
     strength = np.ones(len(influence))
     strength[samples] = np.where(noise.kept, noise.intensity, 1.0)
     scaled = influence * strength[:, None]
-    waves = _waves_of(noise.colour, scaled)
-    covariance, degrees = _propagated(noise.colour, waves)
-    shares = scaled * irfft(waves.influence * waves.spectrum[:, None], waves.size, axis=0)[: len(scaled)]
+    covariance, degrees = propagated(noise.colour, scaled)
+    size = next_fast_len(len(scaled) + len(noise.intensity), real=True)
+    spectrum = rfft(_circular(noise.colour.values, size)).real
+    shares = scaled * irfft(rfft(scaled, size, axis=0) * spectrum[:, None], size, axis=0)[: len(scaled)]
     by_phase = shares[samples].sum(axis=0).T
     return covariance, np.array([_with_intensity(noise, *pair) for pair in zip(degrees, by_phase, strict=True)])
 
@@ -149,30 +150,13 @@ def propagated(error: Autocovariance, influence: Array) -> tuple[Array, Array]:
     Args:
         influence: (N, n) ψ, zero in dropped rows.
     """
-    return _propagated(error, _waves_of(error, influence))
-
-
-@dataclass(frozen=True)
-class _Waves:
-    """Fourier transforms of an influence (F, n) and of an autocovariance (F,), of `size` samples."""
-
-    influence: NDArray[np.complex128]
-    spectrum: Array
-    size: int
-
-
-def _waves_of(error: Autocovariance, influence: Array) -> _Waves:
-    size = next_fast_len(len(influence) + len(error.values), real=True)
-    return _Waves(rfft(influence, size, axis=0), rfft(_circular(error.values, size)).real, size)
-
-
-def _propagated(error: Autocovariance, waves: _Waves) -> tuple[Array, Array]:
-    spectrum, size, order = waves.spectrum, waves.size, np.arange(len(waves.spectrum))
-    weights = spectrum * np.where((order == 0) | (2 * order == size), 1.0, 2.0)
-    # Real and imaginary parts beside each other: one product of real matrices.
-    parts = np.concatenate([waves.influence.real, waves.influence.imag])
-    covariance = parts.T @ (np.tile(weights, 2)[:, None] * parts) / size
-    own = irfft(np.abs(waves.influence) ** 2, size, axis=0)[: len(error.values)]
+    length = len(error.values)
+    size = next_fast_len(len(influence) + length, real=True)
+    waves = rfft(influence, size, axis=0)
+    spectrum = rfft(_circular(error.values, size)).real
+    weights = spectrum * np.where((np.arange(len(spectrum)) == 0) | (2 * np.arange(len(spectrum)) == size), 1.0, 2.0)
+    covariance = np.einsum("fi,fj,f->ij", waves.conj(), waves, weights, optimize=True).real / size
+    own = irfft(np.abs(waves) ** 2, size, axis=0)[:length]
     return np.asarray(covariance), np.array([_degrees_of_freedom(error, column) for column in own.T])
 
 
