@@ -20,8 +20,9 @@ from typing import Any, Final
 import numpy as np
 
 from hil.bench import emulation
+from hil.campaign.asked import DiagnosisOrder
 from hil.campaign.creating import create_run
-from hil.campaign.diagnosing import DiagnosisOrder, diagnose_records, write_answer
+from hil.campaign.diagnosing import diagnose_records, write_answer
 from hil.campaign.folder import Run, RunFolder, network_file_of
 from hil.campaign.results import identify_run, write_result
 from hil.campaign.runner import CampaignRunner

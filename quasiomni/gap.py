@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from hil.campaign.diagnosing import DiagnosisOrder, diagnose_records, write_answer
+from hil.campaign.asked import DiagnosisOrder
+from hil.campaign.diagnosing import diagnose_records, write_answer
 from quasiomni.application import app
 from quasiomni.options import (
     EngineOption,

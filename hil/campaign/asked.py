@@ -2,15 +2,46 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from hil.campaign.folder import Run
 from ident.report.commands import Asked
 from ident.vehicle.description import VehicleDescription, load_vehicle
 
-if TYPE_CHECKING:
-    from hil.campaign.diagnosing import DiagnosisOrder
+
+@dataclass(frozen=True)
+class DiagnosisOrder:
+    """A diagnosis as it is asked for.
+
+    Attributes:
+        records: run folders or files to look for causes in.
+        confirm: the same, independent of them; none: a part of `records` confirms.
+        vehicle: shipped vehicle file by name, or a path; None: that of the first run folder, or the prototype.
+        model: `parameters.toml` under test; None: the parameters are refitted.
+        axis: the records are of servo axes.
+        seed: of the surrogates.
+        json, report, extended: files to write, or None; `extended` is the model with the effects that are named.
+        force: take a model that was assessed as unusable.
+        network: network file in place of that of the vehicle or of the run folders.
+    """
+
+    records: tuple[Path, ...]
+    confirm: tuple[Path, ...]
+    vehicle: str | None
+    model: Path | None
+    axis: bool
+    seed: int
+    json: Path | None
+    report: Path | None
+    extended: Path | None = None
+    force: bool = False
+    network: Path | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What is to be written."""
+        return tuple(path for path in (self.json, self.report, self.extended) if path is not None)
 
 
 def asked_again(order: DiagnosisOrder) -> Asked:

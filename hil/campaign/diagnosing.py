@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.campaign.asked import asked_again, asked_of_run
+from hil.campaign.asked import DiagnosisOrder, asked_again, asked_of_run
 from hil.campaign.axes import assumed_kinds, axis_models
 from hil.campaign.folder import describe, sources_of
 from hil.campaign.reading import first_run, read_of, whole_records
@@ -43,40 +43,6 @@ SAME: Final = 1e-6
 """Largest difference of two series over their range at which they are the same recording, written twice."""
 SAME_RATE: Final = 0.01
 """Largest relative difference of two sample times."""
-
-
-@dataclass(frozen=True)
-class DiagnosisOrder:
-    """A diagnosis as it is asked for.
-
-    Attributes:
-        records: run folders or files to look for causes in.
-        confirm: the same, independent of them; none: a part of `records` confirms.
-        vehicle: shipped vehicle file by name, or a path; None: that of the first run folder, or the prototype.
-        model: `parameters.toml` under test; None: the parameters are refitted.
-        axis: the records are of servo axes.
-        seed: of the surrogates.
-        json, report, extended: files to write, or None; `extended` is the model with the effects that are named.
-        force: take a model that was assessed as unusable.
-        network: network file in place of that of the vehicle or of the run folders.
-    """
-
-    records: tuple[Path, ...]
-    confirm: tuple[Path, ...]
-    vehicle: str | None
-    model: Path | None
-    axis: bool
-    seed: int
-    json: Path | None
-    report: Path | None
-    extended: Path | None = None
-    force: bool = False
-    network: Path | None = None
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """What is to be written."""
-        return tuple(path for path in (self.json, self.report, self.extended) if path is not None)
 
 
 @dataclass(frozen=True)
@@ -158,8 +124,16 @@ def write_answer(order: DiagnosisOrder, answer: Answer) -> list[Path]:
         if answer.findings is None:
             write_fault_report(answer.diagnosis.faults, (*fitted, *confirmed), order.report)
         else:
-            found = (answer.findings, answer.diagnosis, fitted, confirmed, judged)
-            write_gap_report(GapReport(*found, answer.asked, answer.geometry), order.report)
+            content = GapReport(
+                answer.findings,
+                answer.diagnosis,
+                fitted,
+                confirmed,
+                judged,
+                asked=answer.asked,
+                geometry=answer.geometry,
+            )
+            write_gap_report(content, order.report)
         written.append(order.report)
     if order.extended is not None and answer.model is not None:
         write_model(answer.model, order.extended, _provenance(order), geometry=answer.geometry)
