@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hil.exam.cases import Injected
 from hil.exam.sizes import SizeTable
+from ident.diagnosis.law.spline import Knots
 from ident.diagnosis.linear import least_squares, rms
 from ident.effects import Effect, make_effect
 from ident.effects.laws import COUNT, coefficient
@@ -130,14 +131,7 @@ def _joint(planned: Record, joint: int) -> Joint:
 
 def _left(law: Effect, joint: Joint, x: Array) -> Array:
     """What friction and inertia of the model leave of a law [Nm], its scale being one."""
-    places = law["start"] + law["step"] * np.arange(COUNT)
-    distance = x[:, None] - places
-    if law["period"] > 0:
-        distance = (distance + law["period"] / 2) % law["period"] - law["period"] / 2
-    else:
-        distance = np.clip(x, places[1], places[-2])[:, None] - places
-    size = np.abs(distance / law["step"])
-    basis = (np.maximum(2 - size, 0) ** 3 - 4 * np.maximum(1 - size, 0) ** 3) / 6
+    basis = Knots(law["start"], law["step"], law["period"]).basis(x)
     torque = basis @ np.array([law[coefficient(index)] for index in range(COUNT)])
     partner = {"law_angle_direction": np.sign(joint.rate), "law_angle_rate": joint.rate}.get(law.name, 1.0)
     absorbed = np.stack([np.sign(joint.rate), joint.rate, joint.acceleration], axis=1)

@@ -45,6 +45,12 @@ class ExamPlans:
     fit: Plan
     confirm: Plan
 
+    @property
+    def driven(self) -> tuple[Plan, Plan]:
+        """Both with a lane change at the end, which nothing is fitted to: what is found has to hold there too."""
+        fit, confirm = (replace(plan, steps=(*plan.steps, Step.LANE_CHANGE)) for plan in (self.fit, self.confirm))
+        return fit, confirm
+
 
 def plans_text(plans: ExamPlans) -> str:
     """Both plans as JSON; all that the seed decides."""

@@ -136,9 +136,7 @@ def drive_case(plans: str, world: World, cycle: float, case: Case) -> tuple[str,
     both = _plans(plans, world.vehicle, cycle)
     try:
         effects = _effects(case, both, world)
-        records = [
-            drive(plan, world, case.seed + index, effects) for index, plan in enumerate((both.fit, both.confirm))
-        ]
+        records = [drive(plan, world, case.seed + index, effects) for index, plan in enumerate(both.driven)]
     except UserError as error:
         return case.identifier, f"{error.what} {error.remedy}\n"
     for fault in case.effects if case.kind is Kind.FAULT else ():

@@ -129,6 +129,7 @@ class EffectKind:
         same_records: faults of a record that look like it whatever is driven -> its place, by channel; `fault@channel`
             of one channel, `fault@every channel` of all.
         stands_for: names of parameters that the vehicle has anyway and that its size takes the place of, by place.
+        over: variable of its joint that it is a function of, and what that is multiplied with (`ident.diagnosis.law`).
     """
 
     name: str
@@ -145,6 +146,7 @@ class EffectKind:
     always: bool = True
     same_records: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     stands_for: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    over: tuple[str, str] | None = None
 
     @property
     def size(self) -> EffectParameter:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from ident.diagnosis.diagnosis import Diagnosis, Verdict
-from ident.diagnosis.vehicle.ideal import DIAGNOSTIC, INCLINED, Experiment
+from ident.diagnosis.vehicle.ideal import DIAGNOSTIC, Experiment
 
 PROGRAM: Final = "quasiomni"
 EXTENDED: Final = "extended.toml"
@@ -154,8 +154,9 @@ def _sloped(experiment: Experiment | None) -> bool:
 
 def _steps(experiment: Experiment | None, asked: Asked) -> tuple[str, ...]:
     """Options of a campaign that drives it: all steps of a diagnosis, or the usual ones on a slope."""
-    if _sloped(experiment):
-        return () if asked.bus else ("--effect", f"slope@chassis={math.degrees(INCLINED):.0f}deg")
+    if experiment is not None and _sloped(experiment):
+        (slope,) = experiment.given
+        return () if asked.bus else ("--effect", f"{slope}={math.degrees(slope.size):.0f}deg")
     loaded = experiment is not None and any(drive.payload for drive in experiment.drives)
     if not (loaded and asked.mass):
         return ("--diagnostic",)

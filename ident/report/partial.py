@@ -8,17 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.axis.model import OVER as AXIS_OVER
 from ident.diagnosis.findings import Cause, Findings
-from ident.diagnosis.law.dependence import Basis, Dependence, Partner, Variable
+from ident.diagnosis.law.dependence import Basis, Dependence
 from ident.diagnosis.problem import Block, Problem
 from ident.diagnosis.remainder import noise_floors
 from ident.diagnosis.rows import Kept, Rows, make_rows
+from ident.effects import EFFECTS
 from ident.report.sketch import joint_of
 
 Array = NDArray[np.float64]
@@ -44,19 +45,6 @@ SCATTERED: Final = 0.03
 
 FEWEST: Final = 30
 """Points that a curve needs."""
-
-_FRICTIONS: Final = ("stribeck", "asymmetric_coulomb", "asymmetric_viscous", "quadratic_drag", "parameter_change")
-_OVER: Final = MappingProxyType(
-    dict.fromkeys(_FRICTIONS, (Variable.RATE, Partner.NOTHING))
-    | dict.fromkeys(("torque_ripple", "com_offset", "gravity_load"), (Variable.ANGLE, Partner.NOTHING))
-    | {
-        "friction_position": (Variable.ANGLE, Partner.DIRECTION),
-        "inertia_position": (Variable.ANGLE, Partner.ACCELERATION),
-        "friction_load": (Variable.LOAD, Partner.DIRECTION),
-        "presliding": (Variable.PATH_SINCE_REVERSAL, Partner.DIRECTION),
-    }
-)
-"""Of what an effect is a function, and what that is multiplied with."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +85,8 @@ def law_points(findings: Findings, cause: Cause) -> Points | None:
 
 def effect_points(findings: Findings, cause: Cause) -> Points | None:
     """Of a named effect that is a function of one variable in these rows; None where it is none."""
-    over = _OVER.get(str(cause.candidate.effect))
+    name = str(cause.candidate.effect)
+    over = EFFECTS[name].over if name in EFFECTS else AXIS_OVER.get(name)
     if over is None or cause.law is not None:
         return None
     places = _joints(cause.candidate.where)

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Final
 
 from ident.diagnosis.findings import Cause, Findings
-from ident.diagnosis.law.dependence import Partner
+from ident.diagnosis.law.dependence import Partner, law_name
 from ident.report.digits import percent, plain, significant
 from ident.report.headline import place_words
 from ident.report.law_text import VARIABLES, law_kind
@@ -26,11 +26,7 @@ PROBABILITY: Final = "probability"
 """What the length of bars says."""
 
 _PLAIN: Final = MappingProxyType(
-    {
-        "_".join(part for part in ("law", variable, partner) if part): law_kind(partner, variable)
-        for variable in VARIABLES
-        for partner in Partner
-    }
+    {law_name(variable, partner): law_kind(partner, variable) for variable in VARIABLES for partner in Partner}
 )
 """Laws of the own motion of a place in words, by the names that they have as effects."""
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.motion import AxisMotion
+from ident.diagnosis.law.dependence import Partner, Variable
 from ident.diagnosis.problem import Candidate, Variant
 from ident.effects import EffectParameter
 from ident.records.axis_record import AxisKind
@@ -29,6 +32,18 @@ class AxisEffect(enum.StrEnum):
     GRAVITY_LOAD = "gravity_load"
     INERTIA_POSITION = "inertia_position"
     TORQUE_FILTER = "torque_filter"
+
+
+OVER: Final[Mapping[str, tuple[Variable, Partner]]] = MappingProxyType(
+    {
+        AxisEffect.FRICTION_POSITION: (Variable.ANGLE, Partner.DIRECTION),
+        AxisEffect.FRICTION_LOAD: (Variable.LOAD, Partner.DIRECTION),
+        AxisEffect.PRESLIDING: (Variable.PATH_SINCE_REVERSAL, Partner.DIRECTION),
+        AxisEffect.GRAVITY_LOAD: (Variable.ANGLE, Partner.NOTHING),
+        AxisEffect.INERTIA_POSITION: (Variable.ANGLE, Partner.ACCELERATION),
+    }
+)
+"""Of what each of them that is a function of one variable is one, and what that is multiplied with."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.law.dependence import Dependence
+from ident.diagnosis.law.dependence import Dependence, law_name
 from ident.diagnosis.law.formula import formula_of
 from ident.diagnosis.law.stage import Law
 from ident.effects import Effect, make_effect
@@ -133,7 +133,7 @@ def law_effect(law: Law, scale: float, std: float) -> Effect | None:
         law: as it was learnt.
         scale, std: of it, by the refit.
     """
-    name = "_".join(part for part in ("law", law.dependence.variable, law.dependence.partner) if part)
+    name = law_name(law.dependence.variable, law.dependence.partner)
     if name not in LAWS or law.dependence.where not in LAWS[name].places:
         return None
     knots = law.learnt.knots

@@ -72,13 +72,17 @@ class Dependence:
     @property
     def effect(self) -> str:
         """Name of the law as an effect of a model."""
-        parts = ("law", self.variable, self.of, self.partner)
-        return "_".join(str(part) for part in parts if part)
+        return law_name(self.variable, self.partner, self.of)
 
     @property
     def key(self) -> str:
         """Unique in a problem."""
         return f"{self.effect}@{self.where}"
+
+
+def law_name(variable: str, partner: str, of: str = "") -> str:
+    """Name of a law as an effect of a model; with `of`, one that no model has a form for, or a wheel's or a motor's."""
+    return "_".join(part for part in ("law", str(variable), of, str(partner)) if part)
 
 
 def across(parts: Sequence[Dependence]) -> Dependence:

@@ -96,9 +96,8 @@ class Learner:
 
     def __init__(self, regression: Regression, whitener: Whitener, taken: Sequence[int]) -> None:
         rows = regression.rows
-        self.regression, self._whitener, self.rows = regression, whitener, rows
-        nothing = np.zeros((len(rows), 0))
-        white = regression.white(whitener, tuple(taken), nothing)
+        self._whitener, self.rows = whitener, rows
+        white = regression.white(whitener, tuple(taken), np.zeros((len(rows), 0)))
         self._target, self._model, self._stretch = white.target, white.baseline, white.stretch
         self.fitted = ~white.confirming
         self._part, self._all = self._beside(self.fitted), self._beside(np.ones(len(self.fitted), dtype=bool))

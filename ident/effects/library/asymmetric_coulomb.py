@@ -23,4 +23,5 @@ EFFECT: Final = EffectKind(
     term=_AsymmetricCoulomb,
     words="Coulomb friction {imbalance} beyond its mean forward, as much below it backward",
     usual=lambda vehicle, where: 0.3 * coulomb_friction(vehicle, where),
+    over=("rate", ""),
 )

@@ -25,4 +25,5 @@ EFFECT: Final = EffectKind(
     term=_AsymmetricViscous,
     words="viscous friction {imbalance} beyond its mean forward, as much below it backward",
     usual=lambda vehicle, where: 0.5 * viscous_friction(vehicle, where),
+    over=("rate", ""),
 )

@@ -29,4 +29,5 @@ EFFECT: Final = EffectKind(
     words="centre of mass {x} ahead and {y} left of the centre",
     usual=lambda vehicle, where: vehicle.geometry.wheelbase / 8,
     adding=("x", "y"),
+    over=("angle", ""),
 )

@@ -38,4 +38,5 @@ EFFECT: Final = EffectKind(
     usual=_usual,
     always=False,  # the parameters themselves can be set
     same_records=MappingProxyType({"scaled@every torque": ("all parameters of the vehicle file",)}),
+    over=("rate", ""),
 )

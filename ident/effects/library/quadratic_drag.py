@@ -46,4 +46,5 @@ EFFECT: Final = EffectKind(
     words="drag that grows with the square of the speed, {coefficient}",
     usual=_usual,
     units_at=MappingProxyType({"chassis": "N s^2/m^2"}),
+    over=("rate", ""),
 )

@@ -28,4 +28,5 @@ EFFECT: Final = EffectKind(
     term=_Stribeck,
     words="{amplitude} more friction at rest, most of it gone above {velocity}",
     usual=lambda vehicle, where: 0.4 * coulomb_friction(vehicle, where),
+    over=("rate", ""),
 )

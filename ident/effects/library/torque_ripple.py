@@ -35,4 +35,5 @@ EFFECT: Final = EffectKind(
     words="a torque ripple of {amplitude}, {order} periods a turn",
     usual=lambda vehicle, where: 0.12 * vehicle.limits.rated_torque,
     polar=("amplitude", "phase"),
+    over=("angle", ""),
 )
