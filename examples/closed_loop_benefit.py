@@ -19,8 +19,7 @@ import numpy as np
 from hil.bench.closed_loop import Tracking, track_lane_change
 from hil.bench.truth import truth_of
 from hil.campaign.folder import network_file_of
-from hil.exam.driving import drive
-from hil.exam.world import world_of
+from hil.exam.worlds import world_of
 from hil.network import load_network
 from ident.campaign.plan import Plan, make_plan
 from ident.diagnosis.vehicle.closing import channel_gaps, extended_model, plain_model
@@ -79,7 +78,7 @@ def _found(
 ) -> tuple[ExtendedModel, ExtendedModel]:
     """Models refitted without and with what a diagnosis finds; prints it, and the gaps of the lane change."""
     campaigns = [
-        drive(_plan(vehicle, name, steps, seed), world_of(name, engine), FIRST_SEED + seed, effects)
+        world_of(name, engine).drive(_plan(vehicle, name, steps, seed), FIRST_SEED + seed, effects)
         for seed, steps in ((2, FOUR_STEPS), (3, (*FOUR_STEPS, Step.LANE_CHANGE)))
     ]
     fit, (confirm, unseen) = campaigns[0], _split(campaigns[1])

@@ -15,6 +15,7 @@ from hil.exam.score_figures import confusion_svg, reliability_svg
 from hil.exam.score_report import score_exams, score_json, score_markdown, summary_lines
 from hil.exam.scoring import removable
 from hil.exam.sizes import load_rows, load_sizes, replaced, table_text
+from hil.exam.sources import Source
 from ident.errors import UserError
 from ident.extras import Extra, require
 from ident.writing import write_whole
@@ -33,6 +34,13 @@ KeyOption = Annotated[
     Path | None, typer.Option(help="Key that the exam was sealed with; not needed where it is not sealed.")
 ]
 FolderArgument = Annotated[Path, typer.Argument(help="Folder of the exam.")]
+
+SourceOption = Annotated[
+    Source,
+    typer.Option(
+        help="What drives the cases: the emulated vehicle, or one that shares no code with emulator and model."
+    ),
+]
 
 _DEFAULT = Composition()
 
@@ -60,6 +68,7 @@ def seal(
     ] = _DEFAULT.excitations,
     vehicle: VehicleOption = "prototype",
     engine: EngineOption = None,
+    source: SourceOption = Source.EMULATOR,
     sizes: Annotated[
         Path | None, typer.Option(help="Table of sizes. Default: that kept for the vehicle and the engine.")
     ] = None,
@@ -75,9 +84,10 @@ def seal(
     require(Extra.EXAM, "exam seal", () if key is not None else ("pyarrow",))
     _require_cluster(scheduler)
     from hil.exam.sealing import SealingOrder, seal
-    from hil.exam.world import stored_model, stored_sizes, world_of
+    from hil.exam.world import stored_model, stored_sizes
+    from hil.exam.worlds import world_of
 
-    world = world_of(vehicle, engine)
+    world = world_of(vehicle, engine, source)
     table = load_sizes(stored_sizes(world, sizes))
     composition = Composition(effects, pairs, none, unknown, invisible, laws, faults, excitations)
     order = SealingOrder(out, world, stored_model(world, model), composition, key, first_seed, jobs, scheduler)
@@ -121,6 +131,7 @@ def calibrate(
     out: Annotated[Path, typer.Option(help="Table of sizes to write.")],
     vehicle: VehicleOption = "prototype",
     engine: EngineOption = None,
+    source: SourceOption = Source.EMULATOR,
     effect: Annotated[
         list[str] | None, typer.Option(help="Measure this one alone; other rows of a table that is there are kept.")
     ] = None,
@@ -130,12 +141,12 @@ def calibrate(
     load_emulation()
     from hil.exam.calibration import calibrate
     from hil.exam.probes import EVERY
-    from hil.exam.world import world_of
+    from hil.exam.worlds import world_of
 
     strangers = sorted(set(effect or ()) - EVERY)
     if strangers:
         raise UserError(f"No effect is called {strangers[0]}.", f"Name some of {', '.join(sorted(EVERY))}.")
-    world = world_of(vehicle, engine)
+    world = world_of(vehicle, engine, source)
     kept = load_rows(out) if effect and out.is_file() else None
     with bar("measuring") as shown:
         rows = calibrate(world, jobs, shown, effect or EVERY)

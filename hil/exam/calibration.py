@@ -9,12 +9,9 @@ from functools import lru_cache
 from typing import Final
 
 from emulator.effects import INJECTORS
-from hil.bench.truth import truth_of
-from hil.exam.driving import drive
 from hil.exam.noise_units import Noise, SizeInNoise, noise_of, size_in_noise
 from hil.exam.plans import plan_exam
-from hil.exam.probes import EVERY, IDLE, SHARES, Probe, all_probes
-from hil.exam.quiet import drive_quietly
+from hil.exam.probes import EVERY, IDLE, SHARES, SMALLER, Probe, all_probes
 from hil.exam.sealing import effect_of
 from hil.exam.sizes import EffectSize
 from hil.exam.workers import run_all
@@ -79,7 +76,11 @@ def calibrate(
         progress: called with effects measured and in all.
         names: of the effects.
     """
-    probes = [probe for probe in all_probes(load_vehicle(world.vehicle)) if probe.name in names]
+    probes = [
+        probe
+        for probe in all_probes(load_vehicle(world.vehicle))
+        if probe.name in names and world.can_have(probe.name, probe.where)
+    ]
     stand_ins = {_key(probe): probe for probe in probes}
     tasks = [(world, probe) for probe in stand_ins.values()]
     measured: dict[tuple[str, str], tuple[str, Points]] = {}
@@ -94,7 +95,7 @@ def measure(world: World, probe: Probe) -> tuple[tuple[str, str], str, Points]:
     """Key of a probe, the channel that shows it and its points there, no points where none does; runs in a worker."""
     bench = _bench(world)
     shares = (*SHARES, IDLE) if INJECTORS[probe.name].threshold else SHARES
-    found = {size: units for share in shares if (units := _units(probe, size := _of_share(probe, share), bench))}
+    found = _driven(probe, shares, bench) or _driven(probe, SMALLER, bench)
     channel = _shown_in(probe, list(found.values()))
     if channel is None:
         return _key(probe), "torque", ()
@@ -107,6 +108,11 @@ def measure(world: World, probe: Probe) -> tuple[tuple[str, str], str, Points]:
             break
         sizes[size] = float(getattr(nearer, channel))
     return _key(probe), channel, _points(probe, sizes)
+
+
+def _driven(probe: Probe, shares: Sequence[float], bench: Bench) -> dict[float, SizeInNoise]:
+    """Noise units by size, of the shares of the largest at which the vehicle can be driven."""
+    return {size: units for share in shares if (units := _units(probe, size := _of_share(probe, share), bench))}
 
 
 def _nearer(sizes: Mapping[float, float]) -> float:
@@ -125,16 +131,16 @@ def _key(probe: Probe) -> tuple[str, str]:
 @lru_cache(maxsize=1)
 def _bench(world: World) -> Bench:
     vehicle, cycle = load_vehicle(world.vehicle), load_network(world.network_file).cycle_period
-    plan, truth = plan_exam(vehicle, PLAN_SEED, cycle).fit, truth_of(world.vehicle)
-    noise = noise_of(drive(plan, world, NOISE_SEED, ()), truth.values, vehicle.geometry)
+    plan, truth = plan_exam(vehicle, PLAN_SEED, cycle).fit, world.truth()
+    noise = noise_of(world.drive(plan, NOISE_SEED, ()), truth.values, vehicle.geometry)
     once = replace(plan, periods=1)
-    return Bench(once, noise, drive_quietly(once, world, ()), truth, vehicle.geometry, world)
+    return Bench(once, noise, world.drive_quietly(once, ()), truth, vehicle.geometry, world)
 
 
 def _units(probe: Probe, size: float, bench: Bench) -> SizeInNoise | None:
     """Noise units of a size; None where the vehicle cannot be driven with it."""
     try:
-        record = drive_quietly(bench.plan, bench.world, [effect_of(probe.injected(size))])
+        record = bench.world.drive_quietly(bench.plan, [effect_of(probe.injected(size))])
     except UserError:
         return None
     return size_in_noise(bench.noise, bench.plain, record, bench.truth.values, bench.geometry)
@@ -160,7 +166,9 @@ def _row(probe: Probe, channel: str, points: Points) -> EffectSize:
 
 
 def _shown_in(probe: Probe, measured: Sequence[SizeInNoise]) -> str | None:
-    """The channel that shows the effect best at the first size; None where it shows too little at any."""
+    """The channel that shows the effect best at the first size; None where it shows too little, or stops the vehicle."""
+    if not measured:
+        return None
     channels = ["drift"] if probe.name in DRIFTS else ["torque"]
     if INJECTORS[probe.name].breaks_rolling:
         channels.append("kinematic")

@@ -9,14 +9,14 @@ from pathlib import Path
 import can
 import numpy as np
 
-from emulator.effects import Wanted
+from emulator.vehicle import EmulatedVehicle
 from hil.bench.emulation import BenchOperator
 from hil.bench.lockstep import LockstepBench
 from hil.campaign.folder import Run, RunFolder
 from hil.campaign.reading import segment_of
 from hil.campaign.runner import CampaignRunner
-from hil.exam.world import World
 from hil.frames import FrameTable, decode_frames
+from hil.network import Network
 from ident.campaign.plan import Plan
 from ident.records.record import Record, Step
 
@@ -53,27 +53,24 @@ class FramesInMemory:
         """Nothing is ever on its way to a disk."""
 
 
-def drive(plan: Plan, world: World, seed: int, effects: Sequence[Wanted]) -> Record:
-    """Record of a plan driven by a vehicle with effects.
+def drive(plan: Plan, vehicle: EmulatedVehicle, network: Network, name: str, seed: int) -> Record:
+    """Record of a plan.
 
     The alignments between the steps are no part of it: how many there were depends on the effect.
 
     Args:
         plan: the campaign.
-        world: vehicle and engine.
+        vehicle: that drives it.
+        network: its drives.
+        name: of the vehicle.
         seed: of all noise.
-        effects: that the vehicle has.
 
     Raises:
-        UserError: the vehicle cannot have the effects, or cannot drive with them.
+        UserError: the vehicle cannot drive it.
     """
-    network = world.emulated().network
-    run = Run(RunFolder(Path(_SOURCE)), plan, network, seed, "", world.vehicle, None)
+    run = Run(RunFolder(Path(_SOURCE)), plan, network, seed, "", name, None)
     frames = FramesInMemory()
-    with (
-        world.emulate(seed, effects) as vehicle,
-        LockstepBench(vehicle, network.path) as bench,
-    ):
+    with LockstepBench(vehicle, network.path) as bench:
         CampaignRunner(
             run, bench.bus, bench.clock, frames, BenchOperator(vehicle), lambda *_: None, spare_alignments=True
         ).drive()

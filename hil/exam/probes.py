@@ -15,6 +15,9 @@ from ident.vehicle.description import VehicleDescription
 SHARES: Final = (0.6, 1.0)
 """Of the largest size, at which every effect is driven first; nearer to the noise after that."""
 
+SMALLER: Final = (0.3, 0.1)
+"""Shares at which it is driven where the vehicle cannot be driven with more."""
+
 IDLE: Final = 0.4
 """Share at which an effect with a threshold does nothing yet."""
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from emulator.effects import Wanted
 from emulator.prototype import Prototype
 from emulator.vehicle import EmulatedVehicle
-from hil.exam.world import World
 from ident.campaign.controller import Controller
 from ident.campaign.plan import Plan
 from ident.campaign.reference import Reference, sample_times
@@ -19,27 +15,26 @@ from ident.records.record import Record, Segment
 Array = NDArray[np.float64]
 
 
-def drive_quietly(plan: Plan, world: World, effects: Sequence[Wanted]) -> Record:
+def drive_quietly(plan: Plan, vehicle: EmulatedVehicle, built: Prototype) -> Record:
     """Record of a plan on a vehicle without noise, sampled and controlled in every cycle as over the bus.
 
     Args:
         plan: the campaign.
-        world: vehicle and engine.
-        effects: that the vehicle has.
+        vehicle: that drives it.
+        built: what it was built with.
 
     Raises:
-        UserError: the vehicle cannot have the effects, or cannot drive with them.
+        UserError: the vehicle cannot drive it.
     """
-    with world.emulate(0, effects, noise_scale=0.0) as vehicle:
-        for drive in vehicle.drives:
-            drive.enable()
-        driver = _Driver(vehicle, plan, world.emulated().prototype)
-        segments = []
-        for step in plan.steps:
-            start = driver.steering()
-            if float(np.abs(start - plan.posture(step)).max()) > 0:
-                driver.follow(plan.alignment(start, step, plan.vehicle.prior))
-            segments.append(driver.follow(plan.reference(step, plan.vehicle.prior)))
+    for drive in vehicle.drives:
+        drive.enable()
+    driver = _Driver(vehicle, plan, built)
+    segments = []
+    for step in plan.steps:
+        start = driver.steering()
+        if float(np.abs(start - plan.posture(step)).max()) > 0:
+            driver.follow(plan.alignment(start, step, plan.vehicle.prior))
+        segments.append(driver.follow(plan.reference(step, plan.vehicle.prior)))
     return Record(segments)
 
 

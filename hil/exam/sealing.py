@@ -17,7 +17,6 @@ from hil.exam.cases import Case, Injected, Kind
 from hil.exam.corruptions import corruption_of
 from hil.exam.drawing import Composition, draw_cases
 from hil.exam.drawn_laws import law_effect
-from hil.exam.driving import drive
 from hil.exam.folder import RECORDS, Exam, ExamFolder, read_exam, write_exam
 from hil.exam.identity import planned_record
 from hil.exam.key import Key, make_key
@@ -136,7 +135,7 @@ def drive_case(plans: str, world: World, cycle: float, case: Case) -> tuple[str,
     both = _plans(plans, world.vehicle, cycle)
     try:
         effects = _effects(case, both, world)
-        records = [drive(plan, world, case.seed + index, effects) for index, plan in enumerate(both.driven)]
+        records = [world.drive(plan, case.seed + index, effects) for index, plan in enumerate(both.driven)]
     except UserError as error:
         return case.identifier, f"{error.what} {error.remedy}\n"
     for fault in case.effects if case.kind is Kind.FAULT else ():
@@ -180,7 +179,7 @@ def _draw(folder: ExamFolder, order: SealingOrder, table: SizeTable) -> None:
     cases = draw_cases(table, order.composition, lots.noise, lots.questions, lots.identifiers)
     exam = Exam(
         vehicle=order.world.vehicle,
-        engine=str(order.world.engine),
+        engine=order.world.engine,
         cycle=cycle,
         plans=_draw_plans(order, lots, cycle),
         identifiers=tuple(case.identifier for case in cases),

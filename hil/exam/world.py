@@ -1,35 +1,37 @@
-"""The world of an exam: which vehicle its cases are driven with, in which physics engine."""
+"""The world of an exam: which vehicle its cases are driven with, and by what physics."""
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from emulator.effects import Wanted
-from emulator.engine.choice import ENGINES
-from emulator.vehicle import EmulatedVehicle
-from hil.bench.prototypes import Emulated, load_emulated
 from hil.campaign.folder import network_file_of
+from ident.campaign.plan import Plan
 from ident.errors import UserError
-from ident.extras import EngineName, require_engine
+from ident.records.record import Record
+from ident.vehicle.parameters import Parameters
 
 DATA: Final = Path(__file__).parent / "data"
 """Tables of sizes and models of the worlds that an exam knows by itself."""
 
 
 @dataclass(frozen=True)
-class World:
-    """Vehicle and engine; sizes in noise units and the model under test are those of one world.
+class World(abc.ABC):
+    """Vehicle and physics; sizes in noise units and the model under test are those of one world.
 
     Attributes:
-        vehicle: that the emulator plays: shipped name, or path of a vehicle file.
-        engine: of its physics.
+        vehicle: shipped name, or path of a vehicle file.
+        engine: name of its physics.
+        option: that asks for it on the command line.
     """
 
     vehicle: str
-    engine: EngineName
+    engine: str
+    option: str
 
     def __str__(self) -> str:
         return f"{self.vehicle} in {self.engine}"
@@ -49,41 +51,34 @@ class World:
         """Where the program keeps the model under test, as identified from a campaign without effects."""
         return DATA / f"model.{self.vehicle}.{self.engine}.toml"
 
-    def emulated(self) -> Emulated:
-        """Prototype and network.
+    @abc.abstractmethod
+    def truth(self) -> Parameters:
+        """What the vehicle was built with."""
 
-        Raises:
-            DataFileError: a file is missing or malformed, or two places disagree.
-        """
-        return load_emulated(self.vehicle, self.network_file)
+    @abc.abstractmethod
+    def can_have(self, name: str, where: str) -> bool:
+        """Whether its vehicle can have an effect at a place."""
 
-    def emulate(self, seed: int, effects: Sequence[Wanted], noise_scale: float = 1.0) -> EmulatedVehicle:
-        """The vehicle, to be closed.
+    @abc.abstractmethod
+    def drive(self, plan: Plan, seed: int, effects: Sequence[Wanted]) -> Record:
+        """Record of a plan driven by the vehicle.
 
         Args:
+            plan: the campaign.
             seed: of all noise.
-            effects: that it has.
-            noise_scale: factor on every random source.
+            effects: that the vehicle has.
 
         Raises:
-            UserError: it cannot have the effects.
+            UserError: the vehicle cannot have the effects, or cannot drive with them.
         """
-        return EmulatedVehicle(
-            self.emulated().prototype,
-            seed=seed,
-            noise_scale=noise_scale,
-            make_engine=ENGINES[self.engine],
-            effects=effects,
-        )
 
+    @abc.abstractmethod
+    def drive_quietly(self, plan: Plan, effects: Sequence[Wanted]) -> Record:
+        """The same without noise and without a bus, as fast as can be.
 
-def world_of(vehicle: str, engine: EngineName | None) -> World:
-    """The world of a vehicle and an engine; None: the engine that emulated vehicles have by default.
-
-    Raises:
-        UserError: the engine is not installed.
-    """
-    return World(vehicle, require_engine(engine, "An exam"))
+        Raises:
+            UserError: as `drive`.
+        """
 
 
 def stored_sizes(world: World, named: Path | None) -> Path:
@@ -95,7 +90,7 @@ def stored_sizes(world: World, named: Path | None) -> Path:
     if named is None and not world.sizes_file.is_file():
         raise UserError(
             f"No table of sizes is kept for {world}.",
-            f"Write one: quasiomni exam calibrate --vehicle {world.vehicle} --engine {world.engine} --out FILE; "
+            f"Write one: quasiomni exam calibrate --vehicle {world.vehicle} {world.option} --out FILE; "
             "then name it: --sizes FILE.",
         )
     return named or world.sizes_file
@@ -110,7 +105,7 @@ def stored_model(world: World, named: Path | None) -> Path:
     if named is None and not world.model_file.is_file():
         raise UserError(
             f"No model to be tested is kept for {world}.",
-            "Identify one from a campaign without effects, of that vehicle in that engine; then name its "
+            "Identify one from a campaign without effects, of that vehicle in that world; then name its "
             "parameters.toml: --model FILE.",
         )
     return named or world.model_file

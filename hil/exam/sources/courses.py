@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.exam.sources.independent import CYCLE, SIDE, STEP, WHEELS, Plant, Truth
+from hil.exam.sources.independent import CYCLE, SIDE, Plant, Truth
+from hil.exam.sources.recording import Flaws, Follow, Signals, run
 from ident.records.record import Record, Segment
 from ident.vehicle.description import VehicleDescription
 
@@ -54,25 +55,28 @@ def drive(
     truth: Truth, vehicle: VehicleDescription, courses: list[Course], generator: np.random.Generator
 ) -> list[Segment]:
     """Follow the courses side by side; gains are those of a careful commissioning engineer."""
-    g, runs, samples = vehicle.geometry, len(courses), len(courses[0].position)
+    g = vehicle.geometry
     turned = np.array([float(each.step == "rotation") for each in courses])[:, None]
     plant = Plant(truth, vehicle, turned * g.rotation_angle * np.array([-1.0, 1.0]))
+    signals = run(plant, Flaws(), _engineer(truth, vehicle, courses, plant), len(courses[0].position), generator)
+    return [_segment(each, index, signals) for index, each in enumerate(courses)]
+
+
+def _engineer(truth: Truth, vehicle: VehicleDescription, courses: list[Course], plant: Plant) -> Follow:
+    """Proportional and differential, on wheels and steering."""
+    g, samples = vehicle.geometry, len(courses[0].position)
+    turned = np.array([each.step == "rotation" for each in courses])
     held, lever = plant.alpha.copy(), g.wheel_offset / g.wheel_radius
     wanted = np.stack([each.position for each in courses], axis=1)
     rolling = np.array([each.step in ("straight", "rotation") for each in courses])
-    sense = np.where(turned > 0, -SIDE, 1) * rolling[:, None]
-    arm = np.where(turned[:, 0] > 0, g.rotation_lever, 1.0) / g.wheel_radius
+    sense = np.where(turned[:, None], -SIDE, 1) * rolling[:, None]
+    arm = np.where(turned, g.rotation_lever, 1.0) / g.wheel_radius
     steered = np.array([[each.step == "steering_left", each.step == "steering_right"] for each in courses])
-    heavy = np.where(turned[:, 0] > 0, truth.parameters["C_ch"], truth.parameters["m_ch"])
-    torques, read = np.zeros((samples, runs, 4)), [np.zeros((samples, runs, n)) for n in (4, 2)]
-    acting, slow = np.zeros((runs, 4)), np.zeros((runs, 4))
+    heavy = np.where(turned, truth.parameters["C_ch"], truth.parameters["m_ch"])
     previous = (plant.read()[0], plant.alpha.copy())
-    memory, reported = np.exp(-CYCLE / 0.1), list[Array]()
-    for sample in range(samples):
-        motors, alpha = plant.read()
-        reported.append(acting)
-        torques[sample] = reported[max(sample - truth.late, 0)]
-        read[0][sample], read[1][sample] = motors, alpha
+
+    def follow(sample: int, motors: Array, alpha: Array) -> Array:
+        nonlocal previous
         rates = (motors - previous[0]) / CYCLE, (alpha - previous[1]) / CYCLE
         previous = (motors, alpha)
         ahead = wanted[min(sample + 1, samples - 1)]
@@ -80,29 +84,23 @@ def drive(
         moved, moving = (np.sum(sense * each, axis=1) / 4 / arm for each in (motors, rates[0]))
         pull = rolling * heavy * (60 * (wanted[sample] - moved) + 15 * (speed - moving))
         turn = 400 * (held + steered * wanted[sample][:, None] - alpha) + 20 * (steered * speed[:, None] - rates[1])
-        each = sense * (pull / arm / 4)[:, None] + np.stack([-turn[:, 0], turn[:, 0], turn[:, 1], -turn[:, 1]], 1) / (
-            2 * lever
-        )
-        target = np.clip(each / g.gear_ratio, -3.8, 3.8)
-        slow = memory * slow + np.sqrt(1 - memory**2) * generator.normal(size=slow.shape)
-        disturbance = np.zeros((runs, 9))
-        disturbance[:, WHEELS] = 0.1 * slow
-        parts = round(CYCLE / STEP)
-        for part in range(parts):
-            plant.advance(
-                acting + (target - acting) * (part + 0.5) / parts, disturbance, (sample + (part + 0.5) / parts) * CYCLE
-            )
-        acting = target
-    return [_segment(each, index, torques, read, generator) for index, each in enumerate(courses)]
+        sides = np.stack([-turn[:, 0], turn[:, 0], turn[:, 1], -turn[:, 1]], axis=1) / (2 * lever)
+        each = sense * (pull / arm / 4)[:, None] + sides
+        return np.asarray(np.clip(each / g.gear_ratio, -3.8, 3.8))
+
+    return follow
 
 
-def _segment(each: Course, index: int, torques: Array, read: list[Array], generator: np.random.Generator) -> Segment:
-    def noisy(values: Array, size: float) -> Array:
-        return np.asarray(values[:, index] + size * generator.normal(size=values[:, index].shape))
-
+def _segment(each: Course, index: int, signals: Signals) -> Segment:
     time = np.arange(len(each.position), dtype=np.float64) * CYCLE
     return Segment(
-        each.step, CYCLE, time, noisy(torques, 2e-3), noisy(read[0], 2e-6), noisy(read[1], 1e-5), each.period
+        each.step,
+        CYCLE,
+        time,
+        signals.torques[:, index],
+        signals.motors[:, index],
+        signals.steering[:, index],
+        each.period,
     )
 
 

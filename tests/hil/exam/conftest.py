@@ -14,7 +14,7 @@ from hil.exam.drawing import Composition, draw_cases
 from hil.exam.identity import Identity
 from hil.exam.said import Alone, Said
 from hil.exam.sizes import SizeTable, load_sizes
-from hil.exam.world import world_of
+from hil.exam.worlds import world_of
 
 PROTOTYPE = world_of("prototype", None)
 

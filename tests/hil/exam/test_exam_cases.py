@@ -15,7 +15,8 @@ from hil.exam.cases import SIZES, Case, Kind, case_from_json
 from hil.exam.drawing import Composition, draw_cases
 from hil.exam.sealing import SealingOrder, effect_of, seal
 from hil.exam.sizes import EffectSize, SizeTable, load_rows, table_text
-from hil.exam.world import stored_model, stored_sizes, world_of
+from hil.exam.world import stored_model, stored_sizes
+from hil.exam.worlds import world_of
 from ident.diagnosis.names import EffectName, places_of
 from ident.effects import EFFECTS
 from ident.errors import UserError

@@ -11,8 +11,7 @@ from emulator.effects import Wanted
 from emulator.prototype import load_prototype
 from hil.exam.noise_units import Noise, SizeInNoise, size_in_noise
 from hil.exam.plans import plan_exam, plans_from_text, plans_text
-from hil.exam.quiet import drive_quietly
-from hil.exam.world import world_of
+from hil.exam.worlds import world_of
 from ident.campaign.plan import Plan
 from ident.effects.text import parse_effect
 from ident.estimate.equations import usable_equations
@@ -33,13 +32,13 @@ def plan() -> Plan:
 
 @pytest.fixture(scope="module")
 def plain(plan: Plan) -> Record:
-    return drive_quietly(plan, PROTOTYPE, ())
+    return PROTOTYPE.drive_quietly(plan, ())
 
 
 def size(plan: Plan, plain: Record, *effects: Wanted) -> SizeInNoise:
     steps = {"steering_left": "alpha_l", "steering_right": "alpha_r", "straight": "x", "rotation": "gamma"}
     noise = Noise({(step, name): 1.0 for step, name in steps.items()}, {step: np.ones(8) for step in steps})
-    changed = drive_quietly(plan, PROTOTYPE, effects)
+    changed = PROTOTYPE.drive_quietly(plan, effects)
     return size_in_noise(noise, plain, changed, load_prototype().truth.values, plan.vehicle.geometry)
 
 

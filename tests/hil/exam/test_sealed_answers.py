@@ -20,7 +20,8 @@ from hil.exam.key import Key, make_key, read_key
 from hil.exam.lots import lots_of_key, lots_of_seed
 from hil.exam.sealing import SealingOrder, seal
 from hil.exam.sizes import SizeTable
-from hil.exam.world import World, world_of
+from hil.exam.world import World
+from hil.exam.worlds import world_of
 from ident.errors import UserError
 from ident.writing import write_whole
 
