@@ -166,7 +166,7 @@ def _row(probe: Probe, channel: str, points: Points) -> EffectSize:
 
 
 def _shown_in(probe: Probe, measured: Sequence[SizeInNoise]) -> str | None:
-    """The channel that shows the effect best at the first size; None where it shows too little, or stops the vehicle."""
+    """The channel that shows the effect best at the first size; None where none shows it, or it stops the vehicle."""
     if not measured:
         return None
     channels = ["drift"] if probe.name in DRIFTS else ["torque"]
