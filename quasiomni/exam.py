@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +10,7 @@ import numpy as np
 import typer
 
 from hil.exam.answer_file import open_cases
-from hil.exam.drawing import Composition
+from hil.exam.drawing import Composition, composition_of
 from hil.exam.folder import ExamFolder
 from hil.exam.score_figures import confusion_svg, reliability_svg
 from hil.exam.score_report import score_exams, score_json, score_markdown, summary_lines
@@ -37,9 +38,7 @@ FolderArgument = Annotated[Path, typer.Argument(help="Folder of the exam.")]
 
 SourceOption = Annotated[
     Source,
-    typer.Option(
-        help="What drives the cases: the emulated vehicle, or one that shares no code with emulator and model."
-    ),
+    typer.Option(help="What drives the cases: the emulated vehicle, one that shares no code with it, or servo axes."),
 ]
 
 _DEFAULT = Composition()
@@ -59,10 +58,19 @@ def seal(
     effects: Annotated[int, typer.Option(min=0, help="Cases with one effect of the library.")] = _DEFAULT.effects,
     pairs: Annotated[int, typer.Option(min=0, help="Cases with two.")] = _DEFAULT.pairs,
     none: Annotated[int, typer.Option(min=0, help="Cases without any.")] = _DEFAULT.none,
-    unknown: Annotated[int, typer.Option(min=0, help="Cases with one the library lacks.")] = _DEFAULT.unknown,
-    invisible: Annotated[int, typer.Option(min=0, help="Cases with one below the noise.")] = _DEFAULT.invisible,
+    unknown: Annotated[
+        int | None,
+        typer.Option(min=0, help="Cases with one the library lacks. Default: 40, none of a source without them."),
+    ] = None,
+    invisible: Annotated[
+        int | None,
+        typer.Option(min=0, help="Cases with one below the noise. Default: 24, none of a source without them."),
+    ] = None,
     laws: Annotated[int, typer.Option(min=0, help="Cases with a law that has no name.")] = _DEFAULT.laws,
-    faults: Annotated[int, typer.Option(min=0, help="Cases whose records are at fault.")] = _DEFAULT.faults,
+    faults: Annotated[
+        int | None,
+        typer.Option(min=0, help="Cases whose records are at fault. Default: 16, none of a source without them."),
+    ] = None,
     excitations: Annotated[
         int, typer.Option(min=1, help="Pairs of campaigns, to fit and to confirm, that the cases share.")
     ] = _DEFAULT.excitations,
@@ -80,19 +88,29 @@ def seal(
     scheduler: SchedulerOption = None,
 ) -> None:
     """Draw cases from a secret, drive them, write records and the sealed answer; goes on where it stopped."""
-    load_emulation()
     require(Extra.EXAM, "exam seal", () if key is not None else ("pyarrow",))
     _require_cluster(scheduler)
-    from hil.exam.sealing import SealingOrder, seal
-    from hil.exam.world import stored_model, stored_sizes
-    from hil.exam.worlds import world_of
+    counts = {"effects": effects, "pairs": pairs, "none": none, "unknown": unknown, "invisible": invisible}
+    composition = composition_of(source, counts | {"laws": laws, "faults": faults, "excitations": excitations})
+    if source is Source.AXES:
+        _refuse_of_axes({"--vehicle": vehicle != "prototype", "--engine": engine, "--sizes": sizes, "--model": model})
+        from hil.exam.axes.sealing import seal_axes
+        from hil.exam.order import Order
 
-    world = world_of(vehicle, engine, source)
-    table = load_sizes(stored_sizes(world, sizes))
-    composition = Composition(effects, pairs, none, unknown, invisible, laws, faults, excitations)
-    order = SealingOrder(out, world, stored_model(world, model), composition, key, first_seed, jobs, scheduler)
-    with bar("sealing") as shown:
-        sealed = seal(order, table, shown)
+        with bar("sealing") as shown:
+            sealed = seal_axes(Order(out, composition, key, first_seed, jobs, scheduler), shown)
+    else:
+        load_emulation()
+        from hil.exam.order import VehicleOrder
+        from hil.exam.sealing import seal
+        from hil.exam.world import stored_model, stored_sizes
+        from hil.exam.worlds import world_of
+
+        world = world_of(vehicle, engine, source)
+        table, judged = load_sizes(stored_sizes(world, sizes)), stored_model(world, model)
+        with bar("sealing") as shown:
+            order = VehicleOrder(out, composition, key, first_seed, jobs, scheduler, world, judged)
+            sealed = seal(order, table, shown)
     undriven = sum(ExamFolder(out).undriven(name).is_file() for name in sealed.identifiers)
     if undriven:
         console.print(f"{undriven} cases stopped the campaign and have no records.", style="yellow")
@@ -102,6 +120,12 @@ def seal(
     else:
         console.print(f"Not sealed: all cases follow from seed {first_seed}.", style="yellow", highlight=False)
     show_next(f"quasiomni exam diagnose {out}")
+
+
+def _refuse_of_axes(given: Mapping[str, object]) -> None:
+    named = next((option for option, value in given.items() if value), None)
+    if named is not None:
+        raise UserError(f"An exam of axes draws its machines, and takes no {named}.", f"Leave {named} out.")
 
 
 @exam.command()
@@ -143,6 +167,8 @@ def calibrate(
     from hil.exam.probes import EVERY
     from hil.exam.worlds import world_of
 
+    if source is Source.AXES:
+        raise UserError("Sizes of axes are measured on each drawn machine.", "Nothing needs to be calibrated for them.")
     strangers = sorted(set(effect or ()) - EVERY)
     if strangers:
         raise UserError(f"No effect is called {strangers[0]}.", f"Name some of {', '.join(sorted(EVERY))}.")

@@ -14,13 +14,17 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any, Final
 
+from hil.exam.axes.record_bytes import axis_record_of
 from hil.exam.folder import RECORDS, ExamFolder, read_exam
 from hil.exam.record_bytes import record_from_bytes
 from hil.exam.workers import run_all
 from ident.diagnosis.alone import closed_alone
+from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.diagnosis import faulty
+from ident.diagnosis.findings import Findings
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.vehicle.diagnose import VehicleDiagnosis, diagnose_vehicle
+from ident.diagnosis.problem import Problem
+from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.errors import UserError
 from ident.faults import sure_faults
 from ident.parameters_file import read_model
@@ -96,23 +100,29 @@ def diagnose_exam(
         )
     asked = [identifier for identifier in there if removed is None or identifier in removed]
     left = [identifier for identifier in asked if not folder.diagnosis(identifier, removed is not None).is_file()]
-    vehicle, model = (path.read_text(encoding="utf-8") for path in (folder.vehicle, folder.model))
-    tasks = (
-        (
-            identifier,
-            *(folder.record(identifier, which).read_bytes() for which in RECORDS),
-            vehicle,
-            model,
-            (removed or {}).get(identifier),
-        )
-        for identifier in left
-    )
+    task = _axis_task(folder, removed or {}) if exam.of_axes else _vehicle_task(folder, removed or {})
+    function = diagnose_axis_case if exam.of_axes else diagnose_case
     progress(len(asked) - len(left), len(asked))
     for done, (identifier, content) in enumerate(
-        run_all(diagnose_case, tasks, jobs=jobs, scheduler=scheduler), len(asked) - len(left) + 1
+        run_all(function, map(task, left), jobs=jobs, scheduler=scheduler), len(asked) - len(left) + 1
     ):
         write_whole(content, folder.diagnosis(identifier, removed is not None))
         progress(done, len(asked))
+
+
+def _vehicle_task(folder: ExamFolder, removed: Mapping[str, str]) -> Callable[[str], tuple[Any, ...]]:
+    """Arguments of `diagnose_case` for a case."""
+    described = [path.read_text(encoding="utf-8") for path in (folder.vehicle, folder.model)]
+    return lambda identifier: (identifier, *_both(folder, identifier), *described, removed.get(identifier))
+
+
+def _axis_task(folder: ExamFolder, removed: Mapping[str, str]) -> Callable[[str], tuple[Any, ...]]:
+    """Arguments of `diagnose_axis_case` for a case."""
+    return lambda identifier: (identifier, *_both(folder, identifier), removed.get(identifier))
+
+
+def _both(folder: ExamFolder, identifier: str) -> tuple[bytes, ...]:
+    return tuple(folder.record(identifier, which).read_bytes() for which in RECORDS)
 
 
 def refuse_undiagnosed(folder: ExamFolder, identifiers: Sequence[str]) -> None:
@@ -149,26 +159,44 @@ def diagnose_case(
         for file, text in zip(files, (vehicle, model), strict=True):
             file.write_text(text, encoding="utf-8")
         described, judged = load_vehicle(files[0]), read_model(files[1])
-    started = time.process_time()
     effects = [name for name in EffectName if name != removed]
-    try:
+
+    def answer() -> dict[str, Any]:
         records = [record_from_bytes(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
         faults = sure_faults(records, described)
         if faults:
-            content = {**faulty(faults).as_json(), "seconds": time.process_time() - started}
-            return identifier, json.dumps(content).encode()
+            return faulty(faults).as_json()
         found = diagnose_vehicle(records[:1], records[1:], described, judged, effects=effects)
-        content = {**found.diagnosis.as_json(), "seconds": time.process_time() - started}
-        content |= {} if removed else {"alone": _alone(found)}
+        return found.diagnosis.as_json() | ({} if removed else {"alone": _alone(found.findings, found.problems)})
+
+    return identifier, _timed(answer)
+
+
+def diagnose_axis_case(identifier: str, fit: bytes, confirm: bytes, removed: str | None) -> tuple[str, bytes]:
+    """The same of a case of an axis."""
+    forbid_emulator()
+
+    def answer() -> dict[str, Any]:
+        records = [axis_record_of(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
+        found = diagnose_axis(records[:1], records[1:], seed=1, lacking=() if removed is None else (removed,))
+        return found.diagnosis().as_json()
+
+    return identifier, _timed(answer)
+
+
+def _timed(answer: Callable[[], dict[str, Any]]) -> bytes:
+    """An answer with its processor time; one case that fails must not end an exam of hours, and counts as wrong."""
+    started = time.process_time()
+    try:
+        content = answer()
     except (ArithmeticError, ValueError, UserError) as error:
-        # One case that fails must not end an exam of hours; it counts as a wrong answer.
-        content = {**_FAILED, "seconds": time.process_time() - started, "error": repr(error)}
-    return identifier, json.dumps(content).encode()
+        content = {**_FAILED, "error": repr(error)}
+    return json.dumps({**content, "seconds": time.process_time() - started}).encode()
 
 
-def _alone(found: VehicleDiagnosis) -> list[dict[str, Any]]:
-    keys = [cause.candidate.key for cause in found.findings.causes]
+def _alone(findings: Findings, problems: Sequence[Problem]) -> list[dict[str, Any]]:
+    keys = [cause.candidate.key for cause in findings.causes]
     return [
         {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in vars(one).items()}
-        for one in closed_alone(found.findings, found.problems, keys)
+        for one in closed_alone(findings, problems, keys)
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -13,6 +13,7 @@ from hil.exam.cases import SIZES, Case, Injected, Kind
 from hil.exam.corruptions import draw_corruption
 from hil.exam.drawn_laws import draw_laws
 from hil.exam.sizes import EffectSize, SizeTable
+from hil.exam.sources import Source
 from ident.errors import UserError
 
 UNKNOWN_SIZES: Final = (0.5, 1.0, 2.0)
@@ -63,6 +64,25 @@ class Composition:
         return min(self.excitations, self.total)
 
 
+ABSENT: Final[Mapping[Source, tuple[str, ...]]] = {
+    Source.EMULATOR: (),
+    Source.FIRST_PRINCIPLES: ("unknown",),
+    Source.AXES: ("unknown", "invisible", "faults"),
+}
+"""Kinds of cases that a source does not have."""
+
+
+def composition_of(source: Source, given: Mapping[str, int | None]) -> Composition:
+    """What is asked for, and what a source has by default of all that is not.
+
+    Args:
+        source: what drives the cases.
+        given: number by kind, as the fields of `Composition`; None where nothing was asked for.
+    """
+    absent = dict.fromkeys(ABSENT[source], 0)
+    return replace(Composition(**absent), **{kind: count for kind, count in given.items() if count is not None})
+
+
 def draw_cases(
     table: SizeTable,
     composition: Composition,
@@ -92,7 +112,7 @@ def draw_cases(
         *_faults(composition.faults, generator),
     ]
     order = generator.permutation(len(questions))
-    identifiers = _identifiers(len(questions), names or generator)
+    identifiers = identifiers_of(len(questions), names or generator)
     cases = []
     for number, (position, identifier) in enumerate(zip(order.tolist(), identifiers, strict=True)):
         kind, effects, noise_units = questions[position]
@@ -103,7 +123,8 @@ def draw_cases(
 _Question = tuple[Kind, tuple[Injected, ...], float]
 
 
-def _identifiers(count: int, generator: np.random.Generator) -> list[str]:
+def identifiers_of(count: int, generator: np.random.Generator) -> list[str]:
+    """Names of cases, which tell nothing."""
     found: dict[str, None] = {}
     while len(found) < count:
         found[generator.bytes(6).hex()] = None

@@ -24,6 +24,9 @@ from ident.writing import write_whole
 SCHEMA: Final = "quasiomni.exam/4"
 RECORDS: Final = ("fit", "confirm")
 
+AXES: Final = "drawn axes"
+"""What stands for the vehicle of an exam of axes, each of another machine."""
+
 
 @dataclass(frozen=True)
 class ExamFolder:
@@ -101,6 +104,11 @@ class Exam:
     def world(self) -> str:
         """Vehicle and engine in words."""
         return f"{self.vehicle} in {self.engine}"
+
+    @property
+    def of_axes(self) -> bool:
+        """Whether its records are of servo axes."""
+        return self.vehicle == AXES
 
     @property
     def sealed(self) -> bool:

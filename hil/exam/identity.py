@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from hil.exam.axes.drawing import MACHINES
 from hil.exam.cases import Case, Injected
 from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.plans import plans_from_text
@@ -90,8 +91,12 @@ class Identities:
 
 
 def exam_identities(folder: ExamFolder) -> tuple[Identities, ...]:
-    """Identities in every pair of campaigns of an exam, from its plans, its vehicle and its model."""
-    exam, vehicle, model = read_exam(folder), load_vehicle(folder.vehicle), read_model(folder.model)
+    """Identities by `Case.excitation` of an exam, from its plans, its vehicle and its model."""
+    exam = read_exam(folder)
+    if exam.of_axes:
+        # What is drawn for them is all of one place, and of names that a motion at many speeds tells apart.
+        return (Identities({}),) * MACHINES
+    vehicle, model = load_vehicle(folder.vehicle), read_model(folder.model)
     found = []
     for text in exam.plans:
         plans = plans_from_text(text, vehicle, exam.cycle)

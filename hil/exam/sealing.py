@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 import secrets
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from emulator.effects import INJECTORS, Unlibraried, Wanted
 from hil.exam.answer_file import answer_hash, answer_text, key_of_exam, open_answer, undriven_text
@@ -21,6 +20,7 @@ from hil.exam.folder import RECORDS, Exam, ExamFolder, read_exam, write_exam
 from hil.exam.identity import planned_record
 from hil.exam.key import Key, make_key
 from hil.exam.lots import Lots, lots_of_key, lots_of_seed
+from hil.exam.order import Order, VehicleOrder
 from hil.exam.plans import ExamPlans, plan_exam, plans_from_text, plans_text
 from hil.exam.record_bytes import record_bytes
 from hil.exam.sizes import SizeTable
@@ -42,32 +42,7 @@ SALT: Final = 16
 _EPOCH: Final = (0, 0)
 
 
-@dataclass(frozen=True)
-class SealingOrder:
-    """An exam as it is asked for.
-
-    Attributes:
-        out: folder.
-        world: vehicle and engine.
-        model: file of the model under test.
-        composition: how many cases of each kind.
-        key: file of the secret that everything is drawn from, made where it is missing; None: not sealed.
-        first_seed: without a key, the first of the noise, two a case, of the excitations, and of everything drawn.
-        jobs: processes on this machine.
-        scheduler: of a Dask cluster, None for this machine.
-    """
-
-    out: Path
-    world: World
-    model: Path
-    composition: Composition
-    key: Path | None
-    first_seed: int | None
-    jobs: int
-    scheduler: str | None
-
-
-def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
+def seal(order: VehicleOrder, table: SizeTable, progress: Progress) -> Exam:
     """Seal an exam, or go on with one that was stopped.
 
     A case whose effects stop the campaign has no records: what was wrong is sealed with the answer.
@@ -77,23 +52,55 @@ def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
             folder holds another exam.
         DataFileError: vehicle or model cannot be read.
     """
-    _refuse_impossible(order)
+    refuse_impossible(order)
     folder = ExamFolder(order.out)
     # The excitations take minutes before the first case is done.
     progress(0, order.composition.total)
     if not folder.manifest.is_file():
         _draw(folder, order, table)
     exam = read_exam(folder)
-    _refuse_other_lots(exam, order)
+    refuse_other_lots(exam, order)
     key = key_of_exam(folder, exam, order.key)
     cases = open_answer(folder, exam, key)
-    _refuse_other(cases, exam, order)
+    refuse_other_cases(cases, exam, order, (order.world.vehicle, order.world.engine, order.composition.driven))
     _refuse_other_files(folder, order)
+    drive_left(
+        folder,
+        exam,
+        key,
+        cases,
+        drive_case,
+        lambda case: (exam.plans[case.excitation], order.world, exam.cycle, case),
+        order,
+        progress,
+    )
+    return exam
+
+
+def drive_left(
+    folder: ExamFolder,
+    exam: Exam,
+    key: Key | None,
+    cases: Sequence[Case],
+    driven: Callable[..., tuple[str, tuple[bytes, bytes] | str]],
+    task: Callable[[Case], tuple[Any, ...]],
+    order: Order,
+    progress: Progress,
+) -> None:
+    """Write the records of all cases that have none, and why where there can be none.
+
+    Args:
+        folder, exam, key: of the exam.
+        cases: all of them.
+        driven: makes the records of a case, in a worker.
+        task: its arguments.
+        order: says on how many processes.
+        progress: told how far it is.
+    """
     left = [case for case in cases if not _finished(folder, case.identifier)]
-    tasks = [(exam.plans[case.excitation], order.world, exam.cycle, case) for case in left]
     done = len(cases) - len(left)
     progress(done, len(cases))
-    for identifier, contents in run_all(drive_case, tasks, jobs=order.jobs, scheduler=order.scheduler):
+    for identifier, contents in run_all(driven, map(task, left), jobs=order.jobs, scheduler=order.scheduler):
         if isinstance(contents, str):
             write_whole(undriven_text(identifier, contents, exam, key), folder.undriven(identifier))
         else:
@@ -102,10 +109,10 @@ def seal(order: SealingOrder, table: SizeTable, progress: Progress) -> Exam:
         progress(done, len(cases))
     if left:
         _hide_order(folder, exam)
-    return exam
 
 
-def _refuse_impossible(order: SealingOrder) -> None:
+def refuse_impossible(order: Order) -> None:
+    """Refuse an exam without cases, and one that is drawn from nothing, or from two things."""
     if not order.composition.total:
         raise UserError("An exam without cases is none.", "Ask for some: --effects, --none, --unknown.")
     if (order.key is None) == (order.first_seed is None):
@@ -169,7 +176,7 @@ def _plans(text: str, vehicle: str, cycle: float) -> ExamPlans:
     return plans_from_text(text, load_vehicle(vehicle), cycle)
 
 
-def _draw(folder: ExamFolder, order: SealingOrder, table: SizeTable) -> None:
+def _draw(folder: ExamFolder, order: VehicleOrder, table: SizeTable) -> None:
     """Everything but the records."""
     read_model(order.model)  # Whether it is one must show now, not when the exam is diagnosed.
     cycle = load_network(order.world.network_file).cycle_period
@@ -194,14 +201,14 @@ def _draw(folder: ExamFolder, order: SealingOrder, table: SizeTable) -> None:
     write_exam(folder, replace(exam, answer_hash=answer_hash(answer)))
 
 
-def _lots(order: SealingOrder, key: Key | None, salt: bytes) -> Lots:
+def _lots(order: VehicleOrder, key: Key | None, salt: bytes) -> Lots:
     if key is not None:
         return lots_of_key(key, salt)
     assert order.first_seed is not None
     return lots_of_seed(order.first_seed)
 
 
-def _draw_plans(order: SealingOrder, lots: Lots, cycle: float) -> tuple[str, ...]:
+def _draw_plans(order: VehicleOrder, lots: Lots, cycle: float) -> tuple[str, ...]:
     tasks = [
         (number, order.world.vehicle, lots.excitation(number), cycle) for number in range(order.composition.driven)
     ]
@@ -213,7 +220,8 @@ def draw_plans(number: int, vehicle: str, seed: int, cycle: float) -> tuple[int,
     return number, plans_text(plan_exam(load_vehicle(vehicle), seed, cycle))
 
 
-def _refuse_other_lots(exam: Exam, order: SealingOrder) -> None:
+def refuse_other_lots(exam: Exam, order: Order) -> None:
+    """Refuse to go on with an exam that was drawn from something else."""
     if exam.sealed and order.key is None:
         raise UserError(
             f"{order.out} holds a sealed exam.", "Go on with its key (--key), or name another folder (--out)."
@@ -225,11 +233,11 @@ def _refuse_other_lots(exam: Exam, order: SealingOrder) -> None:
         )
 
 
-def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
+def refuse_other_cases(cases: Sequence[Case], exam: Exam, order: Order, world: tuple[str, str, int]) -> None:
+    """Refuse to go on with an exam of another composition, or another world: its vehicle, engine and excitations."""
     wanted = order.composition
     held = Counter(case.kind for case in cases)
-    ours = (order.world.vehicle, order.world.engine, wanted.driven, Counter(wanted.asked))
-    if (exam.vehicle, exam.engine, len(exam.plans), held) != ours:
+    if (exam.vehicle, exam.engine, len(exam.plans), held) != (*world, Counter(wanted.asked)):
         kinds = ", ".join(f"{held[kind]} {kind}" for kind in wanted.asked)
         raise UserError(
             f"{order.out} holds another exam: {kinds} of {exam.world} on {len(exam.plans)} excitations.",
@@ -237,7 +245,7 @@ def _refuse_other(cases: list[Case], exam: Exam, order: SealingOrder) -> None:
         )
 
 
-def _refuse_other_files(folder: ExamFolder, order: SealingOrder) -> None:
+def _refuse_other_files(folder: ExamFolder, order: VehicleOrder) -> None:
     """The cases that are left are driven with the vehicle file of the order, not with its copy in the folder."""
     for asked, held in (
         (find_data_file("ident.vehicle", order.world.vehicle), folder.vehicle),

@@ -10,3 +10,4 @@ class Source(enum.StrEnum):
 
     EMULATOR = "emulator"
     FIRST_PRINCIPLES = "first_principles"
+    AXES = "axes"

@@ -60,11 +60,11 @@ def draw_axis(seed: int, lacking: Lacking | None = None) -> DrawnAxis:
     generator = np.random.default_rng([seed, 0])
     causes = list(Lacking)
     cause = lacking or causes[int(generator.integers(len(causes)))]
-    machine = _machine(generator)
+    machine = draw_machine(generator)
     return _DRAWN[cause](machine, generator)
 
 
-def _machine(generator: Generator) -> Machine:
+def draw_machine(generator: Generator) -> Machine:
     """One that the model describes: mass, friction, gains, rates and noise of usual carriages."""
     rate = float(generator.choice([250.0, 500.0, 1000.0, 2000.0]))
     mass, speed = float(generator.uniform(5, 50)), float(np.exp(generator.uniform(math.log(0.1), math.log(0.5))))
@@ -124,28 +124,28 @@ def _delay(machine: Machine, generator: Generator) -> DrawnAxis:
     return DrawnAxis(replace(machine, delay=delay), Lacking.DELAY, delay)
 
 
-def _reach(machine: Machine) -> float:
+def reach_of(machine: Machine) -> float:
     """How far a stroke goes [m]."""
     return machine.speeds[-1] * machine.duration / machine.strokes
 
 
 def _spring(machine: Machine, generator: Generator) -> DrawnAxis:
     size, phase = 2 * _size(generator), float(generator.uniform(0, 2 * math.pi))
-    order = float(generator.uniform(0.5, 2.0)) * math.pi / _reach(machine)
+    order = float(generator.uniform(0.5, 2.0)) * math.pi / reach_of(machine)
     force = size * machine.coulomb
     return _forced(machine, lambda _t, x, _v: force * math.sin(order * x + phase), Lacking.SPRING, size)
 
 
 def _ripple(machine: Machine, generator: Generator) -> DrawnAxis:
     size, phase = _size(generator), float(generator.uniform(0, 2 * math.pi))
-    order = 2 * math.pi * float(generator.uniform(3.0, 12.0)) / _reach(machine)
+    order = 2 * math.pi * float(generator.uniform(3.0, 12.0)) / reach_of(machine)
     force = size * machine.coulomb
     return _forced(machine, lambda _t, x, _v: force * math.sin(order * x + phase), Lacking.RIPPLE, size)
 
 
 def _friction(machine: Machine, generator: Generator) -> DrawnAxis:
     size, phase = 2 * _size(generator), float(generator.uniform(0, 2 * math.pi))
-    order = float(generator.uniform(0.5, 2.0)) * math.pi / _reach(machine)
+    order = float(generator.uniform(0.5, 2.0)) * math.pi / reach_of(machine)
     force = size * machine.coulomb
     return _forced(
         machine,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -11,6 +11,7 @@ from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_oth
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judge import judge
 from ident.diagnosis.limits import Limits
+from ident.diagnosis.problem import Problem
 from ident.diagnosis.split import split_problem
 from ident.records.axis_record import AxisRecord
 from ident.stages import Stage, untold
@@ -26,6 +27,7 @@ def diagnose_axis(
     *,
     seed: int,
     cutoff: float | None = None,
+    lacking: Collection[str] = (),
     stage: Stage = untold,
 ) -> Findings:
     """What the model M a + Fv v + Fc sign(v) + offset lacks.
@@ -35,6 +37,7 @@ def diagnose_axis(
         confirm: independent records of the same axes; none: a part of `fit` confirms.
         seed: of the surrogates.
         cutoff: of the position filter [rad/s]; None: chosen from the records.
+        lacking: names of effects that are not looked for.
         stage: told what begins.
 
     Raises:
@@ -44,19 +47,21 @@ def diagnose_axis(
     refuse_other_axes([*fit, *confirm])
     stage("filter of the records")
     reference = axis_reference(fit, cutoff, confirm)
-    findings = _judged(fit, confirm, reference, seed, stage)
+
+    def judged(reference: Reference) -> Findings:
+        fitted = _without(axis_problem(fit, reference), lacking)
+        pair = (fitted, _without(axis_problem(confirm, reference), lacking)) if confirm else split_problem(fitted)
+        return judge(*pair, seed=seed, limits=LIMITS, stage=stage)
+
+    findings = judged(reference)
     late = delayed_axes(findings.after, findings.problem, fit[0].axes, reference.scales)
     if not any(late):
         return findings
     pairs = zip(reference.scales, late, strict=True)
     scales = tuple(replace(scale, hold=None) if delayed else scale for scale, delayed in pairs)
     stage("again, an axis being late")
-    return _judged(fit, confirm, replace(reference, scales=scales), seed, stage)
+    return judged(replace(reference, scales=scales))
 
 
-def _judged(
-    fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord], reference: Reference, seed: int, stage: Stage
-) -> Findings:
-    fitted = axis_problem(fit, reference)
-    pair = (fitted, axis_problem(confirm, reference)) if confirm else split_problem(fitted)
-    return judge(*pair, seed=seed, limits=LIMITS, stage=stage)
+def _without(problem: Problem, names: Collection[str]) -> Problem:
+    return replace(problem, candidates=tuple(one for one in problem.candidates if one.effect not in names))

@@ -13,7 +13,8 @@ from emulator.effects import inject
 from emulator.prototype import load_prototype
 from hil.exam.cases import SIZES, Case, Kind, case_from_json
 from hil.exam.drawing import Composition, draw_cases
-from hil.exam.sealing import SealingOrder, effect_of, seal
+from hil.exam.order import VehicleOrder
+from hil.exam.sealing import effect_of, seal
 from hil.exam.sizes import EffectSize, SizeTable, load_rows, table_text
 from hil.exam.world import stored_model, stored_sizes
 from hil.exam.worlds import world_of
@@ -154,8 +155,8 @@ def test_an_exam_has_no_more_excitations_than_cases(table: SizeTable) -> None:
 
 
 def test_an_exam_without_cases_is_refused_before_anything_is_planned(table: SizeTable, tmp_path: Path) -> None:
-    order = SealingOrder(
-        tmp_path / "exam", PROTOTYPE, PROTOTYPE.model_file, Composition(0, 0, 0, 0, 0, 0, 0), None, 1, 1, None
+    order = VehicleOrder(
+        tmp_path / "exam", Composition(0, 0, 0, 0, 0, 0, 0), None, 1, 1, None, PROTOTYPE, PROTOTYPE.model_file
     )
     with pytest.raises(UserError, match="without cases"):
         seal(order, table, lambda *_: None)

@@ -18,7 +18,8 @@ from hil.exam.drawing import Composition, draw_cases
 from hil.exam.folder import Exam, ExamFolder, read_exam, write_exam
 from hil.exam.key import Key, make_key, read_key
 from hil.exam.lots import lots_of_key, lots_of_seed
-from hil.exam.sealing import SealingOrder, seal
+from hil.exam.order import VehicleOrder
+from hil.exam.sealing import seal
 from hil.exam.sizes import SizeTable
 from hil.exam.world import World
 from hil.exam.worlds import world_of
@@ -236,11 +237,11 @@ def test_candidates_are_left_out_once_all_cases_are_diagnosed(folder: ExamFolder
     refuse_undiagnosed(folder, ["a", "b"])
 
 
-def ordered(folder: ExamFolder, key: Path | None, first_seed: int | None) -> SealingOrder:
-    return SealingOrder(folder.path, PROTOTYPE, PROTOTYPE.model_file, FEW, key, first_seed, 1, None)
+def ordered(folder: ExamFolder, key: Path | None, first_seed: int | None) -> VehicleOrder:
+    return VehicleOrder(folder.path, FEW, key, first_seed, 1, None, PROTOTYPE, PROTOTYPE.model_file)
 
 
-def sealed_without_driving(order: SealingOrder, table: SizeTable, monkeypatch: pytest.MonkeyPatch) -> Exam:
+def sealed_without_driving(order: VehicleOrder, table: SizeTable, monkeypatch: pytest.MonkeyPatch) -> Exam:
     """Seals with excitations and records that nobody waits for."""
 
     def plans(number: int, *_: object) -> tuple[int, str]:
