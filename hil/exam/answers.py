@@ -14,6 +14,7 @@ from hil.exam.identity import Identity
 from hil.exam.said import Said
 from hil.exam.statistics import Z95
 from ident.diagnosis.findings import LAW
+from ident.diagnosis.functions import function_of
 from ident.diagnosis.vehicle.library import DRIFTS, SHAPES
 
 CONFIDENT: Final = 0.5
@@ -207,15 +208,23 @@ class Answer:
     def law_variable(self) -> bool:
         """The law is said to depend on what it does, or on what these records do not tell from it.
 
-        A name is as good where it closes all but what a cosine of ALIKE leaves: the shape drawn is near one.
+        A name is as good where it closes all but what a cosine of ALIKE leaves: the shape drawn is near one. So are
+        several, where each is a function of that variable at that place, and together they close as much.
         """
         if not self.said.effects:
             return False
-        first = self.said.effects[0]
+        first, variable = self.said.effects[0], LAW_VARIABLES[self.single.name]
         if first.get("law") is None:
-            return self.law_place and float(first["gap_closed_held_out"] or 0.0) >= ALIKE**2
+            near = float(first["gap_closed_held_out"] or 0.0) >= ALIKE**2
+            return self.law_place and (near or (self.said.closed >= ALIKE**2 and self._all_over(variable)))
         told = {first["law"]["variable"], *(other.get("variable") for other in first.get("alternatives", ()))}
-        return self.law_place and LAW_VARIABLES[self.single.name] in told
+        return self.law_place and variable in told
+
+    def _all_over(self, variable: str) -> bool:
+        """Whether every name is a function of that variable, at the joint of the case."""
+        functions = [function_of(str(effect["name"])) for effect in self.said.effects]
+        there = all(_corner(str(effect["where"])) == _corner(self.single.where) for effect in self.said.effects)
+        return there and all(over is not None and over[0] == variable for over in functions)
 
     @property
     def _places(self) -> list[str]:

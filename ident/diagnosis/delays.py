@@ -1,4 +1,4 @@
-"""A series as it was some time before, or before a filter, by its spectrum; and what of a delay is sampling."""
+"""A series as it was some time before, or before a filter, or behind a spring, by its spectrum; what sampling does."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 LED_BACK: Final = 1000
 """Samples at least over which a series is led back to its start before its spectrum is turned."""
 
+DAMPING: Final = 0.05
+"""Of what is behind a spring, over the critical damping: that of steel and screwed joints."""
+
 HELD: Final = 0.55
 """Sample intervals up to which a lag is no delay: half of one is what holding a torque over the interval does."""
 
@@ -26,6 +29,22 @@ def delayed(series: Array, delay: float, sample_time: float) -> Array:
 def led(series: Array, time: float, sample_time: float) -> Array:
     """A series (N,) before a filter of first order, as it must have been: u + T u', by its spectrum."""
     return _answered(series, sample_time, lambda angular: 1 + 1j * angular * time)
+
+
+def sprung(series: Array, resonance: float, sample_time: float) -> Array:
+    """Second derivative of a series (N,), with a minus, behind a spring: ω² over 1 - (ω/ω_a)² + 2iζ ω/ω_a.
+
+    Args:
+        series: as it is before.
+        resonance: ω_a of what is behind the spring, with the front held [rad/s].
+        sample_time: [s].
+    """
+
+    def response(angular: Array) -> NDArray[np.complex128]:
+        share = angular / resonance
+        return np.asarray(angular**2 / (1 - share**2 + 2j * DAMPING * share), dtype=np.complex128)
+
+    return _answered(series, sample_time, response)
 
 
 def _answered(

@@ -81,24 +81,26 @@ class Judgement:
         """Of an explanation: log of the held-out gap that it leaves, and what its causes cost, and their number.
 
         A law, which can be anything, costs more than a name, which says more; what nobody knows costs as much as a law.
+        The gap is what lies above the noise, beside what no record tells from noise: what is closed of a small gap
+        counts as much as of a large one.
 
         Args:
             floors: noise of every block, the same for all explanations that are compared.
             labels: of the blocks in which some of them act: the others say nothing for or against any.
         """
-        laws = len(self.laws)
+        laws = sum(self._law(index) is not None for index in range(self.fitted.count))
         unknown = self._verdict() is Verdict.UNKNOWN
         price = self.limits.law * (laws + unknown) + self.limits.name * (self.fitted.count - laws)
-        left = self.fitted.measured(floors, labels).after
-        return round(50 * (math.log(max(left, 1.0)) + price)) / 50, self.fitted.count
+        above = max(self.fitted.measured(floors, labels).after ** 2 - 1, 0.0)
+        return round(50 * (math.log(above + self.limits.measurable) / 2 + price)) / 50, self.fitted.count
 
     def refuted(self) -> frozenset[str]:
         """Effects of no size of which another candidate is what comes along with them, and those that are none."""
         keys = {candidate.key for candidate in self.problems[0].candidates if not candidate.excluded}
         sizeless = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._sizeless(index)]
-        outside = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._outside(index)]
+        none = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._nothing(index)]
         return frozenset(
-            [*(one.key for one in sizeless if f"{one.along}@{one.where}" in keys), *(one.key for one in outside)]
+            [*(one.key for one in sizeless if f"{one.along}@{one.where}" in keys), *(one.key for one in none)]
         )
 
     def worthwhile(self) -> tuple[int, ...]:
@@ -118,7 +120,7 @@ class Judgement:
                 return self.fitted.others(min(superfluous, key=lambda index: closed[index]))
         others = [index for index in range(self.fitted.count) if index != self._strongest] if closed else []
         for index in others:
-            if self._sizeless(index) or self._outside(index):
+            if self._sizeless(index) or self._nothing(index):
                 return self.fitted.others(index)
         least = min(others, key=lambda index: closed[index], default=None)
         if least is not None and self._measurable() and closed[least] < self.limits.improvement:
@@ -160,7 +162,7 @@ class Judgement:
             return Verdict.UNKNOWN if left else Verdict.NONE
         unexplained = self._predictable() and self._explained() < self.limits.explained
         strange = unexplained or self._lasting() or self._foreign() or self._unsteady() or self._tangled()
-        another = self._sizeless(self._strongest) or self._outside(self._strongest)
+        another = self._sizeless(self._strongest) or self._nothing(self._strongest)
         return Verdict.UNKNOWN if strange or another or self._short() else Verdict.EFFECT
 
     def _far_off(self) -> bool:
@@ -211,10 +213,16 @@ class Judgement:
         size = np.abs(part.values) if least is None else part.values - least
         return bool(np.any(accompanied) and np.all(size < self.limits.sized * part.std))
 
-    def _outside(self, index: int) -> bool:
-        """Whether the refit has made something else of an effect: parameters that it does not have."""
-        lowest = self.fitted.candidate(index).lowest
-        return bool(lowest) and bool(np.any(np.abs(self.fitted.after.parts[index].values) < lowest))
+    def _nothing(self, index: int) -> bool:
+        """Whether the refit has made something else of an effect, or of a size that may be zero.
+
+        Something else has parameters that the effect does not have. Of linear ones any is a size, or else the first.
+        """
+        candidate, part = self.fitted.candidate(index), self.fitted.after.parts[index]
+        if candidate.lowest and bool(np.any(np.abs(part.values) < candidate.lowest)):
+            return True
+        sizes = slice(None) if candidate.contribution is None else slice(1)
+        return bool(np.all(np.abs(part.values[sizes]) < self.limits.sure_of * part.std[sizes]))
 
     @cached_property
     def _named(self) -> float:

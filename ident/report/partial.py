@@ -13,13 +13,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.axis.model import OVER as AXIS_OVER
 from ident.diagnosis.findings import Cause, Findings
+from ident.diagnosis.functions import function_of
 from ident.diagnosis.law.dependence import Basis, Dependence
 from ident.diagnosis.problem import Block, Problem
 from ident.diagnosis.remainder import noise_floors
 from ident.diagnosis.rows import Kept, Rows, make_rows
-from ident.effects import EFFECTS
 from ident.report.sketch import joint_of
 
 Array = NDArray[np.float64]
@@ -85,8 +84,7 @@ def law_points(findings: Findings, cause: Cause) -> Points | None:
 
 def effect_points(findings: Findings, cause: Cause) -> Points | None:
     """Of a named effect that is a function of one variable in these rows; None where it is none."""
-    name = str(cause.candidate.effect)
-    over = EFFECTS[name].over if name in EFFECTS else AXIS_OVER.get(name)
+    over = function_of(str(cause.candidate.effect))
     if over is None or cause.law is not None:
         return None
     places = _joints(cause.candidate.where)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -15,12 +15,15 @@ from hil.exam.axes.sizes import ruler_of
 from hil.exam.cases import SIZES, Case, Injected, Kind
 from hil.exam.drawing import LAW_SIZES, Composition, identifiers_of
 from hil.exam.lots import Lots
-from hil.exam.sources.axes import draw_machine
+from hil.exam.sources.axes import draw_machine, reach_of
 from hil.exam.sources.machine import Machine
 from ident.errors import EstimationError, UserError
 
 Spread = Callable[[Callable[..., Case], Iterable[tuple[Any, ...]]], Iterator[Case]]
 """Runs a function over tasks."""
+
+TRAVELS: Final = (1.0, 3.0)
+"""Travel of a machine over the length of a stroke, which others can be as long as."""
 
 MACHINES: Final = 20
 """Machines that are drawn at most until one can be driven with what a case asks."""
@@ -119,7 +122,9 @@ def sized_case(question: Question, identifier: str, seed: int) -> Case:
 def machine_of(seed: int, attempt: int) -> tuple[Machine, np.random.Generator]:
     """The machine of a case, without what it lacks, and what its other numbers are drawn from."""
     generator = np.random.default_rng([seed, attempt])
-    return draw_machine(generator), generator
+    machine = draw_machine(generator)
+    travel = float(generator.uniform(*TRAVELS)) * reach_of(machine)
+    return replace(machine, travel=travel), generator
 
 
 def _sized(question: Question, seed: int, attempt: int) -> tuple[Injected, ...]:

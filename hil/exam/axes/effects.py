@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from hil.exam.cases import Injected
-from hil.exam.sources.axes import reach_of
 from hil.exam.sources.machine import Machine
 
 Array = NDArray[np.float64]
@@ -87,7 +86,9 @@ def _stribeck(machine: Machine, size: float, values: Mapping[str, float]) -> Mac
 
 
 def _delay(machine: Machine, size: float, _values: Mapping[str, float]) -> Machine:
-    return replace(machine, delay=size)
+    """Of the motion behind the effort as recorded: that the effort is held and the position read is part of it."""
+    read = int(machine.read * machine.substeps) / machine.substeps
+    return replace(machine, delay=size - (0.5 - read) / machine.rate)
 
 
 def _ripple(machine: Machine, size: float, values: Mapping[str, float]) -> Machine:
@@ -136,9 +137,9 @@ def _smooth(low: float, high: float, generator: np.random.Generator) -> dict[str
 
 
 def _over_position(machine: Machine, generator: np.random.Generator) -> dict[str, float]:
-    """As far as strokes go that add up, and drift, on both sides of where they begin."""
-    reach = 1.5 * reach_of(machine)
-    return _smooth(-reach, reach, generator)
+    """Over all of its travel, and some more: the diagnosis does not know its ends."""
+    before, behind = generator.uniform(0.0, 0.5, size=2) * machine.travel
+    return _smooth(-float(before), machine.travel + float(behind), generator)
 
 
 def _over_speed(machine: Machine, generator: np.random.Generator) -> dict[str, float]:
@@ -147,7 +148,7 @@ def _over_speed(machine: Machine, generator: np.random.Generator) -> dict[str, f
 
 
 def _rippling(machine: Machine, generator: np.random.Generator) -> dict[str, float]:
-    order = float(generator.uniform(3.0, 12.0)) / reach_of(machine)
+    order = float(generator.uniform(3.0, 12.0)) / machine.travel
     return {"order": order, "phase": float(generator.uniform(0, 2 * math.pi))}
 
 

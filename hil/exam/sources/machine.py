@@ -36,6 +36,8 @@ class Machine:
         spring: between carriage and frame [N/m].
         law: force that resists beside all this [N], of time, position and velocity.
         strokes, speeds: in a period, an even number of them, and those that they are driven at [m/s].
+        travel: within which it is driven from point to point, in as many strokes as there is time for [m]; 0: it is driven
+            in strokes of one duration, wherever they lead.
         noise, encoder: rms of the noise of the measured effort [N] and of the positions [m].
     """
 
@@ -62,6 +64,7 @@ class Machine:
     repeats: int = 4
     strokes: int = 8
     speeds: tuple[float, ...] = (0.05, 0.1, 0.15, 0.2)
+    travel: float = 0.0
 
     def drive(self, seed: int) -> AxisRecord:
         """A record of `repeats` periods of a random motion."""
@@ -87,6 +90,8 @@ class Machine:
     def _reference(self, generator: np.random.Generator) -> Array:
         """Alternating strokes of various speeds, smoothed accelerations, that end where they began."""
         samples = round(self.duration * self.rate)
+        if self.travel:
+            return self._from_point_to_point(samples, generator)
         strokes = generator.choice(self.speeds, self.strokes) * np.tile([1.0, -1.0], self.strokes // 2)
         velocity = np.resize(np.repeat(strokes, samples // self.strokes), samples)
         velocity = velocity - velocity.mean()
@@ -94,6 +99,19 @@ class Machine:
         wrapped = np.concatenate([velocity, velocity, velocity])
         smooth = signal.convolve(wrapped, window / window.sum(), mode="same")[len(velocity) : 2 * len(velocity)]
         return np.tile(np.cumsum(smooth - smooth.mean()) / self.rate, self.repeats)
+
+    def _from_point_to_point(self, samples: int, generator: np.random.Generator) -> Array:
+        """The same between random points of the travel."""
+        velocity, here = np.zeros(0), 0.0
+        while len(velocity) < samples:
+            there = float(generator.uniform(0.0, self.travel))
+            speed = float(generator.choice(self.speeds))
+            stroke = np.full(round(abs(there - here) / speed * self.rate), math.copysign(speed, there - here))
+            here += float(stroke.sum()) / self.rate
+            velocity = np.append(velocity, stroke)
+        window = signal.windows.hann(round(0.15 * self.rate))
+        smooth = signal.convolve(velocity, window / window.sum())[:samples]
+        return np.tile(np.cumsum(smooth) / self.rate, self.repeats)
 
     def _integrated(self, reference: Array, other: Array) -> tuple[Array, Array]:
         step = 1 / self.rate / self.substeps
@@ -104,7 +122,8 @@ class Machine:
         x, v, z, load, load_rate = float(reference[0]), 0.0, 0.0, float(reference[0]), 0.0
         behind = self.mass * self.share if self.compliance else 0.0
         positions, efforts = np.zeros(len(reference)), np.zeros(len(reference))
-        late = deque([0.0] * round(self.delay / step))
+        whole, part = divmod(self.delay / step, 1.0)
+        late = deque([0.0] * (int(whole) + 1))
         moved, read = self.mass - behind, int(self.read * self.substeps)
         held, following = self.coulomb / moved * step, any(self.follower)
         # Numbers of Python: numpy's take a multiple of the time in a loop.
@@ -116,7 +135,8 @@ class Machine:
                 if sub == read:
                     positions[index] = x
                 late.append(wanted)
-                force = late.popleft() - self.viscous * v - self.asymmetry * abs(v) - self.offset - self.spring * x
+                arrived = part * late.popleft() + (1 - part) * late[0]
+                force = arrived - self.viscous * v - self.asymmetry * abs(v) - self.offset - self.spring * x
                 if self.law is not None:
                     force -= self.law((index + sub / self.substeps) / self.rate, x, v)
                 if following:

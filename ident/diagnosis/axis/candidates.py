@@ -1,23 +1,23 @@
 """Possible causes of the gap of an axis, as columns beside M a + Fv v + Fc sign(v) + offset.
 
 Written from the literature of servo axes: Stribeck's curve and asymmetric friction (Armstrong-Hélouvry, Dupont, Canudas
-de Wit 1994), friction of two joints that share a shaft (Gautier, Janot, Vandanjon: Stäubli TX 40), a spring between
-drive and load by its first term in frequency.
+de Wit 1994), friction of two joints that share a shaft (Gautier, Janot, Vandanjon: Stäubli TX 40).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.axis.memories import friction_load, friction_warming, presliding, torque_filter
+from ident.diagnosis.axis.memories import NEAREST, friction_load, friction_warming, presliding, torque_filter
 from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
 from ident.diagnosis.axis.motion import AxisMotion
 from ident.diagnosis.axis.positional import friction_position, gravity_loads, inertia_position
-from ident.diagnosis.delays import HELD, delayed
+from ident.diagnosis.delays import HELD, delayed, sprung
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.orders import FEWEST
 from ident.diagnosis.problem import Candidate, Periodic, Variant
@@ -29,6 +29,11 @@ Array = NDArray[np.float64]
 
 STRIBECK_SPEEDS: Final = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Tried first, over the 95th percentile of the speed."""
+RESONANCES: Final = (0.8, 1.3, 2.0, 4.0, 20.0)
+"""Tried first, over the bandwidth of the rows; the last is a spring that shows as a compliance alone."""
+HOLDING: Final = 1 / 8
+"""Compliance times inertia, over the square of the sample time, that sampling may be: an effort that is held over an
+interval is smaller by (ωT)²/24, and a drive may hold it twice more on its way."""
 BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
 """Tried first, over the range of the position."""
 GRID: Final = 0.3
@@ -98,13 +103,17 @@ def _stribeck(axis: AxisModel) -> Candidate:
         EffectParameter("amplitude", axis.unit(), "friction at rest beyond the Coulomb friction"),
         EffectParameter("velocity", f"{axis.kind.position_unit}/s", "speed at which it has fallen to 1/e"),
     )
-    speeds = [share * axis.speed for share in STRIBECK_SPEEDS]
-    return shaped_by(axis, EffectName.STRIBECK, parameters, curve, speeds)
+    # Friction that has risen only below what hardly a row shows is what rows near a reversal miss, at any amplitude.
+    slowest = float(np.quantile(np.abs(velocity[axis.motion.moving]), NEAREST)) if axis.motion.moving.any() else 0.0
+    speeds = [max(share * axis.speed, slowest) for share in STRIBECK_SPEEDS]
+    candidate = shaped_by(axis, EffectName.STRIBECK, parameters, curve, speeds)
+    return replace(candidate, lowest=(0.0, slowest))
 
 
 def _time_delay(axis: AxisModel) -> Candidate:
-    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
-        return axis.alone(delayed(axis.effort, -float(values[0]), axis.sample_time) - axis.effort)
+    def contribution(values: Array, baseline: Array) -> tuple[Array | None, ...]:
+        effort = axis.effort_of(baseline)
+        return axis.alone(delayed(effort, -float(values[0]), axis.sample_time) - effort)
 
     parameters = (EffectParameter("delay", "s", "of the motion behind the effort, as reported"),)
     slope = differentiate(axis.effort, axis.sample_time, SEVEN)
@@ -116,14 +125,26 @@ def _time_delay(axis: AxisModel) -> Candidate:
 
 
 def _elasticity(axis: AxisModel) -> Candidate:
-    """u = M q'' + ... - c M u'': the load follows the drive through a spring; first order in its compliance c."""
+    """A load on a spring: u = M q'' + ... + c M ω²/(1 - (ω/ω_a)²) M q''; far below ω_a, only c is seen."""
+    force, slowest = axis.inertia * axis.motion.acceleration, RESONANCES[0] * axis.bandwidth
+
+    def series(resonance: float) -> Array:
+        within = np.clip(abs(resonance), slowest, RESONANCES[-1] * axis.bandwidth)
+        return axis.inertia * sprung(force, float(within), axis.sample_time)
+
+    def heavier(baseline: Array) -> float:
+        return float((baseline[axis.first] / axis.inertia) ** 2)
+
     unit = f"{axis.kind.position_unit}/{axis.kind.effort_unit}"
     meaning = "between drive and load, all inertia behind it; negative where the position is measured behind it"
-    bend = differentiate(differentiate(axis.effort, axis.sample_time, SEVEN), axis.sample_time, SEVEN)
-    sampling = axis.sample_time**2 / abs(axis.inertia)
-    column = axis.alone((-axis.inertia * bend)[:, None])
-    parameters = (EffectParameter("compliance", unit, meaning),)
-    return Candidate(EffectName.ELASTICITY, axis.place, parameters, (Variant(column),), negligible=(sampling, sampling))
+    parameters = (
+        EffectParameter("compliance", unit, meaning),
+        EffectParameter("resonance", "rad/s", "of the load, the drive held"),
+    )
+    sampling = HOLDING * axis.sample_time**2 / abs(axis.inertia)
+    tried = [share * axis.bandwidth for share in RESONANCES]
+    candidate = shaped_by(axis, EffectName.ELASTICITY, parameters, series, tried, scale=heavier)
+    return replace(candidate, negligible=(sampling, sampling))
 
 
 def _backlash(axis: AxisModel) -> Candidate:

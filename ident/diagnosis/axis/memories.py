@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -50,7 +51,8 @@ def presliding(axis: AxisModel) -> Candidate:
         EffectParameter("distance", axis.kind.position_unit, "path over which it has fallen to 1/e"),
     )
     tried = [max(share * axis.reach, shortest) for share in PATHS]
-    return shaped_by(axis, AxisEffect.PRESLIDING, parameters, series, tried, price=math.log(len(tried)))
+    candidate = shaped_by(axis, AxisEffect.PRESLIDING, parameters, series, tried, price=math.log(len(tried)))
+    return replace(candidate, lowest=(0.0, shortest))
 
 
 def friction_load(axis: AxisModel) -> Candidate:
@@ -79,8 +81,9 @@ def friction_warming(axis: AxisModel) -> Candidate:
 def torque_filter(axis: AxisModel) -> Candidate:
     """A drive whose effort follows what is reported as a filter of first order does."""
 
-    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
-        return axis.alone(led(axis.effort, float(values[0]), axis.sample_time) - axis.effort)
+    def contribution(values: Array, baseline: Array) -> tuple[Array | None, ...]:
+        effort = axis.effort_of(baseline)
+        return axis.alone(led(effort, float(values[0]), axis.sample_time) - effort)
 
     slope = differentiate(axis.effort, axis.sample_time, SEVEN)
     parameters = (

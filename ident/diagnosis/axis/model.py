@@ -58,8 +58,11 @@ class AxisModel:
         motion: smoothed.
         sample_time: [s].
         filtered: passes (N,) or (N, k) through the filter of the rows.
+        bandwidth: of that filter [rad/s].
         inertia: M of a first estimate [kg or kg m²].
-        effort: (N,) of that estimate, from the smoothed motion [N or Nm].
+        columns: (N, p) of the smoothed motion that make an effort with the parameters of the axis.
+        effort: (N,) of a first estimate of them [N or Nm].
+        first: number of the first of them among the parameters of all axes.
         absorbed: (N,) the same, of the columns of the baseline itself.
         speed: of which the axis is seldom faster [m/s or rad/s].
         reach: range of its position [m or rad].
@@ -73,12 +76,19 @@ class AxisModel:
     motion: AxisMotion
     sample_time: float
     filtered: Filter
+    bandwidth: float
     inertia: float
+    columns: Array
     effort: Array
+    first: int
     absorbed: Array
     speed: float
     reach: float
     others: tuple[tuple[str, AxisMotion], ...]
+
+    def effort_of(self, baseline: Array) -> Array:
+        """Effort (N,) of the smoothed motion with parameters of all axes."""
+        return np.asarray(self.columns @ baseline[self.first : self.first + self.columns.shape[1]])
 
     def alone(self, column: Array) -> tuple[Array | None, ...]:
         """A filtered column in the block of this axis, nothing in the others."""
@@ -110,11 +120,15 @@ def shaped_by(
     tried: Sequence[float],
     *,
     price: float = 0.0,
+    scale: Callable[[Array], float] = lambda _baseline: 1.0,
 ) -> Candidate:
-    """An effect of a size times a series (N,) of one more number, of which some are tried first."""
+    """An effect of a size times a series (N,) of one more number, of which some are tried first.
 
-    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
-        return axis.alone(values[0] * series(float(values[1])))
+    `scale` is by how much more the effect is, with other parameters than those of the first estimate.
+    """
+
+    def contribution(values: Array, baseline: Array) -> tuple[Array | None, ...]:
+        return axis.alone(scale(baseline) * values[0] * series(float(values[1])))
 
     def variant(number: float) -> Variant:
         return Variant(axis.alone(series(number)[:, None]), lambda found: np.append(found, number))

@@ -57,7 +57,9 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
 
 def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]], list[Dependence]]:
     period = with_repeats(signals.record)
-    models = [_model(signals, index, scale) for index, scale in enumerate(reference.scales)]
+    scales, width = reference.scales, len(PARAMETERS) + len(reference.scales) - 1
+    first = np.cumsum([0, *(width + (scale.hold is not None) for scale in scales)]).tolist()
+    models = [_model(signals, index, scale, first[index]) for index, scale in enumerate(scales)]
     baselines = _baselines(models, signals, reference.scales)
     blocks = [_block(signals, model, columns, period) for model, columns in zip(models, baselines, strict=True)]
     candidates = [_candidates(model, scale) for model, scale in zip(models, reference.scales, strict=True)]
@@ -85,8 +87,9 @@ def _candidates(model: AxisModel, scale: Scale) -> list[Candidate]:
     return [one for one in axis_candidates(model) if scale.hold is None or one.effect != EffectName.TIME_DELAY]
 
 
-def _model(signals: Signals, index: int, scale: Scale) -> AxisModel:
+def _model(signals: Signals, index: int, scale: Scale, first: int) -> AxisModel:
     axis, motion = signals.record.axes[index], signals.motions[index]
+    columns = signals.smoothed_columns(index)
     return AxisModel(
         place=axis.named("axis"),
         block=index,
@@ -95,8 +98,11 @@ def _model(signals: Signals, index: int, scale: Scale) -> AxisModel:
         motion=motion,
         sample_time=signals.record.sample_time,
         filtered=signals.filtered,
+        bandwidth=signals.bandwidth,
         inertia=float(scale.values[0]),
-        effort=signals.first_estimate(index, scale.values),
+        columns=columns,
+        effort=np.asarray(columns @ scale.values),
+        first=first,
         absorbed=np.asarray(own_columns(signals.motions, index) @ scale.values),
         speed=scale.speed,
         reach=scale.reach,

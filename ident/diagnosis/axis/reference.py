@@ -93,13 +93,13 @@ class Signals:
         columns, effort = self.filtered(own_columns(self.motions, index)), self.filtered(motion.effort)
         return columns[motion.moving], effort[motion.moving]
 
-    def first_estimate(self, index: int, values: Array) -> Array:
-        """Effort (N,) of an axis by a first estimate of its parameters, from its smoothed motion."""
+    def smoothed_columns(self, index: int) -> Array:
+        """Columns (N, p) of `own_columns`, of the smoothed motion."""
         motions = self.motions
         own = motions[index]
         columns = [own.acceleration, own.velocity, np.sign(own.velocity), np.ones_like(own.velocity)]
         columns += [motion.acceleration for motion in motions if motion is not own]
-        return np.asarray(np.stack(columns, axis=1) @ values)
+        return np.stack(columns, axis=1)
 
 
 def own_columns(motions: Sequence[AxisMotion], index: int) -> Array:
@@ -137,7 +137,7 @@ def axis_reference(
     limit = min([*limits, *(LARGEST_ROWS_CUTOFF / record.sample_time for record in others)])
     bandwidth = max(
         effort_bandwidth(
-            one.first_estimate(index, scale.values), repeat_duration(one.record), limit, one.record.sample_time
+            one.smoothed_columns(index) @ scale.values, repeat_duration(one.record), limit, one.record.sample_time
         )
         for one in signals
         for index, scale in enumerate(scales)
@@ -210,4 +210,4 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
 def _lagging(signals: Signals, index: int, values: Array) -> Array:
     """Filtered change (N,) of the effort of a first estimate over a sample interval."""
     dt = signals.record.sample_time
-    return signals.filtered(dt * differentiate(signals.first_estimate(index, values), dt, SEVEN))
+    return signals.filtered(dt * differentiate(signals.smoothed_columns(index) @ values, dt, SEVEN))
