@@ -36,8 +36,8 @@ class Machine:
         spring: between carriage and frame [N/m].
         law: force that resists beside all this [N], of time, position and velocity.
         strokes, speeds: in a period, an even number of them, and those that they are driven at [m/s].
-        travel: within which it is driven from point to point, in as many strokes as there is time for [m]; 0: it is driven
-            in strokes of one duration, wherever they lead.
+        travel: within which it is driven from point to point, in as many strokes as there is time for [m]; 0: in
+            strokes of one duration, wherever they lead.
         noise, encoder: rms of the noise of the measured effort [N] and of the positions [m].
     """
 

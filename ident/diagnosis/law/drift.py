@@ -53,7 +53,8 @@ def _anchored(problems: Sequence[Problem], law: Law, settings: Settings, seed: i
     """A law of time with its constant, of which what differs between repeats says nothing.
 
     It is the one that the fitted rows ask for beside the parameters, and beside what is known of those. Where a
-    parameter absorbs it, as Coulomb friction does of a law times the direction, the law has no mean in these rows.
+    parameter absorbs it, as Coulomb friction does of a law times the direction, the law has no mean in these rows. Nor
+    has it where they ask for more than the law varies by: that is another cause, which the drift does not tell.
 
     Args:
         problems: to fit and to confirm, with all that repeats.
@@ -81,9 +82,10 @@ def _constant(regression: Regression, column: Array, known: Array) -> float:
     basis = orthonormal(white.baseline[fitted])
     whole, target = white.columns[fitted, 0], (white.target - white.columns[:, 1])[fitted]
     left = whole - basis @ (basis.T @ whole)
-    if left @ left > VISIBLE**2 * (whole @ whole):
-        return float(left @ target) / float(left @ left)
-    return -float(whole @ white.columns[fitted, 1]) / max(float(whole @ whole), np.finfo(float).tiny)
+    mean = float(whole @ white.columns[fitted, 1]) / max(float(whole @ whole), np.finfo(float).tiny)
+    asked = float(left @ target) / float(left @ left) if left @ left > VISIBLE**2 * (whole @ whole) else -mean
+    acting = np.abs(column) > VISIBLE * np.abs(column).max(initial=0.0)
+    return asked if abs(asked + mean) < np.ptp(known[acting] / column[acting]) else -mean
 
 
 def without_drift(problem: Problem, law: Law) -> Problem:
