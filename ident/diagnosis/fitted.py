@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +16,7 @@ from ident.diagnosis.linear import least_squares, rms
 from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.refit import Refit, refit
 from ident.diagnosis.regression import Regression
-from ident.diagnosis.remainder import held_out_gap, held_out_gap_of_means, noise_floors
+from ident.diagnosis.remainder import Told, held_out_gap, held_out_gap_of_means, noise_floors
 from ident.diagnosis.search import Found
 from ident.diagnosis.whitening import Predictor, Whitener
 
@@ -31,10 +32,14 @@ class Fitted:
         before, after: refits of all rows.
         floors: rms of the noise of every block.
         untouched: (N,) of every block, the model without effects that held-out rows are compared with.
+        told: samples (N,) of every block in which laws are within what the fitted rows have shown; empty without laws.
+            Held out, nothing is asked elsewhere.
     """
 
-    def __init__(self, problems: Sequence[Problem], regression: Regression, found: Found, seed: int) -> None:
-        self.problems, self.regression, self.found = problems, regression, found
+    def __init__(
+        self, problems: Sequence[Problem], regression: Regression, found: Found, seed: int, told: Told = ()
+    ) -> None:
+        self.problems, self.regression, self.found, self.told = problems, regression, found, told
         self._kept: dict[tuple[tuple[int, ...], bool], Refit] = {}
         self.rows = regression.rows
         self._weights = _weights(regression, found)
@@ -87,11 +92,11 @@ class Fitted:
     @cached_property
     def exactly(self) -> Gap:
         """With all effects, as their exact forms."""
-        return held_out_gap(self.rows, self.floors, self.untouched, self._extended_models)
+        return held_out_gap(self.rows, self.floors, self.untouched, self._extended_models, self.told)
 
-    def measured(self, floors: Array, labels: Collection[str]) -> Gap:
-        """The same of the means over the repeats, in blocks of some labels, with the noise of every block as given."""
-        return held_out_gap_of_means(self.rows, floors, self.untouched, self._extended_models, labels)
+    def measured(self, floors: Array, labels: Collection[str], told: Told) -> Gap:
+        """The same of the means over the repeats, in blocks of some labels, with noise and samples of all as given."""
+        return held_out_gap_of_means(self.rows, floors, self.untouched, self._extended_models, labels, told)
 
     @cached_property
     def whole(self) -> Gap:
@@ -119,27 +124,42 @@ class Fitted:
 
     @cached_property
     def lacking(self) -> list[float]:
-        """The same of the means over the repeats, the values of a model that is judged held: what they lack."""
-        whole = self._gap_of_means(self.found.variants)
-        without = [self._gap_of_means(self.others(index), held=self._is_given).after for index in range(self.count)]
-        return [_share(whole, after) for after in without]
+        """The same of the means over the repeats where the effect acts, the values of a judged model held."""
+        return [self._lacking(index) for index in range(self.count)]
+
+    def _lacking(self, index: int) -> float:
+        """Of what is left without it, where that is more than without any: effects can make up for each other."""
+        labels = self.reached_by(index)
+        whole = self._gap_of_means(self.found.variants, labels=labels)
+        without = self._gap_of_means(self.others(index), held=self._is_given, labels=labels).after
+        above = replace(whole, before=max(whole.before, without), after=max(whole.after, whole.floor))
+        return _share(above, without)
 
     def gap(self, variants: Sequence[int]) -> Gap:
         """Held-out gap with some effects, as their columns."""
-        return held_out_gap(self.rows, self.floors, self.untouched, self._held_out_models(variants))
+        return held_out_gap(self.rows, self.floors, self.untouched, self._held_out_models(variants), self.told)
 
     def _gap_of_means(
         self, variants: Sequence[int], *, held: bool = False, labels: Collection[str] | None = None
     ) -> Gap:
         """The same of the means over the repeats; `held`: what is known of the baseline is taken as exact."""
         models = self._held_out_models(variants, held=held)
-        return held_out_gap_of_means(self.rows, self.floors, self.untouched, models, labels)
+        return held_out_gap_of_means(self.rows, self.floors, self.untouched, models, labels, self.told)
 
     def closed_where_it_acts(self, index: int) -> float:
         """Share of what can be removed of the means over the repeats that an effect closes where it acts, held out."""
+        return _share(*self._where_it_acts(index))
+
+    def power_where_it_acts(self, index: int) -> float:
+        """The same as a power, over that of the noise."""
+        whole, without = self._where_it_acts(index)
+        return without**2 - whole.after**2
+
+    def _where_it_acts(self, index: int) -> tuple[Gap, float]:
+        """Gap of the means over the repeats where an effect acts, held out, and what it would be without it."""
         labels = self.reached_by(index)
         whole = self._gap_of_means(self.found.variants, labels=labels)
-        return _share(whole, self._gap_of_means(self.others(index), labels=labels).after)
+        return whole, self._gap_of_means(self.others(index), labels=labels).after
 
     def held_out(self) -> HeldOut:
         """What was fitted without the confirming rows."""
@@ -191,7 +211,8 @@ class Fitted:
     @cached_property
     def closed_by_drift(self) -> float:
         """Share of the removable held-out gap that what follows time closes, the other effects given."""
-        without = held_out_gap(self.rows, self.floors, self.untouched, self._drifting(self._extended_models))
+        models = self._drifting(self._extended_models)
+        without = held_out_gap(self.rows, self.floors, self.untouched, models, self.told)
         return _share(self.exactly, without.after)
 
     def _drifting(self, models: Sequence[Array]) -> Sequence[Array]:

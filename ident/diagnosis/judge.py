@@ -98,7 +98,9 @@ def _judged_once(
     found = [judgement, *(one for start in starts if (one := _with_laws(start, designs, concluded_from)) is not None)]
     floors = np.min([one.fitted.floors for one in found], axis=0)
     acting = frozenset[str]().union(*(one.fitted.reached for one in found))
-    return min(found, key=lambda one: one.cost(floors, acting))
+    masks = [one.fitted.told for one in found if one.fitted.told]
+    told = tuple(np.logical_and.reduce(each) for each in zip(*masks, strict=True))
+    return min(found, key=lambda one: one.cost(floors, acting, told))
 
 
 def _judged(searched: Shaped, laws: tuple[Law, ...], limits: Limits, seed: int) -> Judgement:

@@ -17,12 +17,13 @@ from ident.diagnosis.fitted import Fitted
 from ident.diagnosis.law.answer import LawAnswer, alternatives, law_answer, same_names
 from ident.diagnosis.law.drift import drift_cause
 from ident.diagnosis.law.neighbours import channel_of, nearest_name
+from ident.diagnosis.law.reach import told_samples
 from ident.diagnosis.law.stage import Law
 from ident.diagnosis.limits import Limits
 from ident.diagnosis.probability import calibration, rank
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
-from ident.diagnosis.remainder import repeated, shares
+from ident.diagnosis.remainder import Told, repeated, shares
 from ident.diagnosis.repeating import Repeating
 from ident.diagnosis.search import Found
 from ident.diagnosis.steady import log_unsteady
@@ -45,7 +46,7 @@ class Judgement:
         self.problems, self.regression, self.found, self.limits = problems, regression, found, limits
         self.laws = laws
         self.rows = regression.rows
-        self.fitted = Fitted(problems, regression, found, seed)
+        self.fitted = Fitted(problems, regression, found, seed, told_samples(self.rows, problems, self._law_keys()))
 
     def findings(self, drift: Law | None = None) -> Findings:
         """The answer, with all that reports show of it; beside a drift that was taken off before."""
@@ -77,7 +78,11 @@ class Judgement:
         left = self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeats.by_no_accident
         return left or self.fitted.exactly.after**2 > 1 + self.limits.measurable
 
-    def cost(self, floors: Array, labels: Collection[str]) -> tuple[float, int]:
+    def _law_keys(self) -> list[str]:
+        owners = {self.regression.owners[variant] for variant in self.found.variants}
+        return [law.dependence.key for law in self.laws if law.number in owners]
+
+    def cost(self, floors: Array, labels: Collection[str], told: Told) -> tuple[float, int]:
         """Of an explanation: log of the held-out gap that it leaves, and what its causes cost, and their number.
 
         A law, which can be anything, costs more than a name, which says more; what nobody knows costs as much as a law.
@@ -87,12 +92,13 @@ class Judgement:
         Args:
             floors: noise of every block, the same for all explanations that are compared.
             labels: of the blocks in which some of them act: the others say nothing for or against any.
+            told: samples of every block in which the laws of all of them are told.
         """
         laws = sum(self._law(index) is not None for index in range(self.fitted.count))
         unknown = self._verdict() is Verdict.UNKNOWN
         price = self.limits.law * (laws + unknown) + self.limits.name * (self.fitted.count - laws)
-        above = max(self.fitted.measured(floors, labels).after ** 2 - 1, 0.0)
-        return round(50 * (math.log(above + self.limits.measurable) / 2 + price)) / 50, self.fitted.count
+        above = max(self.fitted.measured(floors, labels, told).after ** 2 - 1, 0.0)
+        return round(50 * (math.log(above + self.limits.blur) / 2 + price)) / 50, self.fitted.count
 
     def refuted(self) -> frozenset[str]:
         """Effects of no size of which another candidate is what comes along with them, and those that are none."""
@@ -122,10 +128,15 @@ class Judgement:
         for index in others:
             if self._sizeless(index) or self._nothing(index):
                 return self.fitted.others(index)
-        least = min(others, key=lambda index: closed[index], default=None)
-        if least is not None and self._measurable() and closed[least] < self.limits.improvement:
+        acting = {index: self.fitted.closed_where_it_acts(index) for index in others} if self._measurable() else {}
+        least = min(acting, key=acting.__getitem__, default=None)
+        if least is not None and acting[least] < self.limits.improvement and not self._clear(least):
             return self.fitted.others(least)
         return self.found.variants
+
+    def _clear(self, index: int) -> bool:
+        """Whether what an effect closes of the gap where it acts is more than an accident of the noise."""
+        return self.fitted.power_where_it_acts(index) > self.limits.measurable
 
     def _law(self, index: int) -> Law | None:
         """The law that a cause is, if it is one."""

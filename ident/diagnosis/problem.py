@@ -142,6 +142,8 @@ class Candidate:
         curve: whose friction over the speed it changes, if it is a friction.
         periodic: of a wave over an angle; its variants are then those of the orders that the records show.
         price: log evidence that the choice of its variants costs beyond that of its coefficients.
+        learnt: its columns are a function that was learnt on fitted rows and tried on the confirming ones, uncertain
+            where the fitted ones are few; they need not confirm it again as if it were known exactly.
         along: effect at the same place that comes along with it in its widest variant; both at once are that variant.
     """
 
@@ -163,6 +165,7 @@ class Candidate:
     along: str = ""
     periodic: Periodic | None = None
     price: float = 0.0
+    learnt: bool = False
 
     @property
     def key(self) -> str:

@@ -48,11 +48,13 @@ class Slot:
         evidence: of every variant.
         variants: the best one of every candidate, best first.
         events: candidates, best first, whose evidence is clear and all of one drive: no cause.
+        seen: variants (V,) that the fitted rows show and the confirming ones confirm.
     """
 
     evidence: Evidence
     variants: tuple[int, ...]
-    events: tuple[int, ...] = ()
+    events: tuple[int, ...]
+    seen: Mask
 
     @property
     def log_evidence(self) -> Array:
@@ -83,6 +85,11 @@ class Regression:
     def owners(self) -> list[int]:
         """Candidate of every variant."""
         return [column.candidate for column in self.rows.layout]
+
+    @cached_property
+    def _learnt(self) -> Mask:
+        """Variants (V,) whose shape the fitted rows have taught and the confirming ones confirmed, as sure as it is."""
+        return np.array([self.problem.candidates[owner].learnt for owner in self.owners], dtype=bool)
 
     @cached_property
     def broad(self) -> list[Whole]:
@@ -207,7 +214,8 @@ class Regression:
     def slot(self, given: Sequence[int], whitener: Whitener) -> Slot:
         """What may stand beside the variants given."""
         evidence = self.evidence(whitener, given)
-        once = ~in_both(evidence, self.settings) & (evidence.log_evidence > self.settings.clear)
+        seen = in_both(evidence, self.settings) | self._learnt
+        once = ~seen & (evidence.log_evidence > self.settings.clear)
         found = np.where(once, -np.inf, evidence.log_evidence)
         strongest = sorted(np.flatnonzero(once).tolist(), key=lambda variant: -float(evidence.log_evidence[variant]))
         events = tuple(dict.fromkeys(self.owners[variant] for variant in strongest))
@@ -215,7 +223,7 @@ class Regression:
         for variant in np.flatnonzero(np.isfinite(found)).tolist():
             contenders.setdefault(self.owners[variant], []).append(variant)
         best = [self._simplest(variants, found) for variants in contenders.values()]
-        return Slot(evidence, tuple(sorted(best, key=lambda variant: -float(found[variant]))), events)
+        return Slot(evidence, tuple(sorted(best, key=lambda variant: -float(found[variant]))), events, seen)
 
     def _simplest(self, variants: Sequence[int], log_evidence: Array) -> int:
         """The best variant of a candidate, or one of fewer columns that is nearly as good."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,9 @@ from ident.diagnosis.problem import Block
 from ident.diagnosis.rows import Kept, Rows
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Series = Sequence[Array]
+Told = Sequence[Mask]
 
 
 def noise_floors(rows: Rows, models: Series, left: Array) -> Array:
@@ -48,13 +50,13 @@ def mostly_tolerated(block: Block, floor: float) -> bool:
     return bool(2 * block.tolerance**2 > floor**2)
 
 
-def held_out_gap(rows: Rows, floors: Array, before: Series, after: Series) -> Gap:
-    """Rms over all samples of the confirming blocks, each over its noise."""
-    return _gap(rows, floors, (before, after), _samples, rows_with=None)
+def held_out_gap(rows: Rows, floors: Array, before: Series, after: Series, told: Told = ()) -> Gap:
+    """Rms over all samples of the confirming blocks, each over its noise; arguments as below."""
+    return _gap(rows, floors, (before, after), None, told, means=False)
 
 
 def held_out_gap_of_means(
-    rows: Rows, floors: Array, before: Series, after: Series, labels: Collection[str] | None = None
+    rows: Rows, floors: Array, before: Series, after: Series, labels: Collection[str] | None = None, told: Told = ()
 ) -> Gap:
     """The same of the means over the repeats, over what noise leaves of them: that is what the rows say of a cause.
 
@@ -63,16 +65,19 @@ def held_out_gap_of_means(
         floors: rms of the noise of every block.
         before, after: models of every block's target, (N,).
         labels: of the blocks; None: all.
+        told: samples (N,) of every block of which the models say something; empty: all of all blocks.
     """
-    return _gap(rows, floors, (before, after), _means, rows_with=labels)
+    return _gap(rows, floors, (before, after), labels, told, means=True)
 
 
 def _gap(
     rows: Rows,
     floors: Array,
     models: tuple[Series, Series],
-    seen: Callable[[Kept, Array], Array],
     rows_with: Collection[str] | None,
+    told: Told,
+    *,
+    means: bool,
 ) -> Gap:
     sums, count = np.zeros(3), 0
     for index, (block, kept) in enumerate(rows.blocks):
@@ -80,14 +85,22 @@ def _gap(
         if left_out or not rows.confirming[rows.block_slices[index]].any():
             continue
         floor = floors[index]
+        known = _known(kept, told[index], means) if told else slice(None)
+        seen = _means if means else _samples
         for place, model in enumerate(models):
-            left = seen(kept, block.target - model[index])
+            left = seen(kept, block.target - model[index])[known]
             power = float(np.sum((left / floor) ** 2))
             sums[place] += max(power, len(left)) if mostly_tolerated(block, floor) else power
         sums[2] += len(left)
         count += len(left)
     mean = np.sqrt(sums / count) if count else np.zeros(3)
     return Gap(float(mean[0]), float(mean[1]), float(mean[2]))
+
+
+def _known(kept: Kept, told: Mask, means: bool) -> Mask:
+    """Which of the rows, or of all their samples, are told."""
+    chosen = told[kept.samples]
+    return np.asarray(chosen.all(axis=0) if means else chosen.ravel())
 
 
 def _samples(kept: Kept, residual: Array) -> Array:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ident.diagnosis.pairs import best_pair
-from ident.diagnosis.regression import Regression, Slot, Whole, in_both
+from ident.diagnosis.regression import Regression, Slot, Whole
 from ident.diagnosis.settings import Settings
 from ident.diagnosis.whitening import Whitener
 
@@ -71,7 +71,7 @@ def _believed(slot: Slot, variant: int, settings: Settings, *, alone: bool) -> b
     """Larger than chance over all candidates, seen in the fit, and confirmed."""
     evidence, least = slot.evidence, settings.least if alone else settings.beside
     large = evidence.log_evidence[variant] > least and evidence.significance <= settings.level
-    return bool(large and in_both(evidence, settings)[variant])
+    return bool(large and slot.seen[variant])
 
 
 def settled(regression: Regression, taken: tuple[int, ...]) -> tuple[int, ...]:

@@ -104,7 +104,8 @@ def with_law(
         design = problem.dependences[law.learnt.index].design(law.learnt.knots.basis)
         columns = tuple(None if one is None else (one @ law.learnt.weights)[:, None] for one in design)
         series += columns
-        candidate = Candidate(law.dependence.effect, law.dependence.where, (SCALE,), (Variant(columns),), least=0.0)
+        variants = (Variant(columns),)
+        candidate = Candidate(law.dependence.effect, law.dependence.where, (SCALE,), variants, least=0.0, learnt=True)
         changed.append(replace(problem, candidates=(*problem.candidates, candidate)))
     rows = regression.rows
     end = rows.columns.shape[1]
