@@ -228,12 +228,15 @@ class Judgement:
         """Whether the refit has made something else of an effect, or of a size that may be zero.
 
         Something else has parameters that the effect does not have. Of linear ones any is a size, or else the first.
+        Beside what comes along, `_sizeless` says.
         """
         candidate, part = self.fitted.candidate(index), self.fitted.after.parts[index]
         if candidate.lowest and bool(np.any(np.abs(part.values) < candidate.lowest)):
             return True
         sizes = slice(None) if candidate.contribution is None else slice(1)
-        return bool(np.all(np.abs(part.values[sizes]) < self.limits.sure_of * part.std[sizes]))
+        alone = len(part.numbers) == len(part.values)
+        small = np.abs(part.values[sizes]) < self.limits.sure_of * part.scatter[: len(part.values)][sizes]
+        return alone and bool(np.all(small))
 
     @cached_property
     def _named(self) -> float:

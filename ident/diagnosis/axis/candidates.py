@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.axis.memories import NEAREST, friction_load, friction_warming, presliding, torque_filter
+from ident.diagnosis.axis.memories import friction_load, friction_warming, presliding, torque_filter
 from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
 from ident.diagnosis.axis.motion import AxisMotion
 from ident.diagnosis.axis.positional import friction_position, gravity_loads, inertia_position
@@ -33,7 +33,8 @@ RESONANCES: Final = (0.8, 1.3, 2.0, 4.0, 20.0)
 """Tried first, over the bandwidth of the rows; the last is a spring that shows as a compliance alone."""
 HOLDING: Final = 1 / 8
 """Compliance times inertia, over the square of the sample time, that sampling may be: an effort that is held over an
-interval is smaller by (ωT)²/24, and a drive may hold it twice more on its way."""
+interval is smaller by (ωT)²/24, and a drive may hold it twice more on its way. Eight times that where the compliance is
+negative, as errors of the positions look."""
 BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
 """Tried first, over the range of the position."""
 GRID: Final = 0.3
@@ -103,10 +104,10 @@ def _stribeck(axis: AxisModel) -> Candidate:
         EffectParameter("amplitude", axis.unit(), "friction at rest beyond the Coulomb friction"),
         EffectParameter("velocity", f"{axis.kind.position_unit}/s", "speed at which it has fallen to 1/e"),
     )
-    # Friction that has risen only below what hardly a row shows is what rows near a reversal miss, at any amplitude.
-    slowest = float(np.quantile(np.abs(velocity[axis.motion.moving]), NEAREST)) if axis.motion.moving.any() else 0.0
-    speeds = [max(share * axis.speed, slowest) for share in STRIBECK_SPEEDS]
-    candidate = shaped_by(axis, EffectName.STRIBECK, parameters, curve, speeds)
+    # At half the speed that hardly a row is below, all rows have lost it, but what they miss near a reversal looks so.
+    slowest = axis.slowest / 2
+    speeds = [speed for share in STRIBECK_SPEEDS if (speed := share * axis.speed) > slowest]
+    candidate = shaped_by(axis, EffectName.STRIBECK, parameters, curve, speeds or [2 * slowest])
     return replace(candidate, lowest=(0.0, slowest))
 
 
@@ -141,10 +142,10 @@ def _elasticity(axis: AxisModel) -> Candidate:
         EffectParameter("compliance", unit, meaning),
         EffectParameter("resonance", "rad/s", "of the load, the drive held"),
     )
-    sampling = HOLDING * axis.sample_time**2 / abs(axis.inertia)
+    sampling = axis.sample_time**2 / abs(axis.inertia)
     tried = [share * axis.bandwidth for share in RESONANCES]
     candidate = shaped_by(axis, EffectName.ELASTICITY, parameters, series, tried, scale=heavier)
-    return replace(candidate, negligible=(sampling, sampling))
+    return replace(candidate, negligible=(sampling, HOLDING * sampling))
 
 
 def _backlash(axis: AxisModel) -> Candidate:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
+from ident.diagnosis.axis.reference import NEAREST
 from ident.diagnosis.delays import led
 from ident.diagnosis.law.dependence import path_since_reversal
 from ident.diagnosis.problem import Candidate, Variant
@@ -20,9 +21,6 @@ Array = NDArray[np.float64]
 
 PATHS: Final = (0.001, 0.003, 0.01, 0.03, 0.1)
 """Over which friction settles after a reversal, tried first, over the range of the position."""
-
-NEAREST: Final = 0.02
-"""Of the rows, that are nearest to a reversal."""
 
 TIMES: Final = (0.1, 0.3, 1.0)
 """Over which friction warms up, tried first, over the duration of the record; faster is a start, no warming."""

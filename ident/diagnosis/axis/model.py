@@ -65,6 +65,7 @@ class AxisModel:
         first: number of the first of them among the parameters of all axes.
         absorbed: (N,) the same, of the columns of the baseline itself.
         speed: of which the axis is seldom faster [m/s or rad/s].
+        slowest: than which it is seldom slower in a row [m/s or rad/s].
         reach: range of its position [m or rad].
         others: name and motion of the other axes.
     """
@@ -83,6 +84,7 @@ class AxisModel:
     first: int
     absorbed: Array
     speed: float
+    slowest: float
     reach: float
     others: tuple[tuple[str, AxisMotion], ...]
 

@@ -29,6 +29,9 @@ from ident.records.axis_record import AxisRecord, AxisSignals
 
 Array = NDArray[np.float64]
 
+NEAREST: Final = 0.02
+"""Of the rows, that are nearest to a reversal, or slowest."""
+
 LARGEST_HOLD: Final = 1.0
 """Sample intervals up to which a first estimate of the lag may be what sampling does; other effects shift it."""
 
@@ -40,6 +43,7 @@ class Scale:
     Attributes:
         values: own baseline parameters of the axis, a first estimate.
         speed: of which the axis is seldom faster [m/s or rad/s].
+        slowest: than which it is seldom slower in a row [m/s or rad/s].
         reach: range of its position [m or rad].
         hold: sample intervals by which its motion follows its effort as recorded, if sampling can be why: an effort
             that is held over the interval acts half of one late. None: longer, and a cause of its own.
@@ -47,6 +51,7 @@ class Scale:
 
     values: Array
     speed: float
+    slowest: float
     reach: float
     hold: float | None
 
@@ -202,9 +207,10 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
     bend = np.concatenate([_lagging(one, index, values)[one.motions[index].moving] for one in signals])
     *refined, lag = np.linalg.lstsq(np.column_stack([left, bend]), right, rcond=None)[0]
     speed = max(float(np.percentile(np.abs(motion.velocity), 95)) for motion in motions)
+    slowest = float(np.quantile(np.concatenate([np.abs(one.velocity[one.moving]) for one in motions]), NEAREST))
     reach = float(np.ptp(np.concatenate([motion.position for motion in motions])))
     sampled = abs(lag) <= LARGEST_HOLD
-    return Scale(np.array(refined) if sampled else values, speed, reach, float(lag) if sampled else None)
+    return Scale(np.array(refined) if sampled else values, speed, slowest, reach, float(lag) if sampled else None)
 
 
 def _lagging(signals: Signals, index: int, values: Array) -> Array:

@@ -68,14 +68,15 @@ def _anchored(problems: Sequence[Problem], law: Law, settings: Settings, seed: i
     # The functions sum to one, so that all coefficients together move the law by a constant.
     constant = design.sum(axis=1)
     weights, whole = (
-        learnt + _constant(regression, constant, design @ learnt) for learnt in (law.learnt.weights, law.learnt.whole)
+        learnt + _constant(regression, constant, design @ learnt, float(np.ptp(learnt)))
+        for learnt in (law.learnt.weights, law.learnt.whole)
     )
     learnt = replace(law.learnt, weights=weights, whole=whole)
     return replace(law, learnt=learnt)
 
 
-def _constant(regression: Regression, column: Array, known: Array) -> float:
-    """How much of a column (n,) fitted rows hold beside what is known (n,); if they show none, less its mean."""
+def _constant(regression: Regression, column: Array, known: Array, most: float) -> float:
+    """How much of a column (n,) fitted rows hold beside what is known (n,); less its mean if none, or above `most`."""
     pair = np.column_stack([column, known])
     white = regression.white(regression.colour_beside(pair, order=0), (), pair)
     fitted = ~white.confirming
@@ -84,8 +85,7 @@ def _constant(regression: Regression, column: Array, known: Array) -> float:
     left = whole - basis @ (basis.T @ whole)
     mean = float(whole @ white.columns[fitted, 1]) / max(float(whole @ whole), np.finfo(float).tiny)
     asked = float(left @ target) / float(left @ left) if left @ left > VISIBLE**2 * (whole @ whole) else -mean
-    acting = np.abs(column) > VISIBLE * np.abs(column).max(initial=0.0)
-    return asked if abs(asked + mean) < np.ptp(known[acting] / column[acting]) else -mean
+    return asked if abs(asked + mean) < most else -mean
 
 
 def without_drift(problem: Problem, law: Law) -> Problem:
