@@ -14,7 +14,7 @@ import pytest
 from ident.diagnosis.axis.candidates import in_gap
 from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.axis.motion import with_repeats
-from ident.diagnosis.delays import delayed
+from ident.diagnosis.delays import DAMPING, delayed, sprung
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import Findings
 from ident.errors import EstimationError, RecordError
@@ -84,10 +84,36 @@ def test_friction_that_depends_on_direction_is_named_with_its_size(machine: Make
     assert findings.gap.closed > 0.9
 
 
+def test_a_wave_behind_a_spring_is_as_much_larger_as_its_resonance_says() -> None:
+    time, omega, resonance = np.arange(12000) * 1e-3, 2 * np.pi * 5, 2 * np.pi * 8
+    share = omega / resonance
+    gain = omega**2 / (1 - share**2 + 2j * DAMPING * share)
+    expected = np.real(gain * np.exp(1j * omega * time))
+    found = sprung(np.cos(omega * time), resonance, 1e-3)
+    np.testing.assert_allclose(found[4000:-4000], expected[4000:-4000], atol=0.01 * abs(gain))
+
+
 def test_a_delay_of_two_samples_is_named_with_its_length(machine: Make) -> None:
     findings = _diagnosed(machine(delay=0.002))
     assert [str(cause.candidate.effect) for cause in findings.causes] == ["time_delay"]
     assert _value(findings, "time_delay")[0] == pytest.approx(0.002, rel=0.02)
+
+
+@pytest.mark.parametrize("read", [0.0, 0.5, 0.9])
+def test_a_delay_is_as_long_as_it_is_by_the_parameters_fitted_beside_it(machine: Make, read: float) -> None:
+    """By those of a first estimate it was short by fourteen standard deviations; holding and reading are part of it."""
+    findings = _diagnosed(machine(delay=0.004, read=read, substeps=10, viscous=400.0, coulomb=40.0))
+    value, std = _value(findings, "time_delay")
+    assert abs(value - 0.004 - (0.5 - read) * 1e-3) < 3 * std
+
+
+@pytest.mark.parametrize("resonance", [20.0, 30.0, 40.0])
+def test_a_compliance_is_what_it_is_near_the_resonance_of_its_load(machine: Make, resonance: float) -> None:
+    """All inertia behind it: c = share² over (2π f)² of the mass. By its first term it was a quarter too large."""
+    compliance = 1 / (20.0 * (2 * np.pi * resonance) ** 2)
+    findings = _diagnosed(machine(compliance=compliance, noise=0.1))
+    value, _ = _value(findings, "elasticity")
+    assert value == pytest.approx(0.6**2 * compliance, rel=0.08)
 
 
 def test_bristles_that_break_away_are_named_stribeck(machine: Make) -> None:
