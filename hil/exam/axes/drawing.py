@@ -22,8 +22,11 @@ from ident.errors import EstimationError, UserError
 Spread = Callable[[Callable[..., Case], Iterable[tuple[Any, ...]]], Iterator[Case]]
 """Runs a function over tasks."""
 
-TRAVELS: Final = (1.0, 3.0)
+TRAVELS: Final = (0.5, 1.5)
 """Travel of a machine over the length of a stroke, which others can be as long as."""
+
+LARGEST: Final = 2.0
+"""Sizes over those that machines have, at most: a motion that shows less of it asks nothing."""
 
 MACHINES: Final = 20
 """Machines that are drawn at most until one can be driven with what a case asks."""
@@ -140,5 +143,7 @@ def _sized(question: Question, seed: int, attempt: int) -> tuple[Injected, ...]:
                 raise UserError(f"{name} of {size:g} does not show.", "Draw another machine.")
         else:
             size = sign * ruler.size(name, question.units, values)
+            if abs(size) > LARGEST * missing.probe(machine):
+                raise UserError(f"{name} of {size:g} is none that one meets.", "Draw another machine.")
         effects.append(Injected(name, PLACE, MISSING[name].parameter, size, values))
     return tuple(effects)
