@@ -148,18 +148,9 @@ class Fitted:
 
     def closed_where_it_acts(self, index: int) -> float:
         """Share of what can be removed of the means over the repeats that an effect closes where it acts, held out."""
-        return _share(*self._where_it_acts(index))
-
-    def power_where_it_acts(self, index: int) -> float:
-        """The same as a power, over that of the noise."""
-        whole, without = self._where_it_acts(index)
-        return without**2 - whole.after**2
-
-    def _where_it_acts(self, index: int) -> tuple[Gap, float]:
-        """Gap of the means over the repeats where an effect acts, held out, and what it would be without it."""
         labels = self.reached_by(index)
         whole = self._gap_of_means(self.found.variants, labels=labels)
-        return whole, self._gap_of_means(self.others(index), labels=labels).after
+        return _share(whole, self._gap_of_means(self.others(index), labels=labels).after)
 
     def held_out(self) -> HeldOut:
         """What was fitted without the confirming rows."""

@@ -130,13 +130,9 @@ class Judgement:
                 return self.fitted.others(index)
         acting = {index: self.fitted.closed_where_it_acts(index) for index in others} if self._measurable() else {}
         least = min(acting, key=acting.__getitem__, default=None)
-        if least is not None and acting[least] < self.limits.improvement and not self._clear(least):
+        if least is not None and acting[least] < self.limits.improvement:
             return self.fitted.others(least)
         return self.found.variants
-
-    def _clear(self, index: int) -> bool:
-        """Whether what an effect closes of the gap where it acts is more than an accident of the noise."""
-        return self.fitted.power_where_it_acts(index) > self.limits.measurable
 
     def _law(self, index: int) -> Law | None:
         """The law that a cause is, if it is one."""
