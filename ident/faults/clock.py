@@ -18,6 +18,7 @@ from ident.records.checks import UNIFORMITY
 from ident.records.record import Segment
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 INTERVALS: Final = (1e-4, 0.1)
 """Sample intervals [s] at which a vehicle is recorded: faster than any drive answers, slower than any steering."""
@@ -89,18 +90,30 @@ def skipped(segment: Segment) -> tuple[Segment, list[Fault]]:
     if len(angles) < 4 * WINDOW:
         return segment, []
     moved, usual = np.diff(angles, axis=0), _usual(np.diff(angles, axis=0))
-    size = np.sum(usual**2, axis=1)
-    grain = np.sum(np.median(np.abs(np.diff(moved, axis=0)), axis=0) ** 2)
-    ratio = np.sum(moved * usual, axis=1) / np.maximum(size, np.finfo(float).tiny)
-    left = np.sum((moved - ratio[:, None] * usual) ** 2, axis=1)
-    # Beyond resolution and noise, as far in all channels alike, and at least one whole sample more.
-    jumps = (size > GRAIN**2 * grain) & (ratio > 2 - UNIFORMITY * WINDOW) & (left < UNIFORMITY * ratio**2 * size)
+    # A channel that jumps alone is a motor that hits its play or rings on its spring: the others must have jumped too.
+    others = np.arange(angles.shape[1]) != np.argmax(usual**2, axis=1)[:, None]
+    (ratio, jumps), (_, without) = (_farther(moved, usual, chosen) for chosen in (np.ones_like(others), others))
+    jumps &= without
     if not jumps.any():
         return segment, []
     lost = np.where(jumps, np.maximum(np.round(ratio) - 1, 1), 0)
     missing = float(lost.sum())
     fault = Fault(FaultName.LOST, TIME, missing, "samples", math.sqrt(missing), CERTAIN, True, step=segment.step)
     return _filled(segment, lost, segment.sample_time), [fault]
+
+
+def _farther(moved: Array, usual: Array, chosen: Mask) -> tuple[Array, Mask]:
+    """How far some channels move between two samples over what they usually do (N,), and where that is a sample more.
+
+    It is beyond resolution and noise, as far in all channels alike, and at least one whole sample more.
+    """
+    grain = np.sum(np.median(np.abs(np.diff(moved, axis=0)), axis=0) ** 2 * chosen, axis=1)
+    moved, usual = moved * chosen, usual * chosen
+    size = np.sum(usual**2, axis=1)
+    ratio = np.sum(moved * usual, axis=1) / np.maximum(size, np.finfo(float).tiny)
+    left = np.sum((moved - ratio[:, None] * usual) ** 2, axis=1)
+    far = (size > GRAIN**2 * grain) & (ratio > 2 - UNIFORMITY * WINDOW) & (left < UNIFORMITY * ratio**2 * size)
+    return ratio, np.asarray(far)
 
 
 def unwrapped(segments: Sequence[Segment]) -> tuple[list[Segment], list[Fault]]:
