@@ -18,6 +18,7 @@ import numpy as np
 from hil.exam.sources.campaigns import drive_campaign
 from ident.campaign.plan import make_plan
 from ident.effects.text import parse_effect
+from ident.errors import UserError
 from ident.records.files import write_record
 from ident.records.record import FOUR_STEPS, Step
 from ident.vehicle.description import load_vehicle
@@ -30,10 +31,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("record", type=Path)
     parser.add_argument("--effect", action="append", default=[], metavar="NAME@PLACE=SIZE")
-    parser.add_argument("--periods", type=int, default=6)
+    parser.add_argument("--periods", type=int, default=6, help="repeats of every step, at least 4")
     parser.add_argument("--excitation", type=int, default=1, help="seed of the planned motion")
     parser.add_argument("--seed", type=int, default=1, help="of the noise")
     arguments = parser.parse_args()
+    try:
+        _write(arguments)
+    except UserError as error:
+        parser.error(f"{error.what} {error.remedy}")
+    print(f"Written: {arguments.record}")
+
+
+def _write(arguments: argparse.Namespace) -> None:
     plan = make_plan(
         load_vehicle("prototype"),
         np.random.default_rng(arguments.excitation),
@@ -43,7 +52,6 @@ def main() -> None:
     )
     record = drive_campaign(plan, arguments.seed, [parse_effect(text) for text in arguments.effect])
     write_record(record, arguments.record)
-    print(f"Written: {arguments.record}")
 
 
 if __name__ == "__main__":
