@@ -101,8 +101,7 @@ def seal(
             sealed = seal_axes(Order(out, composition, key, first_seed, jobs, scheduler), shown)
     else:
         load_emulation()
-        from hil.exam.order import VehicleOrder
-        from hil.exam.sealing import seal
+        from hil.exam.sealing import VehicleOrder, seal
         from hil.exam.world import stored_model, stored_sizes
         from hil.exam.worlds import world_of
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from emulator.prototype import load_prototype
 from hil.bench.prototypes import is_vehicle_file
 from ident.vehicle.description import load_vehicle
-from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+from ident.vehicle.parameters import Parameters, exact_parameters
 
 
 def truth_of(prototype: str) -> Parameters:
@@ -18,4 +16,4 @@ def truth_of(prototype: str) -> Parameters:
         DataFileError: there is no such prototype.
     """
     values = load_vehicle(prototype).prior if is_vehicle_file(prototype) else load_prototype(prototype).truth
-    return Parameters(np.array([values[name] for name in PARAMETER_NAMES]), np.zeros(len(PARAMETER_NAMES)))
+    return exact_parameters(values)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hil.exam.cases import Injected
 from hil.exam.sizes import SizeTable
+from hil.exam.smooth import draw_length, smooth_values
 from ident.diagnosis.law.spline import Knots
 from ident.diagnosis.linear import least_squares, rms
 from ident.effects import Effect, make_effect
@@ -27,9 +28,6 @@ Array = NDArray[np.float64]
 
 MEASURE: Final = "asymmetric_coulomb"
 """The effect whose size says how many Nm are a noise unit at a joint: it pushes with its size wherever that moves."""
-
-LENGTHS: Final = (0.1, 0.6)
-"""Over which a function changes, as a share of the range of its variable; of a periodic one, of the period."""
 
 SLACK: Final = 0.5
 """Largest share of the range by which the coefficients reach beyond it, on either side."""
@@ -73,7 +71,7 @@ def draw_laws(table: SizeTable, sizes: Sequence[float], generator: np.random.Gen
 
 def _drawn(name: str, where: str, size: float, table: SizeTable, generator: np.random.Generator) -> Injected:
     row = next(row for row in table.visible if (row.name, row.where) == (MEASURE, where))
-    length = math.exp(generator.uniform(math.log(LENGTHS[0]), math.log(LENGTHS[1])))
+    length = draw_length(generator)
     before, behind = generator.uniform(0.0, SLACK, size=2).tolist()
     numbers = {"unit": row.physical(1.0), "before": before, "behind": behind}
     periodic = name == "law_angle" and where in WHEEL_PLACES
@@ -87,8 +85,7 @@ def _smooth(length: float, periodic: bool, generator: np.random.Generator) -> Ar
     distance = np.subtract.outer(np.arange(COUNT), np.arange(COUNT)) / (COUNT if periodic else COUNT - 3)
     if periodic:
         distance = np.sin(np.pi * distance) / np.pi
-    powers, vectors = np.linalg.eigh(np.exp(-0.5 * (distance / length) ** 2))
-    return np.asarray(vectors @ (np.sqrt(np.maximum(powers, 0.0)) * generator.normal(size=COUNT)))
+    return smooth_values(distance, length, generator)
 
 
 def law_effect(injected: Injected, planned: Record) -> Effect:

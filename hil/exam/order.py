@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hil.exam.drawing import Composition
-from hil.exam.world import World
 
 
 @dataclass(frozen=True)
@@ -28,16 +27,3 @@ class Order:
     first_seed: int | None
     jobs: int
     scheduler: str | None
-
-
-@dataclass(frozen=True)
-class VehicleOrder(Order):
-    """An exam of a vehicle.
-
-    Attributes:
-        world: vehicle and physics.
-        model: file of the model under test.
-    """
-
-    world: World
-    model: Path

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 from emulator.effects import INJECTORS, Wanted
 from emulator.engine.choice import ENGINES
 from emulator.vehicle import EmulatedVehicle
@@ -25,7 +23,7 @@ from ident.effects import Effect
 from ident.errors import UserError
 from ident.extras import EngineName, require_engine
 from ident.records.record import Record
-from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+from ident.vehicle.parameters import Parameters, exact_parameters
 
 LENGTHS: Final = "prototype"
 """The vehicle whose lengths the independent one has."""
@@ -77,8 +75,7 @@ class IndependentWorld(World):
 
     def truth(self) -> Parameters:
         """Of `Truth`."""
-        values = Truth().parameters
-        return Parameters(np.array([values[name] for name in PARAMETER_NAMES]), np.zeros(len(PARAMETER_NAMES)))
+        return exact_parameters(Truth().parameters)
 
     def can_have(self, name: str, where: str) -> bool:
         """Whether it was written for that vehicle."""

@@ -129,9 +129,7 @@ class Fitted:
 
     def _lacking(self, index: int) -> float:
         """Of what is left without it, where that is more than without any: effects can make up for each other."""
-        labels = self.reached_by(index)
-        whole = self._gap_of_means(self.found.variants, labels=labels)
-        without = self._gap_of_means(self.others(index), held=self._is_given, labels=labels).after
+        whole, without = self._where_it_acts(index, held=self._is_given)
         above = replace(whole, before=max(whole.before, without), after=max(whole.after, whole.floor))
         return _share(above, without)
 
@@ -148,9 +146,13 @@ class Fitted:
 
     def closed_where_it_acts(self, index: int) -> float:
         """Share of what can be removed of the means over the repeats that an effect closes where it acts, held out."""
+        return _share(*self._where_it_acts(index))
+
+    def _where_it_acts(self, index: int, *, held: bool = False) -> tuple[Gap, float]:
+        """Gap of the means over the repeats where an effect acts, and what it is without it; `held` as above."""
         labels = self.reached_by(index)
         whole = self._gap_of_means(self.found.variants, labels=labels)
-        return _share(whole, self._gap_of_means(self.others(index), labels=labels).after)
+        return whole, self._gap_of_means(self.others(index), held=held, labels=labels).after
 
     def held_out(self) -> HeldOut:
         """What was fitted without the confirming rows."""

@@ -65,6 +65,11 @@ class Parameters:
         return Parameters(changed, self.std)
 
 
+def exact_parameters(values: Mapping[str, float] | Parameters) -> Parameters:
+    """Parameters from a number of all eleven, known without uncertainty."""
+    return Parameters(np.array([values[name] for name in PARAMETER_NAMES]), np.zeros(len(PARAMETER_NAMES)))
+
+
 def parameters_from(quantities: Mapping[str, Quantity]) -> Parameters:
     """Parameters from a mapping of all eleven quantities."""
     return Parameters(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from hil.exam.cases import Injected
+from hil.exam.smooth import draw_length, smooth_values
 from hil.exam.sources.machine import Machine
 
 Array = NDArray[np.float64]
@@ -23,9 +24,6 @@ PLACE: Final = "axis"
 
 KNOTS: Final = 25
 """Values between which a drawn function is interpolated."""
-
-LENGTHS: Final = (0.1, 0.6)
-"""Over which it changes, as a share of its range."""
 
 EDGE: Final = 1e-3
 """Velocity over which a force turns with the direction [m/s]."""
@@ -129,10 +127,9 @@ def _function(values: Mapping[str, float]) -> Callable[[float], float]:
 
 def _smooth(low: float, high: float, generator: np.random.Generator) -> dict[str, float]:
     """Values of a Gaussian process over a range."""
-    length = math.exp(generator.uniform(*np.log(LENGTHS)))
+    length = draw_length(generator)
     distance = np.subtract.outer(np.linspace(0, 1, KNOTS), np.linspace(0, 1, KNOTS))
-    powers, vectors = np.linalg.eigh(np.exp(-0.5 * (distance / length) ** 2))
-    heights = vectors @ (np.sqrt(np.maximum(powers, 0.0)) * generator.normal(size=KNOTS))
+    heights = smooth_values(distance, length, generator)
     return {"low": low, "high": high} | {f"y{index:02d}": round(float(y), 5) for index, y in enumerate(heights)}
 
 

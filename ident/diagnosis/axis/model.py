@@ -61,8 +61,8 @@ class AxisModel:
         bandwidth: of that filter [rad/s].
         inertia: M of a first estimate [kg or kg m²].
         columns: (N, p) of the smoothed motion that make an effort with the parameters of the axis.
-        effort: (N,) of a first estimate of them [N or Nm].
         first: number of the first of them among the parameters of all axes.
+        effort: (N,) of a first estimate of them [N or Nm].
         absorbed: (N,) the same, of the columns of the baseline itself.
         speed: of which the axis is seldom faster [m/s or rad/s].
         slowest: than which it is seldom slower in a row [m/s or rad/s].
@@ -80,8 +80,8 @@ class AxisModel:
     bandwidth: float
     inertia: float
     columns: Array
-    effort: Array
     first: int
+    effort: Array
     absorbed: Array
     speed: float
     slowest: float

@@ -13,8 +13,7 @@ from emulator.effects import inject
 from emulator.prototype import load_prototype
 from hil.exam.cases import SIZES, Case, Kind, case_from_json
 from hil.exam.drawing import Composition, draw_cases
-from hil.exam.order import VehicleOrder
-from hil.exam.sealing import effect_of, seal
+from hil.exam.sealing import VehicleOrder, effect_of, seal
 from hil.exam.sizes import EffectSize, SizeTable, load_rows, table_text
 from hil.exam.world import stored_model, stored_sizes
 from hil.exam.worlds import world_of

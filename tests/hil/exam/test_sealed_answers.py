@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hil.exam import sealing
+from hil.exam import sealed, sealing
 from hil.exam.answer_file import answer_hash, answer_text, open_answer, open_cases, undriven_text
 from hil.exam.cases import Case
 from hil.exam.diagnosing import refuse_undiagnosed
@@ -18,8 +18,7 @@ from hil.exam.drawing import Composition, draw_cases
 from hil.exam.folder import Exam, ExamFolder, read_exam, write_exam
 from hil.exam.key import Key, make_key, read_key
 from hil.exam.lots import lots_of_key, lots_of_seed
-from hil.exam.order import VehicleOrder
-from hil.exam.sealing import seal
+from hil.exam.sealing import VehicleOrder, seal
 from hil.exam.sizes import SizeTable
 from hil.exam.world import World
 from hil.exam.worlds import world_of
@@ -213,14 +212,14 @@ def test_records_look_alike_from_outside_however_long_they_took(
     """Made one after the other in the order of the names that everybody sees, whatever order they were driven in."""
     order = ordered(folder, tmp_path / "exam.key", None)
     written_names: list[str] = []
-    write = sealing.write_whole
+    write = sealed.write_whole
 
     def noted(content: str | bytes, path: Path) -> None:
         if path.parent.name == "cases":
             written_names.append(path.name.partition(".")[0])
         write(content, path)
 
-    monkeypatch.setattr(sealing, "write_whole", noted)
+    monkeypatch.setattr(sealed, "write_whole", noted)
     exam = sealed_without_driving(order, table, monkeypatch)
     stats = [path.stat() for path in (folder.path / "cases").iterdir()]
     assert len(stats) == 2 * FEW.total
