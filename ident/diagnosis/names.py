@@ -19,6 +19,7 @@ class EffectName(enum.StrEnum):
     ASYMMETRIC_COULOMB = "asymmetric_coulomb"
     ASYMMETRIC_VISCOUS = "asymmetric_viscous"
     QUADRATIC_DRAG = "quadratic_drag"
+    FRICTION_POSITION = "friction_position"
     SLOPE = "slope"
     COM_OFFSET = "com_offset"
     PAYLOAD = "payload"
@@ -43,6 +44,7 @@ _AT_GROUPS: Final[Mapping[EffectName, tuple[str, ...]]] = MappingProxyType(
         EffectName.ASYMMETRIC_COULOMB: ("wheels", "steering"),
         EffectName.ASYMMETRIC_VISCOUS: ("wheels", "steering"),
         EffectName.QUADRATIC_DRAG: ("wheels",),
+        EffectName.FRICTION_POSITION: ("steering",),
         EffectName.TIME_DELAY: ("drives", "encoders"),
         EffectName.TORQUE_RIPPLE: ("drives",),
     }

@@ -25,7 +25,6 @@ class AxisEffect(enum.StrEnum):
     """Effects that are looked for at axes alone."""
 
     COUPLED_FRICTION = "coupled_friction"
-    FRICTION_POSITION = "friction_position"
     FRICTION_LOAD = "friction_load"
     FRICTION_WARMING = "friction_warming"
     PRESLIDING = "presliding"
@@ -36,7 +35,6 @@ class AxisEffect(enum.StrEnum):
 
 OVER: Final[Mapping[str, tuple[Variable, Partner]]] = MappingProxyType(
     {
-        AxisEffect.FRICTION_POSITION: (Variable.ANGLE, Partner.DIRECTION),
         AxisEffect.FRICTION_LOAD: (Variable.LOAD, Partner.DIRECTION),
         AxisEffect.PRESLIDING: (Variable.PATH_SINCE_REVERSAL, Partner.DIRECTION),
         AxisEffect.GRAVITY_LOAD: (Variable.ANGLE, Partner.NOTHING),

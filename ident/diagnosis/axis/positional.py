@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear
+from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate
 from ident.effects import EffectParameter
 from ident.records.axis_record import AxisKind
@@ -18,7 +19,7 @@ Array = NDArray[np.float64]
 def friction_position(axis: AxisModel) -> Candidate:
     """Dry friction that grows along the travel, as where guides are not parallel or a belt is tighter."""
     parameter = EffectParameter("slope", axis.unit("/q"), "of the Coulomb friction over the position")
-    return linear(axis, AxisEffect.FRICTION_POSITION, [parameter], _centred(axis) * np.sign(axis.motion.velocity))
+    return linear(axis, EffectName.FRICTION_POSITION, [parameter], _centred(axis) * np.sign(axis.motion.velocity))
 
 
 def inertia_position(axis: AxisModel) -> Candidate:

@@ -53,6 +53,7 @@ SHAPES: Final[Mapping[EffectName, Shape]] = MappingProxyType(
         EffectName.ASYMMETRIC_COULOMB: Shape(("imbalance",)),
         EffectName.ASYMMETRIC_VISCOUS: Shape(("imbalance",)),
         EffectName.QUADRATIC_DRAG: Shape(("coefficient",)),
+        EffectName.FRICTION_POSITION: Shape(("slope",)),
         EffectName.SLOPE: Shape(("angle",), angle="direction", simple=True),
         EffectName.COM_OFFSET: Shape(("x", "y"), curved=True),
         EffectName.PAYLOAD: Shape(("mass", "inertia")),

@@ -8,6 +8,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from emulator.effects import inject
+from emulator.effects.laws import Moment
+from emulator.prototype import load_prototype
+from ident.effects import make_effect
+from ident.errors import UserError
+
 Make = Callable[..., object]
 
 
@@ -81,3 +87,20 @@ def test_scrub_resists_turning_on_the_spot_and_not_driving_straight(make: Make) 
     assert steering[0] - steering[1] == pytest.approx(4.0, rel=0.02)
     straight = [m.hold_speed([2.0] * 4, 3.0) for m in (make("scrub@steering_left=4Nm"), make())]
     assert straight[0].sum() == pytest.approx(straight[1].sum(), rel=1e-3)
+
+
+@pytest.mark.parametrize("angle", [0.8, -0.8])
+def test_friction_over_the_position_is_the_same_at_both_units_of_a_side(angle: float) -> None:
+    [effect] = [make_effect("friction_position", "steering_left", {"slope": 3.0})]
+    # The rear unit turns against the front one.
+    now = Moment(0.0, None, [angle, -angle, 0.5, -0.5, 0, 0, 0, 0], [0.1] * 8, [0.0] * 8, [0.0] * 4, [5.0] * 8)
+    for law in inject(load_prototype(), [effect], 1e-3).laws:
+        law(now)
+    assert now.coulomb == pytest.approx([5.0 + 1.5 * angle] * 2 + [5.0] * 6)
+    assert now.torques == [0.0] * 8
+
+
+def test_friction_that_would_drive_a_steering_axis_is_refused() -> None:
+    effect = make_effect("friction_position", "steering_left", {"slope": 50.0})
+    with pytest.raises(UserError, match="more than the dry friction has to lose"):
+        inject(load_prototype(), [effect], 1e-3)

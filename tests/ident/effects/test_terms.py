@@ -143,6 +143,16 @@ def test_friction_adds_to_viscous_and_coulomb_by_direction(
     assert np.count_nonzero(viscous) == 1
 
 
+@pytest.mark.parametrize("rate", [0.4, -0.4])
+def test_friction_over_the_position_resists_what_turns_more_where_it_stands_further(
+    rate: float, state: terms.State, vehicle: VehicleDescription
+) -> None:
+    state.rates[3:5] = rate
+    found = forces("friction_position", "steering", state, vehicle, slope=2.0)
+    assert found[3:5] == pytest.approx(2.0 * state.alpha * np.sign(rate))
+    assert np.count_nonzero(found) == 2
+
+
 def test_drag_takes_power_whatever_the_direction(state: terms.State, vehicle: VehicleDescription) -> None:
     speed = np.hypot(*state.rates[:2])
     drag = forces("quadratic_drag", "chassis", state, vehicle, coefficient=30.0)
