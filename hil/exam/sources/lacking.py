@@ -122,6 +122,18 @@ def _quadratic_drag(built: Built, effect: Effect) -> Built:
     return built.resisting(drag)
 
 
+def _friction_position(built: Built, effect: Effect) -> Built:
+    rows = _rows(effect.where)
+
+    def more(alpha: Array, _beta: Array, rates: Array, _time: float) -> Array:
+        torques = np.zeros_like(rates)
+        for row in rows:
+            torques[:, row] = effect["slope"] * alpha[:, row - 3]
+        return torques
+
+    return built.drier(more)
+
+
 def _friction_warming(built: Built, effect: Effect) -> Built:
     rows, parameters = _rows(effect.where), built.truth.parameters
     viscous, dry = np.array([[parameters[name] for name in _FRICTION[row - 3]] for row in rows]).T
@@ -261,6 +273,7 @@ _MADE: Final[Mapping[str, Callable[[Built, Effect], Built]]] = MappingProxyType(
         "scrub": _scrub,
         "parameter_change": _parameter_change,
         "friction_warming": _friction_warming,
+        "friction_position": _friction_position,
     }
     | dict.fromkeys(("law_rate", "law_angle", "law_angle_direction", "law_angle_rate"), _law)
 )
