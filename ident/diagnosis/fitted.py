@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -147,6 +148,15 @@ class Fitted:
     def closed_where_it_acts(self, index: int) -> float:
         """Share of what can be removed of the means over the repeats that an effect closes where it acts, held out."""
         return _share(*self._where_it_acts(index))
+
+    def gain(self, index: int, blur: float) -> float:
+        """Log of what is above the noise, and `blur` of it, without an effect over the same with it; where it acts.
+
+        Held out, of the means over the repeats. What a greater effect beside it closes does not count.
+        """
+        whole, without = self._where_it_acts(index)
+        above = [max(after**2 - whole.floor**2, 0.0) + blur for after in (without, whole.after)]
+        return math.log(above[0] / above[1]) / 2
 
     def _where_it_acts(self, index: int, *, held: bool = False) -> tuple[Gap, float]:
         """Gap of the means over the repeats where an effect acts, and what it is without it; `held` as above."""

@@ -128,9 +128,9 @@ class Judgement:
         for index in others:
             if self._sizeless(index) or self._nothing(index):
                 return self.fitted.others(index)
-        acting = {index: self.fitted.closed_where_it_acts(index) for index in others} if self._measurable() else {}
-        least = min(acting, key=acting.__getitem__, default=None)
-        if least is not None and acting[least] < self.limits.improvement:
+        gains = {index: self.fitted.gain(index, self.limits.blur) for index in others} if self._measurable() else {}
+        least = min(gains, key=gains.__getitem__, default=None)
+        if least is not None and gains[least] < self.limits.name:
             return self.fitted.others(least)
         return self.found.variants
 

@@ -22,14 +22,13 @@ class Limits:
         nearly: the same where what repeats exceeds its limit by more than `far`.
         humble: whether no name is surer than that share, where a remainder repeats that is pardoned.
         far: what repeats, in units of its limit, above which `nearly` is asked instead of `named`.
-        improvement: share of the held-out gap that every effect but one must close; the search stops at what pays.
         widening: share of the held-out gap by which an effect may seem to widen it.
         most: share of the held-out gap that all effects must close where nothing repeats.
         measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.
         far_off: what the held-out gap may have beyond its noise, over that, to be called none.
         scarce: the same times the square root of the confirming rows, where those are few.
         law: share of the held-out gap that a law must close, and log of it that a law costs where explanations compete.
-        name: log of it that a name costs there: several of them bend to a curve as well.
+        name: log of it that a name costs there (several of them bend to a curve as well), and must gain beside others.
         blur: part of the noise's power that no explanation is asked to come nearer to than another, where they compete.
         sure: log Bayes factor of the confirming rows from which an effect stands although it seems to, by accident.
         unsteady: log evidence, for other sizes of the effects in some steps, from which they are not what they seem.
@@ -51,7 +50,6 @@ class Limits:
     nearly: float = 0.95
     humble: bool = False
     far: float = 2.5
-    improvement: float = 0.01
     widening: float = 0.1
     most: float = 0.5
     measurable: float = 0.05
@@ -63,6 +61,6 @@ class Limits:
     sure: float = 2.5
     unsteady: float = 5.0
     bent: float = 1e-3
-    sized: float = 1.0
+    sized: float = 2.0
     sure_of: float = 2.0
     curve: int = 3

@@ -55,7 +55,8 @@ class AxisMotion:
         position, velocity, acceleration: (N,) smoothed, for what is nonlinear in them [m or rad, and per s, s²].
         linear: (N, 2) acceleration and velocity of the unfiltered position, to be filtered like the effort.
         effort: (N,) measured, unfiltered [N or Nm].
-        moving: (N,) false where the axis may stick, and at the ends, where filters have not settled.
+        sticking: (N,) where the axis may stick: it reverses, or hardly moves.
+        moving: (N,) false there, with the memory of the rows' filter, and at the ends, where filters have not settled.
     """
 
     position: Array
@@ -63,6 +64,7 @@ class AxisMotion:
     acceleration: Array
     linear: Array
     effort: Array
+    sticking: NDArray[np.bool_]
     moving: NDArray[np.bool_]
 
 
@@ -110,7 +112,7 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth:
     moving[:ends] = moving[-ends:] = False
     rate = differentiate(axis.position, dt, SEVEN)
     linear = np.stack([differentiate(rate, dt, SEVEN), rate], axis=1)
-    return AxisMotion(position, velocity, differentiate(velocity, dt, SEVEN), linear, axis.effort, moving)
+    return AxisMotion(position, velocity, differentiate(velocity, dt, SEVEN), linear, axis.effort, slow, moving)
 
 
 def effort_bandwidth(effort: Array, duration: float, limit: float, sample_time: float) -> float:
@@ -147,6 +149,11 @@ def with_repeats(record: AxisRecord) -> NDArray[np.int64]:
     if len(record) - period[-1] * length < ALMOST_WHOLE * length:
         period[period == period[-1]] = -1
     return np.asarray(period, dtype=np.int64)
+
+
+def sample_noise(effort: Array, sample_time: float) -> float:
+    """Deviation of white noise that has the power of an effort (N,) in the upper half of its band."""
+    return max(math.sqrt(_noise_power(effort, sample_time) / (2 * sample_time)), np.finfo(float).tiny)
 
 
 def _noise_power(series: Array, sample_time: float) -> float:

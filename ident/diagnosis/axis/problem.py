@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,15 @@ from ident.diagnosis.axis.candidates import axis_candidates
 from ident.diagnosis.axis.dependences import axis_dependences
 from ident.diagnosis.axis.model import AxisModel
 from ident.diagnosis.axis.motion import AxisMotion, with_repeats
-from ident.diagnosis.axis.reference import Reference, Scale, Signals, axis_signals, own_columns, refuse_other_axes
+from ident.diagnosis.axis.reference import (
+    Reference,
+    Scale,
+    Signals,
+    axis_signals,
+    own_columns,
+    refuse_other_axes,
+    turning,
+)
 from ident.diagnosis.delays import HELD
 from ident.diagnosis.law.dependence import Dependence, across
 from ident.diagnosis.names import EffectName
@@ -31,6 +40,8 @@ LOW_SPEED = 0.15
 STEP = "motion"
 LAG = "lag"
 """Parameter of the baseline: of a motion behind its effort, by sampling."""
+TURN = "turn"
+"""Parameter of the baseline: of dry friction behind the direction of the velocity, which filters and sticking make."""
 SURELY = 2.0
 """Standard deviations by which a lag must exceed what sampling explains."""
 
@@ -39,7 +50,7 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
     """Rows M a + Fv v + Fc sign(v) + offset = effort of every axis of the records, and what might be missing in them.
 
     With several axes, the acceleration of each stands in the rows of all: inertia couples them, and that is no gap.
-    So does, in its own rows, a lag of each axis that sampling can explain.
+    So do, in its own rows, a lag of each axis that sampling can explain, and one of its dry friction.
 
     Raises:
         RecordError: the records do not have the same axes, or not those of the reference.
@@ -57,11 +68,14 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
 
 def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]], list[Dependence]]:
     period = with_repeats(signals.record)
-    scales, width = reference.scales, len(PARAMETERS) + len(reference.scales) - 1
+    scales, width = reference.scales, len(PARAMETERS) + len(reference.scales)
     first = np.cumsum([0, *(width + (scale.hold is not None) for scale in scales)]).tolist()
     models = [_model(signals, index, scale, first[index]) for index, scale in enumerate(scales)]
     baselines = _baselines(models, signals, reference.scales)
-    blocks = [_block(signals, model, columns, period) for model, columns in zip(models, baselines, strict=True)]
+    blocks = [
+        _block(signals.record, model, columns, period, _features(signals.motions))
+        for model, columns in zip(models, baselines, strict=True)
+    ]
     candidates = [_candidates(model, scale) for model, scale in zip(models, reference.scales, strict=True)]
     return blocks, candidates, [one for model in models for one in axis_dependences(model)]
 
@@ -97,7 +111,7 @@ def _model(signals: Signals, index: int, scale: Scale, first: int) -> AxisModel:
         kind=axis.kind,
         motion=motion,
         sample_time=signals.record.sample_time,
-        filtered=signals.filtered,
+        filtered=partial(signals.rows_of, index),
         bandwidth=signals.bandwidth,
         inertia=float(scale.values[0]),
         columns=columns,
@@ -111,21 +125,21 @@ def _model(signals: Signals, index: int, scale: Scale, first: int) -> AxisModel:
     )
 
 
-def _block(signals: Signals, model: AxisModel, baseline: Array, period: NDArray[np.int64]) -> Block:
+def _block(record: AxisRecord, model: AxisModel, baseline: Array, period: NDArray[np.int64], features: Array) -> Block:
     return Block(
-        record=signals.record.source,
+        record=record.source,
         channel=Channel.DYNAMIC,
         step=STEP,
         coordinate=model.place,
         unit=model.kind.effort_unit,
-        sample_time=signals.record.sample_time,
-        bandwidth=signals.bandwidth,
-        target=signals.filtered(model.motion.effort),
-        baseline=signals.filtered(baseline),
+        sample_time=record.sample_time,
+        bandwidth=model.bandwidth,
+        target=model.filtered(model.motion.effort),
+        baseline=model.filtered(baseline),
         moving=model.motion.moving,
         period=period,
         regions=_regions(model.motion, model.speed),
-        features=_features(signals.motions),
+        features=features,
     )
 
 
@@ -137,16 +151,18 @@ def _baseline_names(axes: Sequence[AxisSignals], scales: Sequence[Scale]) -> lis
         named += [(axis.named(name), PARAMETER_UNITS[axis.kind][name]) for name in PARAMETERS]
         named += [(f"M_{axis.name}_{other.name}", inertia) for other in axes if other is not axis]
         named += [(axis.named(LAG), "samples")] if scale.hold is not None else []
+        named += [(axis.named(TURN), "samples")]
     return named
 
 
 def _baselines(models: Sequence[AxisModel], signals: Signals, scales: Sequence[Scale]) -> list[Array]:
     """Columns (N, p) of the baseline in the rows of each axis, unfiltered, zero where they are not its own."""
-    own = [own_columns(signals.motions, index) for index in range(len(models))]
+    own = []
     for index, (model, scale) in enumerate(zip(models, scales, strict=True)):
-        if scale.hold is not None:
-            change = model.sample_time * differentiate(model.effort, model.sample_time, SEVEN)
-            own[index] = np.column_stack([own[index], change])
+        dt = model.sample_time
+        late = [dt * differentiate(model.effort, dt, SEVEN)] if scale.hold is not None else []
+        columns = own_columns(signals.motions, index)
+        own.append(np.column_stack([columns, *late, turning(model.motion, scale.values)]))
     return [
         np.hstack([columns if place == index else np.zeros_like(columns) for place, columns in enumerate(own)])
         for index in range(len(own))

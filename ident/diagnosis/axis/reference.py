@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -19,11 +20,13 @@ from ident.diagnosis.axis.motion import (
     effort_bandwidth,
     noise_limit,
     repeat_duration,
+    sample_noise,
 )
+from ident.diagnosis.axis.reversals import Sticking, Untold, untold_while_sticking
 from ident.diagnosis.delays import delayed
 from ident.errors import EstimationError, RecordError
 from ident.estimate.axis.cutoff import LARGEST_CUTOFF, position_cutoff
-from ident.estimate.axis.processing import smoothed
+from ident.estimate.axis.processing import PARAMETERS, smoothed
 from ident.estimate.filters import SEVEN, differentiate, zero_phase
 from ident.records.axis_record import AxisRecord, AxisSignals
 
@@ -80,22 +83,37 @@ class Signals:
         motions: of its axes.
         cutoff: of the position filter [rad/s].
         bandwidth: of the filter of the rows [rad/s].
+        frictions: dry friction of the axes, of a first estimate; zero: not known [N or Nm].
     """
 
     record: AxisRecord
     motions: list[AxisMotion]
     cutoff: float
     bandwidth: float
+    frictions: tuple[float, ...]
 
     def filtered(self, values: Array) -> Array:
         """The filter of the positions and that of the rows, on everything alike."""
         dt = self.record.sample_time
         return zero_phase(smoothed(values, self.cutoff, dt), self.bandwidth, dt)
 
+    @cached_property
+    def _untold(self) -> list[Untold]:
+        memory, dt = 1 / (self.bandwidth * self.record.sample_time), self.record.sample_time
+        found = []
+        for motion, friction in zip(self.motions, self.frictions, strict=True):
+            sticking = Sticking(motion.sticking, friction, sample_noise(motion.effort, dt), 1 / (self.cutoff * dt))
+            found.append(untold_while_sticking(sticking, motion.moving, self.filtered, memory))
+        return found
+
+    def rows_of(self, index: int, values: Array) -> Array:
+        """Values (N,) or (N, m) as rows of an axis: filtered, without what is likely to happen while it may stick."""
+        return self._untold[index].without(self.filtered(values))
+
     def equations(self, index: int) -> tuple[Array, Array]:
         """Own columns (n, p) of an axis in its moving rows, and its effort (n,) there."""
         motion = self.motions[index]
-        columns, effort = self.filtered(own_columns(self.motions, index)), self.filtered(motion.effort)
+        columns, effort = self.rows_of(index, own_columns(self.motions, index)), self.rows_of(index, motion.effort)
         return columns[motion.moving], effort[motion.moving]
 
     def smoothed_columns(self, index: int) -> Array:
@@ -161,15 +179,18 @@ def axis_signals(record: AxisRecord, cutoff: float, bandwidth: float, scales: Se
     Args:
         record: of any axes.
         cutoff, bandwidth: of the filters of the positions and of the rows [rad/s].
-        scales: of the axes, whose `hold` the efforts are shifted by; empty: as recorded.
+        scales: of the axes, whose `hold` the efforts are shifted by, and whose friction turns where they reverse;
+            empty: as recorded.
 
     Raises:
         EstimationError: the record is too short, or an axis does not move.
     """
+    frictions = tuple(float(scale.values[PARAMETERS.index("Fc")]) for scale in scales) or (0.0,) * len(record.axes)
     if scales:
         axes = [_on_time(axis, scale, record.sample_time) for axis, scale in zip(record.axes, scales, strict=True)]
         record = replace(record, axes=tuple(axes))
-    return Signals(record, [axis_motion(record, axis, cutoff, bandwidth) for axis in record.axes], cutoff, bandwidth)
+    motions = [axis_motion(record, axis, cutoff, bandwidth) for axis in record.axes]
+    return Signals(record, motions, cutoff, bandwidth, frictions)
 
 
 def _on_time(axis: AxisSignals, scale: Scale, sample_time: float) -> AxisSignals:
@@ -205,7 +226,13 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
         )
     values = np.linalg.lstsq(left, right, rcond=None)[0]
     bend = np.concatenate([_lagging(one, index, values)[one.motions[index].moving] for one in signals])
-    *refined, lag = np.linalg.lstsq(np.column_stack([left, bend]), right, rcond=None)[0]
+    turn = np.concatenate(
+        [
+            one.rows_of(index, turning(motion, values))[motion.moving]
+            for one, motion in zip(signals, motions, strict=True)
+        ]
+    )
+    *refined, lag, _ = np.linalg.lstsq(np.column_stack([left, bend, turn]), right, rcond=None)[0]
     speed = max(float(np.percentile(np.abs(motion.velocity), 95)) for motion in motions)
     slowest = float(np.quantile(np.concatenate([np.abs(one.velocity[one.moving]) for one in motions]), NEAREST))
     reach = float(np.ptp(np.concatenate([motion.position for motion in motions])))
@@ -213,7 +240,13 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
     return Scale(np.array(refined) if sampled else values, speed, slowest, reach, float(lag) if sampled else None)
 
 
+def turning(motion: AxisMotion, values: Array) -> Array:
+    """What dry friction (N,) of a first estimate is more when it turns a sample later [N or Nm]."""
+    direction = np.sign(motion.velocity)
+    return np.asarray(values[PARAMETERS.index("Fc")] * np.diff(direction, prepend=direction[:1]) * -1.0)
+
+
 def _lagging(signals: Signals, index: int, values: Array) -> Array:
     """Filtered change (N,) of the effort of a first estimate over a sample interval."""
     dt = signals.record.sample_time
-    return signals.filtered(dt * differentiate(signals.smoothed_columns(index) @ values, dt, SEVEN))
+    return signals.rows_of(index, dt * differentiate(signals.smoothed_columns(index) @ values, dt, SEVEN))

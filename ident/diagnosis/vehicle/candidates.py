@@ -35,6 +35,7 @@ from ident.diagnosis.vehicle.sliding import (
     SlidingCause,
     adhesion,
     slides_alone,
+    slides_at_its_limit,
     sliding_cause,
     sliding_causes,
     sliding_times,
@@ -149,24 +150,21 @@ def slid_by_any(sources: Sequence[Source], context: Context) -> Sequence[Array |
 def seen_together(
     candidates: Sequence[Candidate], slid: Sequence[Array | None], sources: Sequence[Source], context: Context
 ) -> Iterator[Candidate]:
-    """The candidates, sliding beside those that stand askew, and slip only of wheels that slide alone.
+    """The candidates, sliding beside those that stand askew, and slip only of wheels that slide alone, and let go.
 
     `slid` is that of `slid_by_any`.
     """
-    times = _sliding_times(sources, context)
+    driving = [source for source in sources if source.rolls and not source.rattles.any()]
+    inputs, settings = [context.inputs(one) for one in driving], [context.setting(one) for one in driving]
+    times = np.sum([np.zeros(len(WHEEL_PLACES)), *map(sliding_times, inputs, settings)], axis=0)
+    lets_go = slides_at_its_limit(inputs, settings)
     rolling = [mask for source in sources for mask in [_nothing_slides(source, context)] * len(source.coordinates)]
     for candidate in candidates:
         if candidate.effect == EffectName.SLIP:
-            yield replace(candidate, excluded=not slides_alone(sliding_cause(candidate.where), times))
+            alone = slides_alone(sliding_cause(candidate.where), times)
+            yield replace(candidate, excluded=not (alone and lets_go))
         else:
             yield beside_sliding(candidate, slid, rolling) if stands_askew(candidate) else candidate
-
-
-def _sliding_times(sources: Sequence[Source], context: Context) -> Array:
-    """Time (4,) that each wheel surely slides [s], drives that rattle aside; both channels have the same signals."""
-    rolling = [source for source in sources if source.rolls and not source.rattles.any()]
-    found = [sliding_times(context.inputs(source), context.setting(source)) for source in rolling]
-    return np.asarray(np.sum([np.zeros(len(WHEEL_PLACES)), *found], axis=0))
 
 
 def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Candidate:
