@@ -36,8 +36,8 @@ rows hold the resonance itself, in a valley that is a tenth wide: from beside it
 HELD_FORCE: Final = 1 / 24
 """Of T²/M, the compliance that an effort seems to have that is held over the sample interval: its spectrum is that of
 the effort times a sinc, 1 - (ωT)²/24."""
-USUAL_SHARE: Final = 0.5
-"""Of the inertia, behind a spring: from there its resonance is looked for where the search has not seen it."""
+SAMPLED: Final = 1 / 8
+"""Of T²/M, the compliance up to which sampling may be what it is: three times that of an effort that is held."""
 BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
 """Tried first, over the range of the position."""
 GRID: Final = 0.3
@@ -129,30 +129,15 @@ def _time_delay(axis: AxisModel) -> Candidate:
 
 
 def _elasticity(axis: AxisModel) -> Candidate:
-    """A load on a spring: u = M q'' + ... + c M ω²/(1 - (ω/ω_a)²) M q''; far below ω_a, only c is seen.
-
-    With a part s of the inertia behind a spring of compliance k, c = k s² and ω_a² = s / (c M): it rings no faster than
-    with all of it.
-    """
+    """A load on a spring: u = M q'' + ... + c M ω²/(1 - (ω/ω_a)²) M q''; far below ω_a, only c is seen."""
     force, slowest = axis.inertia * axis.motion.acceleration, RESONANCES[0] * axis.bandwidth
-
-    def rings_at(compliance: float, share: float) -> float:
-        return math.sqrt(share / max(abs(compliance * axis.inertia), np.finfo(float).tiny))
 
     def series(resonance: float) -> Array:
         within = np.clip(abs(resonance), slowest, RESONANCES[-1] * axis.bandwidth)
         return axis.inertia * sprung(force, float(within), axis.sample_time)
 
-    def contribution(values: Array, baseline: Array) -> tuple[Array | None, ...]:
-        heavier = float((baseline[axis.first] / axis.inertia) ** 2)
-        compliance, resonance = float(values[0]), min(abs(float(values[1])), rings_at(float(values[0]), 1.0))
-        return axis.alone(heavier * compliance * series(resonance))
-
-    def variant(resonance: float) -> Variant:
-        def start(found: Array) -> Array:
-            return np.append(found, min(resonance, rings_at(float(found[0]), USUAL_SHARE)))
-
-        return Variant(axis.alone(series(resonance)[:, None]), start)
+    def heavier(baseline: Array) -> float:
+        return float((baseline[axis.first] / axis.inertia) ** 2)
 
     unit = f"{axis.kind.position_unit}/{axis.kind.effort_unit}"
     meaning = "between drive and load, all inertia behind it; negative where the position is measured behind it"
@@ -161,17 +146,10 @@ def _elasticity(axis: AxisModel) -> Candidate:
         EffectParameter("resonance", "rad/s", "of the load, the drive held"),
     )
     sampling = axis.sample_time**2 / abs(axis.inertia)
-    variants = tuple(variant(share * axis.bandwidth) for share in RESONANCES)
-    return Candidate(
-        EffectName.ELASTICITY,
-        axis.place,
-        parameters,
-        variants,
-        contribution,
-        negligible=(sampling, sampling),
-        spread=(sampling * HELD_FORCE, 0.0),
-        price=math.log(len(variants)),
-    )
+    tried = [share * axis.bandwidth for share in RESONANCES]
+    price = math.log(len(tried))
+    candidate = shaped_by(axis, EffectName.ELASTICITY, parameters, series, tried, price=price, scale=heavier)
+    return replace(candidate, negligible=(SAMPLED * sampling, SAMPLED * sampling), spread=(HELD_FORCE * sampling, 0.0))
 
 
 def _backlash(axis: AxisModel) -> Candidate:

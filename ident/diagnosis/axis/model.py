@@ -120,11 +120,15 @@ def shaped_by(
     tried: Sequence[float],
     *,
     price: float = 0.0,
+    scale: Callable[[Array], float] = lambda _baseline: 1.0,
 ) -> Candidate:
-    """An effect of a size times a series (N,) of one more number, of which some are tried first."""
+    """An effect of a size times a series (N,) of one more number, of which some are tried first.
 
-    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
-        return axis.alone(values[0] * series(float(values[1])))
+    `scale` is by how much more the effect is, with other parameters than those of the first estimate.
+    """
+
+    def contribution(values: Array, baseline: Array) -> tuple[Array | None, ...]:
+        return axis.alone(scale(baseline) * values[0] * series(float(values[1])))
 
     def variant(number: float) -> Variant:
         return Variant(axis.alone(series(number)[:, None]), lambda found: np.append(found, number))
