@@ -183,16 +183,22 @@ def calibrate(
 @exam.command("score")
 def score_command(
     folders: Annotated[list[Path], typer.Argument(help="Folders of exams; several are counted as one, and by world.")],
-    key: KeyOption = None,
+    key: Annotated[
+        list[Path] | None,
+        typer.Option(help="Key that an exam was sealed with; once for every key that was used, none where none was."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the score. Default: that of the exam; several need one.")
     ] = None,
 ) -> None:
-    """Open the sealed answers and score; writes score.md, score.json, reliability.svg and confusion.svg."""
+    """Open the sealed answers and score; writes score.md, score.json, reliability.svg and confusion.svg.
+
+    Of several worlds, the probabilities of each are calibrated on the others too.
+    """
     if out is None and len(folders) > 1:
         raise UserError("Several exams have no one folder for their score.", "Name one: --out FOLDER.")
     target = out or folders[0]
-    report = score_exams([ExamFolder(folder) for folder in folders], np.random.default_rng(0), key)
+    report = score_exams([ExamFolder(folder) for folder in folders], np.random.default_rng(0), key or [])
     for line in summary_lines(report):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     for name, text in (

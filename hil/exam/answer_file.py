@@ -65,6 +65,18 @@ def key_of_exam(folder: ExamFolder, exam: Exam, path: Path | None) -> Key | None
     return key
 
 
+def own_key(folder: ExamFolder, exam: Exam, paths: Sequence[Path]) -> Path | None:
+    """The key of an exam among several; the first where none is, for whoever refuses it; None where none is given.
+
+    Raises:
+        UserError: one of them is no key.
+    """
+    if not exam.sealed or not paths:
+        return None
+    salt = bytes.fromhex(exam.salt)
+    return next((path for path in paths if read_key(path, folder.path).fingerprint(salt) == exam.key), paths[0])
+
+
 def open_answer(folder: ExamFolder, exam: Exam, key: Key | None) -> list[Case]:
     """The cases of an exam, from its answer.
 

@@ -11,11 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from hil.exam.answer_file import open_cases
+from hil.exam.answer_file import open_cases, own_key
 from hil.exam.answer_sets import chance, permuted, read_answers
 from hil.exam.answers import Answer
 from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.identity import exam_identities
+from hil.exam.recalibration import LeftOut, each_left_out
 from hil.exam.score_names import ASKED, PERMUTED, RIGHT
 from hil.exam.scoring import Group, Score, missing_cases, removal_rates, score
 from hil.exam.statistics import Rate
@@ -33,6 +34,7 @@ class ScoreReport:
         worlds: vehicle and engine that the cases were driven with, in words, of every exam.
         first_seeds: that the cases follow from, of exams that are not sealed.
         sources: score of each world by itself, where there are several.
+        left_out: each of them with probabilities calibrated on the others.
     """
 
     score: Score
@@ -42,6 +44,7 @@ class ScoreReport:
     worlds: tuple[str, ...]
     first_seeds: tuple[int, ...] = ()
     sources: Mapping[str, Score] = field(default_factory=dict)
+    left_out: Mapping[str, LeftOut] = field(default_factory=dict)
 
     @property
     def origin(self) -> str:
@@ -62,18 +65,18 @@ class ScoreReport:
         return f"chance, {self.chance:.3f}" if name == PERMUTED else ASKED.get(name, "")
 
 
-def score_exams(folders: Sequence[ExamFolder], generator: np.random.Generator, key: Path | None) -> ScoreReport:
+def score_exams(folders: Sequence[ExamFolder], generator: np.random.Generator, keys: Sequence[Path]) -> ScoreReport:
     """Open the answers and score all that was diagnosed; several exams count as one, and by their worlds.
 
     Args:
         folders: of the exams.
         generator: draws one permutation of the answers.
-        key: file that the exams were sealed with; None for those that are not sealed.
+        keys: files that they were sealed with; none for those that are not sealed.
 
     Raises:
         UserError: there is no exam, no diagnosis, an answer is another one, or the key is.
     """
-    opened = [_opened(folder, key) for folder in folders]
+    opened = [_opened(folder, keys) for folder in folders]
     answers = [answer for one in opened for answer in one.answers]
     missing: Counter[str] = Counter()
     for one in opened:
@@ -89,6 +92,9 @@ def score_exams(folders: Sequence[ExamFolder], generator: np.random.Generator, k
         worlds=worlds,
         first_seeds=tuple(one.first_seed for one in opened if one.first_seed is not None),
         sources={world: score(own) for world, own in by_world.items()} if len(opened) > 1 else {},
+        left_out=each_left_out(
+            {world: [one for answer in own for one in answer.statements] for world, own in by_world.items()}
+        ),
     )
 
 
@@ -103,8 +109,9 @@ class _Opened:
     missing: Mapping[str, int]
 
 
-def _opened(folder: ExamFolder, key: Path | None) -> _Opened:
-    exam, cases = read_exam(folder), open_cases(folder, key)
+def _opened(folder: ExamFolder, keys: Sequence[Path]) -> _Opened:
+    exam = read_exam(folder)
+    cases = open_cases(folder, own_key(folder, exam, keys))
     known = exam_identities(folder)
     without = read_answers(folder, cases, known, removed=True) if folder.diagnosed(removed=True) else []
     answers = read_answers(folder, cases, known)
@@ -118,7 +125,12 @@ def summary_lines(report: ScoreReport) -> list[str]:
     width = max(len(name) for name in texts)
     lines = [f"{name:<{width}}  {text:<32}{_wish(report.asked(name))}".rstrip() for name, text in texts.items()]
     counted = f"{report.score.cases} cases scored, {sum(report.score.missing.values())} without an answer."
-    return [counted, report.origin, *lines]
+    calibrated = [
+        f"{world}, calibrated on the others: error {one.error:.2f} (as stated {one.stated_error:.2f}), log score "
+        f"{one.log_score:.3f} (as stated {one.stated_log_score:.3f}, base rate {one.base_log_score:.3f})"
+        for world, one in report.left_out.items()
+    ]
+    return [counted, report.origin, *lines, *calibrated]
 
 
 def score_markdown(report: ScoreReport, title: str) -> str:
@@ -129,7 +141,7 @@ def score_markdown(report: ScoreReport, title: str) -> str:
     parts += ["| what | measured | asked |", "|---|---|---|"]
     parts += [f"| {name} | {rate} | {report.asked(name)} |" for name, rate in report.rates.items()]
     parts += [f"| {name} | {_text(value)} | {report.asked(name)} |" for name, value in score.numbers.items()]
-    parts += ["", *_sources(report.sources)]
+    parts += ["", *_sources(report.sources), *_left_out(report.left_out)]
     parts += [*_groups("size in noise units", score.by_size), *_groups("true effect", score.by_name)]
     parts += ["## Confusion", "", *_confusion(score.confusion), ""]
     parts += ["## Two effects", "", *_pairs(score.pairs), ""]
@@ -150,6 +162,7 @@ def score_json(report: ScoreReport) -> str:
             world: {name: _plain(rate) for name, rate in own.rates.items() if rate.cases}
             for world, own in report.sources.items()
         },
+        "left_out": {world: {**vars(one), "scaling": vars(one.scaling)} for world, one in report.left_out.items()},
         "cases": score.cases,
         "rates": {name: _plain(rate) for name, rate in report.rates.items() if rate.cases},
         "numbers": {name: _finite(value) for name, value in score.numbers.items()},
@@ -204,6 +217,20 @@ def _sources(sources: Mapping[str, Score]) -> list[str]:
     lines = ["## By world", "", f"| | {' | '.join(sources)} |", "|---" * (1 + len(sources)) + "|"]
     for name in names:
         lines.append(f"| {name} | {' | '.join(str(own.rates[name]) for own in sources.values())} |")
+    return [*lines, ""]
+
+
+def _left_out(sources: Mapping[str, LeftOut]) -> list[str]:
+    """Calibration of every world by the others."""
+    if not sources:
+        return []
+    titles = ("statements", "error", "as stated", "log score", "as stated", "base rate", "shift", "slope")
+    lines = ["## Calibrated on the other worlds", "", f"| | {' | '.join(titles)} |", "|---" * (1 + len(titles)) + "|"]
+    for world, one in sources.items():
+        errors, scores = (one.error, one.stated_error), (one.log_score, one.stated_log_score, one.base_log_score)
+        cells = [*(f"{error:.2f}" for error in errors), *(f"{each:.3f}" for each in scores)]
+        numbers = (f"{number:.2f}" for number in (one.scaling.shift, one.scaling.slope))
+        lines.append(f"| {world} | {one.statements} | {' | '.join([*cells, *numbers])} |")
     return [*lines, ""]
 
 

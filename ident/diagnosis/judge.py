@@ -125,6 +125,9 @@ def _with_laws(
             break
         laws = (*laws, law)
         problems, regression, variant = with_law(found.problems, found.regression, law)
+        if any(problems[0].candidates[regression.owners[one]].excluded for one in found.taken):
+            # What a name of the same kind leaves: without that name the law is all of it.
+            break
         found = most_symmetric(search(problems, regression, (*found.taken, variant)))
         judgement = judged(found, laws)
         if not judgement.incomplete():

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
+from ident.diagnosis.axis.model import AxisEffect
 from ident.diagnosis.axis.problem import axis_problem, delayed_axes
-from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_other_axes
+from ident.diagnosis.axis.reference import Reference, Scale, axis_reference, refuse_other_axes
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judge import judge
 from ident.diagnosis.limits import Limits
+from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.split import split_problem
-from ident.records.axis_record import AxisRecord
+from ident.records.axis_record import AxisRecord, AxisSignals
 from ident.stages import Stage, untold
 
 LIMITS: Final = Limits(named=0.6, nearly=0.6, humble=True)
 """Of an axis. Its effort has little noise, beside which cogging and errors of its pitch always repeat, without a name:
 what they leave does not take the name from a cause that closes one and a half times as much, but makes it less sure."""
+
+LATE: Final = (EffectName.TIME_DELAY, AxisEffect.TORQUE_FILTER)
+"""What makes a motion follow its effort later than sampling does."""
 
 
 def diagnose_axis(
@@ -54,13 +59,24 @@ def diagnose_axis(
         return judge(*pair, seed=seed, limits=LIMITS, stage=stage)
 
     findings = judged(reference)
-    late = delayed_axes(findings.after, findings.problem, fit[0].axes, reference.scales)
-    if not any(late):
+    scales = tuple(_on_second_thought(reference.scales, findings, fit[0].axes))
+    if all(scale is before for scale, before in zip(scales, reference.scales, strict=True)):
         return findings
-    pairs = zip(reference.scales, late, strict=True)
-    scales = tuple(replace(scale, hold=None) if delayed else scale for scale, delayed in pairs)
-    stage("again, an axis being late")
+    stage("again, an axis being late, or not")
     return judged(replace(reference, scales=scales))
+
+
+def _on_second_thought(scales: Sequence[Scale], findings: Findings, axes: Sequence[AxisSignals]) -> Iterator[Scale]:
+    """Scales without a hold where the lag is a delay, and with one where a seeming delay was something else."""
+    named = {cause.candidate.where for cause in findings.causes if cause.candidate.effect in LATE}
+    late = delayed_axes(findings.after, findings.problem, axes, scales)
+    for scale, axis, delayed in zip(scales, axes, late, strict=True):
+        if delayed:
+            yield replace(scale, hold=None)
+        elif scale.hold is None and axis.named("axis") not in named:
+            yield replace(scale, hold=0.0)
+        else:
+            yield scale
 
 
 def _without(problem: Problem, names: Collection[str]) -> Problem:

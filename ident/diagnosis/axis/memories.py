@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
 from ident.diagnosis.axis.reference import NEAREST
-from ident.diagnosis.delays import led
+from ident.diagnosis.delays import HELD, led
 from ident.diagnosis.law.dependence import path_since_reversal
 from ident.diagnosis.problem import Candidate, Variant
 from ident.effects import EffectParameter
@@ -88,4 +88,14 @@ def torque_filter(axis: AxisModel) -> Candidate:
         EffectParameter("time", "s", "constant of the filter between the effort reported and the one that acts"),
     )
     variants = (Variant(axis.alone(slope[:, None])),)
-    return Candidate(AxisEffect.TORQUE_FILTER, axis.place, parameters, variants, contribution, least=0.0, price=RARER)
+    shortest = HELD * axis.sample_time
+    return Candidate(
+        AxisEffect.TORQUE_FILTER,
+        axis.place,
+        parameters,
+        variants,
+        contribution,
+        least=0.0,
+        negligible=(shortest, shortest),
+        price=RARER,
+    )

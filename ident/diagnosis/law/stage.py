@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.functions import function_of
 from ident.diagnosis.law.dependence import Dependence
 from ident.diagnosis.law.learning import Designs, Learner, Learnt
 from ident.diagnosis.problem import Candidate, Problem, Variant
@@ -97,7 +98,10 @@ def next_law(problems: Sequence[Problem], regression: Regression, designs: Desig
 def with_law(
     problems: Sequence[Problem], regression: Regression, law: Law
 ) -> tuple[tuple[Problem, ...], Regression, int]:
-    """The problems and their rows with the law as one more candidate, and the number of its variant."""
+    """The problems and their rows with the law as one more candidate, and the number of its variant.
+
+    Names that are functions of the same at the same place are none beside it: it may be what they are.
+    """
     changed: list[Problem] = []
     series: list[Array | None] = []
     for problem in problems:
@@ -106,12 +110,19 @@ def with_law(
         series += columns
         variants = (Variant(columns),)
         candidate = Candidate(law.dependence.effect, law.dependence.where, (SCALE,), variants, least=0.0, learnt=True)
-        changed.append(replace(problem, candidates=(*problem.candidates, candidate)))
+        others = (replace(one, excluded=one.excluded or _is_another(one, law.dependence)) for one in problem.candidates)
+        changed.append(replace(problem, candidates=(*others, candidate)))
     rows = regression.rows
     end = rows.columns.shape[1]
     column = Column(law.number, 0, slice(end, end + 1), 0.0, (0.0, 0.0))
     wider = replace(rows, columns=np.hstack([rows.columns, rows.stack(series, 1)]), layout=(*rows.layout, column))
     return tuple(changed), Regression(changed[0], wider, regression.settings, regression.seed), len(rows.layout)
+
+
+def _is_another(candidate: Candidate, dependence: Dependence) -> bool:
+    """Whether a candidate is a function of what a law is one of."""
+    there = candidate.where == dependence.where
+    return there and function_of(candidate.effect) == (dependence.variable, dependence.partner)
 
 
 def _tried(learner: Learner, designs: Designs, index: int) -> Learnt | None:
