@@ -152,9 +152,10 @@ class Fitted:
     def gain(self, index: int, blur: float) -> float:
         """Log of what is above the noise, and `blur` of it, without an effect over the same with it; where it acts.
 
-        Held out, of the means over the repeats. What a greater effect beside it closes does not count.
+        Held out, of the means over the repeats, the values of a judged model held. What a greater effect beside it
+        closes does not count.
         """
-        whole, without = self._where_it_acts(index)
+        whole, without = self._where_it_acts(index, held=self._is_given)
         above = [max(after**2 - whole.floor**2, 0.0) + blur for after in (without, whole.after)]
         return math.log(above[0] / above[1]) / 2
 

@@ -128,11 +128,16 @@ class Judgement:
         for index in others:
             if self._sizeless(index) or self._nothing(index):
                 return self.fitted.others(index)
-        gains = {index: self.fitted.gain(index, self.limits.blur) for index in others} if self._measurable() else {}
-        least = min(gains, key=gains.__getitem__, default=None)
-        if least is not None and gains[least] < self.limits.name:
-            return self.fitted.others(least)
+        pays = {index: self._pays(index) for index in others} if self._measurable() else {}
+        if not all(pays.values()):
+            return self.fitted.others(min((one for one in pays if not pays[one]), key=lambda one: closed[one]))
         return self.found.variants
+
+    def _pays(self, index: int) -> bool:
+        """Whether an effect beside others closes a part of the gap that counts, or gains what a name costs."""
+        if self.fitted.closed_where_it_acts(index) >= self.limits.improvement:
+            return True
+        return self.fitted.gain(index, self.limits.blur) >= self.limits.name
 
     def _law(self, index: int) -> Law | None:
         """The law that a cause is, if it is one."""

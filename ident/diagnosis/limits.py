@@ -22,6 +22,7 @@ class Limits:
         nearly: the same where what repeats exceeds its limit by more than `far`.
         humble: whether no name is surer than that share, where a remainder repeats that is pardoned.
         far: what repeats, in units of its limit, above which `nearly` is asked instead of `named`.
+        improvement: share of the held-out gap from which every effect but one counts, whatever it gains.
         widening: share of the held-out gap by which an effect may seem to widen it.
         most: share of the held-out gap that all effects must close where nothing repeats.
         measurable: power of that gap, over the noise's, from which such a share is no accident of the noise.
@@ -50,6 +51,7 @@ class Limits:
     nearly: float = 0.95
     humble: bool = False
     far: float = 2.5
+    improvement: float = 0.01
     widening: float = 0.1
     most: float = 0.5
     measurable: float = 0.05

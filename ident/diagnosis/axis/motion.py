@@ -31,6 +31,13 @@ MOST_ROWS: Final = 4000
 """Rows of a repeat beyond which more say nothing new and take long."""
 EFFORT_SHARE: Final = 0.99
 """Of the power of the effort that the rows keep. What lies above belongs to drives and structures, not to the axis."""
+GUARDS: Final = (4.0, 2.0)
+"""Time constants of the rows' filter around a reversal that have no rows, and where that leaves less than `AFFORDED`.
+
+The rest is weighed out (`ident.diagnosis.axis.reversals`): less sure than not to have it, but better than no record.
+"""
+AFFORDED: Final = 0.5
+"""Part of a record that shall have rows."""
 STUCK_SPEED: Final = 0.01
 """Over the 95th percentile of the speed: below it an axis may stick."""
 REPEAT_MISMATCH: Final = 0.03
@@ -56,7 +63,7 @@ class AxisMotion:
         linear: (N, 2) acceleration and velocity of the unfiltered position, to be filtered like the effort.
         effort: (N,) measured, unfiltered [N or Nm].
         sticking: (N,) where the axis may stick: it reverses, or hardly moves.
-        moving: (N,) false there, with the memory of the rows' filter, and at the ends, where filters have not settled.
+        moving: (N,) false there, `GUARDS` around it, and at the ends, where filters have not settled.
     """
 
     position: Array
@@ -81,14 +88,13 @@ def noise_limit(axis: AxisSignals, inertia: float, cutoff: float, sample_time: f
 def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth: float) -> AxisMotion:
     """Motion of an axis by a zero-phase filter of `cutoff` and differences, for rows up to `bandwidth` [rad/s].
 
-    Where an axis reverses it may stick, and friction is then whatever holds it: such rows are left out, with the memory
-    of the rows' filter around them.
+    Where an axis reverses it may stick, and friction is then whatever holds it: such rows are left out, with `GUARDS`
+    around them.
 
     Raises:
         EstimationError: the record is too short for the filter, the axis does not move, or its effort never changes.
     """
     dt = record.sample_time
-    memory = 4 / bandwidth
     noise = float(np.std(np.diff(axis.position, 2))) / math.sqrt(6)
     if np.ptp(axis.position) < max(SMALLEST_MOTION, REST * noise):
         raise EstimationError(f"{record.source}: {axis.label} does not move.", "Record it while it is driven.")
@@ -107,12 +113,20 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth:
     velocity = differentiate(position, dt, SEVEN)
     speed = float(np.percentile(np.abs(velocity), 95))
     slow = (np.abs(velocity) < STUCK_SPEED * speed) | (np.diff(np.sign(velocity), prepend=np.sign(velocity[0])) != 0)
-    moving = ~ndimage.binary_dilation(slow, np.ones(2 * round(memory / dt) + 1))
-    ends = max(1, round(2 * memory / dt))
-    moving[:ends] = moving[-ends:] = False
+    moving = _apart(slow, GUARDS[0] / (bandwidth * dt))
+    if moving.mean() < AFFORDED:
+        moving = _apart(slow, GUARDS[1] / (bandwidth * dt))
     rate = differentiate(axis.position, dt, SEVEN)
     linear = np.stack([differentiate(rate, dt, SEVEN), rate], axis=1)
     return AxisMotion(position, velocity, differentiate(velocity, dt, SEVEN), linear, axis.effort, slow, moving)
+
+
+def _apart(slow: NDArray[np.bool_], guard: float) -> NDArray[np.bool_]:
+    """Samples (N,) further than a guard from slow ones, and twice that from the ends."""
+    moving = ~ndimage.binary_dilation(slow, np.ones(2 * round(guard) + 1))
+    ends = max(1, round(2 * guard))
+    moving[:ends] = moving[-ends:] = False
+    return np.asarray(moving, dtype=np.bool_)
 
 
 def effort_bandwidth(effort: Array, duration: float, limit: float, sample_time: float) -> float:

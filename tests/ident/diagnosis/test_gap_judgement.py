@@ -242,7 +242,7 @@ def test_where_nothing_came_along_a_small_size_is_as_good_as_its_rows(world: typ
     assert findings.causes[0].part.std[0] > 0.2
 
 
-@pytest.mark.parametrize(("own", "named"), [(0.3, ["a"]), (0.12, ["b"])])
+@pytest.mark.parametrize(("own", "named"), [(0.5, ["a"]), (0.12, ["b"])])
 def test_a_play_within_what_its_flanks_may_yield_is_their_compliance(
     world: type[Any], own: float, named: list[str]
 ) -> None:
