@@ -14,15 +14,18 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from fmu.attachments import build_description, terminals
 from fmu.compiling import Compiler, compile_libraries, universal_binary
 from fmu.description import FmiVersion, model_description
 from fmu.documentation import documentation_page
 from fmu.glue import wrapper_sources
-from fmu.interface import MODEL_IDENTIFIER, Interface, with_indicators
+from fmu.interface import MODEL_IDENTIFIER, Experiment, Interface, with_indicators
 from fmu.platforms import PLATFORMS, Platform
 from fmu.source import Model, ModelSource, make_model
 from fmu.variables import Inputs
+from ident.plant.contact import Contacts
 
 INDICATORS: Final = 4
 """Event indicators of the model, one for each condition of (9)."""
@@ -50,11 +53,13 @@ class Order:
         version: of FMI.
         inputs: what drives the wheels.
         platforms: to build for.
+        contacts: stiff for solvers that are implicit, soft for others.
     """
 
     version: FmiVersion
     inputs: Inputs
     platforms: tuple[Platform, ...]
+    contacts: Contacts = Contacts.STIFF
 
 
 def build_fmu(
@@ -76,8 +81,8 @@ def build_fmu(
     Raises:
         UserError: a compiler is missing or fails.
     """
-    model = make_model(source, order.inputs)
-    interface = _interface(source, model, order.inputs)
+    model = make_model(source, order.inputs, order.contacts)
+    interface = _interface(source, model, order)
     token = _token(model, interface, order.version)
     sources = fmu_sources(model, interface, order.version, token)
     libraries = compile_libraries(sources, order.platforms, compiler, progress, cache)
@@ -99,17 +104,31 @@ def fmu_sources(model: Model, interface: Interface, version: FmiVersion, token: 
     return core | wrapper_sources(interface.table, version, token)
 
 
-def _interface(source: ModelSource, model: Model, inputs: Inputs) -> Interface:
+def _interface(source: ModelSource, model: Model, order: Order) -> Interface:
     return Interface(
         name=f"quasiomni.{_identifier(source.vehicle.name)}",
-        description=f"Identified model of {source.vehicle.name}, {inputs} inputs",
+        description=f"Identified model of {source.vehicle.name}, {order.inputs} inputs, {order.contacts} contacts",
         version=version("quasiomni"),
         tool=f"quasiomni {version('quasiomni')}",
         copyright=_COPYRIGHT,
         license="Apache-2.0",
         table=with_indicators(model.table, INDICATORS),
         dependencies=model.dependencies,
+        experiment=_EXPERIMENTS[order.contacts](model),
     )
+
+
+def _for_implicit_solvers(_model: Model) -> Experiment:
+    return Experiment()
+
+
+def _for_explicit_solvers(model: Model) -> Experiment:
+    """A step within the fastest time constant, one digit of it."""
+    digit = 10.0 ** np.floor(np.log10(model.fastest))
+    return Experiment(step_size=float(f"{np.floor(model.fastest / digit) * digit:.0e}"))
+
+
+_EXPERIMENTS: Final = {Contacts.STIFF: _for_implicit_solvers, Contacts.SOFT: _for_explicit_solvers}
 
 
 def _identifier(name: str) -> str:

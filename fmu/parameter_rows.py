@@ -9,7 +9,7 @@ from typing import Final
 from fmu.variables import DEGREES, Block, Causality, Inputs, Variability, Variable
 from ident.effects import Effect, kind_of, terms_of
 from ident.effects.base import Sign
-from ident.plant.contact import CREEP_STIFFNESS
+from ident.plant.contact import CREEP_STIFFNESS, Contacts
 from ident.plant.drives import DRIVE_GAIN, DRIVE_INTEGRAL_GAIN, DRIVE_UNWIND_TIME
 from ident.plant.memories import Memories, memories_of
 from ident.plant.modes import MODE_TOLERANCE
@@ -44,7 +44,7 @@ _GEOMETRY: Final = {
 
 
 def parameter_rows(
-    vehicle: VehicleDescription, parameters: Parameters, effects: Sequence[Effect], inputs: Inputs
+    vehicle: VehicleDescription, parameters: Parameters, effects: Sequence[Effect], inputs: Inputs, contacts: Contacts
 ) -> list[Variable]:
     """All of them, in the order of the table; arguments as of `fmu.table.variable_table`."""
     dynamic = [
@@ -58,7 +58,7 @@ def parameter_rows(
     of_effects = [row for effect in effects for row in _effect_parameters(effect)]
     springs = _springs(memories_of(terms_of(effects)))
     limits = _friction_limits(vehicle, effects)
-    return dynamic + geometry + _regularisation() + limits + drives + springs + of_effects
+    return dynamic + geometry + _regularisation(contacts) + limits + drives + springs + of_effects
 
 
 def _parameter(
@@ -77,12 +77,12 @@ def _not_negative(name: str, text: str, unit: str, start: float) -> Variable:
     return _parameter(name, text, unit, start, minimum=0.0)
 
 
-def _regularisation() -> list[Variable]:
+def _regularisation(contacts: Contacts) -> list[Variable]:
     coulomb = "Rate at which Coulomb friction has reached 76 %, epsilon of (16)"
     return [
         _positive("epsilon", coulomb, "rad/s", COULOMB_EPSILON),
         _positive("stick_time", "How long motion below stiction goes on before it is held", "s", STICK_TIME),
-        _positive("creep_stiffness", "Contact force per slip velocity of a wheel", "N s/m", CREEP_STIFFNESS),
+        _positive("creep_stiffness", "Contact force per slip velocity of a wheel", "N s/m", CREEP_STIFFNESS[contacts]),
         _positive("mode_tolerance", "Of the steering angles, for the mode", "rad", MODE_TOLERANCE),
     ]
 

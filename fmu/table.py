@@ -14,6 +14,7 @@ from fmu.effect_states import (
 from fmu.parameter_rows import parameter_rows
 from fmu.variables import DEGREES, Block, Causality, Inputs, Variability, Variable, VariableTable, numbered
 from ident.effects import EFFECTS, Effect, make_effect, terms_of
+from ident.plant.contact import Contacts
 from ident.plant.memories import Memories, memories_of
 from ident.plant.places import GROUPS
 from ident.vehicle.description import VehicleDescription
@@ -31,14 +32,27 @@ _PER_SECOND: Final = {
     "Nm": "Nm/s",
 }
 
+FASTEST: Final = "fastest_time_constant"
+"""Name of the variable that tells how short a step an explicit method needs."""
+
 _STICTION: Final = {
     "stick": "Creep of {} that its friction remembers, over epsilon times stick_time",
     "lag": "Lagged load on the friction of {}",
 }
 
+_HELD_SLIP: Final = {"lat": "across", "long": "along"}
+"""How the contacts of the wheels creep."""
+
+_HELD_SLIP_SIZE: Final = 1e-3
+"""Of what a contact remembers [m/s]: what a wheel on soft contacts creeps by under 100 N."""
+
 
 def variable_table(
-    vehicle: VehicleDescription, parameters: Parameters, effects: Sequence[Effect] = (), inputs: Inputs = Inputs.TORQUE
+    vehicle: VehicleDescription,
+    parameters: Parameters,
+    effects: Sequence[Effect] = (),
+    inputs: Inputs = Inputs.TORQUE,
+    contacts: Contacts = Contacts.STIFF,
 ) -> VariableTable:
     """The table for a vehicle with its parameters (18) and effects.
 
@@ -47,12 +61,15 @@ def variable_table(
         parameters: identified.
         effects: each adds its parameters; those of `slip` are start values of the friction limits.
         inputs: motor torques, or wheel speeds with the drives' inner loop.
+        contacts: start value of their stiffness.
     """
     memories = memories_of(terms_of(effects))
     states = _states(inputs, memories)
     derivatives = [_derivative(state) for state in states]
-    tunable = parameter_rows(vehicle, parameters, effects, inputs)
-    return numbered([[_time()], states, derivatives, _inputs(inputs), tunable, _outputs(memories), [_mode()]])
+    tunable = parameter_rows(vehicle, parameters, effects, inputs, contacts)
+    return numbered(
+        [[_time()], states, derivatives, _inputs(inputs), tunable, _outputs(memories), [_mode()], [_fastest()]]
+    )
 
 
 def _time() -> Variable:
@@ -62,6 +79,11 @@ def _time() -> Variable:
 def _mode() -> Variable:
     text = "Motion mode k of (9): 1 alignment, 2 steered, 3 lateral, 4 rotation"
     return Variable("mode", text, Causality.OUTPUT, Variability.DISCRETE, Block.MODE, "1", minimum=1, maximum=4)
+
+
+def _fastest() -> Variable:
+    text = "Fastest time constant at rest: explicit methods of order 4 stay stable with steps up to 2.7 of it"
+    return Variable(FASTEST, text, Causality.CALCULATED, Variability.TUNABLE, Block.CALCULATED, "s")
 
 
 def _states(inputs: Inputs, memories: Memories) -> list[Variable]:
@@ -109,11 +131,22 @@ def _hidden_states(inputs: Inputs) -> list[Variable]:
             *(_state(f"{name}_beta_{wheel}", text.format(f"wheel {wheel}"), "1", 1.0, local) for wheel in WHEELS),
         )
     ]
+    held = [
+        _state(
+            f"held_slip_{way}_{wheel}",
+            f"Creep of contact {wheel} {text} its wheel that it remembers, over stick_time",
+            "m/s",
+            _HELD_SLIP_SIZE,
+            local,
+        )
+        for way, text in _HELD_SLIP.items()
+        for wheel in WHEELS
+    ]
     integrals = [
         _state(f"integral_{wheel}", f"Integral part of the torque of drive {wheel}", "Nm", 0.1, local)
         for wheel in WHEELS
     ]
-    return stick + (integrals if inputs is Inputs.SPEED else [])
+    return stick + held + (integrals if inputs is Inputs.SPEED else [])
 
 
 def _state(name: str, text: str, unit: str, nominal: float, causality: Causality = Causality.OUTPUT) -> Variable:

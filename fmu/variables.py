@@ -22,6 +22,7 @@ class Causality(enum.StrEnum):
 
     INDEPENDENT = "independent"
     PARAMETER = "parameter"
+    CALCULATED = "calculatedParameter"
     INPUT = "input"
     OUTPUT = "output"
     LOCAL = "local"
@@ -45,6 +46,7 @@ class Block(enum.Enum):
     PARAMETER = "p"
     OUTPUT = "y"
     MODE = "mode"
+    CALCULATED = "calculated"
     INDICATOR = "z"
 
 
@@ -86,7 +88,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class VariableTable:
-    """All variables by value reference: time, states, derivatives, inputs, parameters, outputs, mode."""
+    """All variables by value reference: time, states, derivatives, inputs, parameters, outputs, mode, calculated."""
 
     variables: tuple[Variable, ...]
 

@@ -58,6 +58,9 @@ qo_status qo_event_indicators(qo_model *model, double *z);
 /* mode from x, p. *changed tells whether it is another one now. */
 qo_status qo_update_discrete(qo_model *model, int *changed);
 
+/* Time constant [s] of the fastest part of the model with the parameters p, at rest and straight ahead. */
+qo_status qo_fastest(qo_model *model, double *seconds);
+
 /* Integrates over h [s], inputs held: x, y and mode at the end. As many internal steps as the tolerance asks for. */
 qo_status qo_step(qo_model *model, double h);
 

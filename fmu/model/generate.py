@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import casadi as ca
+import numpy as np
 
 from fmu.model.equations import equations
 from fmu.variables import Block, Inputs, Variable, VariableTable
@@ -26,7 +27,7 @@ TOLERANCE: Final = 1e-4
 FIRST_STEP: Final = 1e-3
 """Length that the first internal step tries [s]."""
 
-_WRITTEN: Final = ("core.h", "core.c", "solver.c", "qo_internal.h")
+_WRITTEN: Final = ("core.h", "core.c", "solver.c", "fastest.c", "qo_internal.h")
 """Files of the core that are written by hand."""
 
 _ROWS: Final = (("states", "NX", Block.STATE), ("inputs", "NU", Block.INPUT), ("parameters", "NP", Block.PARAMETER))
@@ -51,10 +52,12 @@ class Core:
     Attributes:
         files: name -> text; compile all that end in `.c`.
         dependencies: derivative or output -> the states and inputs that it depends on, in the order of the table.
+        fastest: time constant [s] with the parameters of the table, at rest and straight ahead.
     """
 
     files: Mapping[str, str]
     dependencies: Mapping[str, tuple[str, ...]]
+    fastest: float
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,14 @@ def generate_core(table: VariableTable, effects: Sequence[Effect], inputs: Input
         "qo_equations.h": _prototypes(routines),
         "qo_equations.c": _definitions(routines),
     }
-    return Core(MappingProxyType({**written, **generated}), MappingProxyType(_dependencies(model, table)))
+    files, dependencies = MappingProxyType({**written, **generated}), MappingProxyType(_dependencies(model, table))
+    return Core(files, dependencies, _fastest(model, table))
+
+
+def _fastest(model: Equations, table: VariableTable) -> float:
+    jacobian = ca.Function("jacobian", [model.x, model.u, model.p], [ca.jacobian(model.xd, model.x)])
+    starts = [[row.start or 0.0 for row in table.block(block)] for block in (Block.STATE, Block.INPUT, Block.PARAMETER)]
+    return float(1.0 / np.abs(np.linalg.eigvals(np.asarray(jacobian(*starts)))).max())
 
 
 def _routines(model: Equations) -> tuple[list[_Routine], int]:

@@ -47,6 +47,7 @@ typedef struct {
     qo_model model;
     double derivatives[QO_NX];
     double indicators[QO_NZ];
+    double fastest; /* time constant [s] */
     double time;
     double stop_time; /* infinite where none is set */
     int mode;         /* of the interface, a qo_mode; k of (9) is in the model */
@@ -56,6 +57,7 @@ typedef struct {
 #define QO_KNOWN_OUTPUTS 1
 #define QO_KNOWN_DERIVATIVES 2
 #define QO_KNOWN_INDICATORS 4
+#define QO_KNOWN_FASTEST 8
 
 struct qo_instance {
     qo_snapshot now;

@@ -42,6 +42,8 @@ static qo_status compute(qo_instance *me, int what)
         status = qo_derivatives(&now->model, now->derivatives);
     } else if (what == QO_KNOWN_INDICATORS) {
         status = qo_event_indicators(&now->model, now->indicators);
+    } else if (what == QO_KNOWN_FASTEST) {
+        status = qo_fastest(&now->model, &now->fastest);
     }
     now->known |= status == QO_OK ? what : 0;
     return status;
@@ -58,6 +60,7 @@ static const struct {
     [QO_PARAMETER] = {0, SETTABLE_PARAMETERS},
     [QO_OUTPUT] = {QO_KNOWN_OUTPUTS, 0},
     [QO_DISCRETE] = {0, 0},
+    [QO_CALCULATED] = {QO_KNOWN_FASTEST, 0},
     [QO_INDICATOR] = {QO_KNOWN_INDICATORS, 0},
 };
 
@@ -69,6 +72,7 @@ static double *place(qo_snapshot *now, const qo_variable *variable)
     case QO_INPUT: return now->model.u + variable->index;
     case QO_PARAMETER: return now->model.p + variable->index;
     case QO_OUTPUT: return now->model.y + variable->index;
+    case QO_CALCULATED: return &now->fastest;
     case QO_INDICATOR: return now->indicators + variable->index;
     default: return &now->time;
     }

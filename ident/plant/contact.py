@@ -1,14 +1,20 @@
-"""Wheel contacts that give a little: what turns constraints into forces.
+"""Wheel contacts that give a little, and hold where they stand: what turns constraints into forces.
 
-    F_i = -c s_i / sqrt(1 + (c |s_i| / (μ_i N_i))²)
+    force       F_i = -c e_i / sqrt(1 + (c |e_i| / (μ_i N_i))²),   e_i = s_i + z_i
+    memory      T ż_i = g s_i - 5 (1 - g) z_i
+    at rest     g = 1 / (1 + (w_i/(3 ε r))⁴),   w_i² = |s_i|² + (r β̇_i)²
 
 s_i (2,) is the velocity of contact i over the floor, c the creep stiffness, μ_i N_i the largest force. It is smooth,
-opposes the slip in its direction, and for c → ∞ the wheels roll.
+opposes the slip in its direction, and for c → ∞ the wheels roll. Without memory a parked vehicle creeps for ever under
+any slope. z_i, two states of each contact, is the way that it has crept while it stands, over T: what it holds ends
+F_i T/c from where it was. Once the wheel turns or slides z fades within T/5.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import enum
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Final
 
 import casadi as ca
@@ -18,8 +24,22 @@ from ident.plant.symbols import Symbols
 from ident.plant.terms import Term, centre_of_mass, loaded_mass
 from ident.vehicle.quantities import GRAVITY
 
-CREEP_STIFFNESS: Final = 1e7
-"""c where nobody sets one [N s/m]: under 100 N a wheel slips by 10 micrometres a second."""
+
+class Contacts(enum.StrEnum):
+    """How little the contacts of a model give."""
+
+    SOFT = "soft"
+    STIFF = "stiff"
+
+
+CREEP_STIFFNESS: Final[Mapping[Contacts, float]] = MappingProxyType({Contacts.SOFT: 1e5, Contacts.STIFF: 3e6})
+"""c where nobody sets one [N s/m]; chosen in docs/adr/0046. Under 100 N a wheel on stiff contacts slips by 33 um/s."""
+
+_RESTING: Final = 3.0
+"""Speed of a contact and of its wheel over ε r below which it stands."""
+
+_FADING: Final = 5.0
+"""How many times faster z fades in motion than it grows at rest."""
 
 _LEAST_LOAD: Final = 1e-3
 """Part of a quarter of the weight that a wheel keeps however far the centre of mass is off: no division by zero."""
@@ -34,9 +54,22 @@ def static_loads(p: Symbols, terms: Sequence[Term]) -> Expression:
     return GRAVITY / 4 * ca.vertcat(*quarters)
 
 
-def contact_forces(slip: Expression, loads: Expression, p: Symbols) -> Expression:
-    """Forces of the floor on the wheels (8,) [N], ordered as the slip (8,) [m/s]: across, then along."""
-    across, along = slip[:4], slip[4:]
+def held_slip(x: Symbols) -> Expression:
+    """z (8,) [m/s], ordered as the slip: across the wheels, then along them."""
+    return ca.vertcat(x.wheels("held_slip_lat_{}"), x.wheels("held_slip_long_{}"))
+
+
+def held_slip_rates(x: Symbols, p: Symbols, slip: Expression, rolling: Expression) -> Expression:
+    """ż (8,) [m/s²]; from the slip (8,) [m/s] and the rates of the wheels (4,) [rad/s]."""
+    speeds = slip[:4] ** 2 + slip[4:] ** 2 + (p["wheel_radius"] * rolling) ** 2
+    resting = 1 / (1 + (speeds / (_RESTING * p["epsilon"] * p["wheel_radius"]) ** 2) ** 2)
+    both = ca.vertcat(resting, resting)
+    return (both * slip - _FADING * (1 - both) * held_slip(x)) / p["stick_time"]
+
+
+def contact_forces(creeping: Expression, loads: Expression, p: Symbols) -> Expression:
+    """Forces of the floor on the wheels (8,) [N], ordered as s + z (8,) [m/s]: across, then along."""
+    across, along = creeping[:4], creeping[4:]
     creep = p["creep_stiffness"]
     limits = p.wheels("friction_limit_{}") * loads
     softening = ca.sqrt(1 + (creep / limits) ** 2 * (across**2 + along**2))

@@ -32,18 +32,28 @@ DRIVE_UNWIND_TIME: Final = 0.05
 _SHARPNESS: Final = 4
 """Of the limit: at half of it 1.5 % of the torque is missing."""
 
+_ROUNDING: Final = 1e-4
+"""Of the corner where unwinding begins, over the limit: below it nothing leaks out of the integral of a parked drive."""
+
 
 def _torque_inputs(rates: Expression, x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
     return u.wheels("torque_{}"), ca.SX.zeros(0)
 
 
 def _speed_loops(rates: Expression, x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
-    """Proportional and integral action with a smooth limit; at the limit the integral follows the torque."""
+    """Proportional and integral action with a smooth limit; beyond it the integral follows the torque."""
     error = u.wheels("speed_{}") - rates
     wanted = p["drive_gain"] * error + x.wheels("integral_{}")
     limit = p["drive_torque_limit"]
     torque = wanted / (1 + (wanted / limit) ** _SHARPNESS) ** (1 / _SHARPNESS)
-    return torque, p["drive_integral_gain"] * error - (wanted - torque) / p["drive_unwind_time"]
+    beyond = _beyond(wanted, limit) - _beyond(-wanted, limit)
+    return torque, p["drive_integral_gain"] * error - beyond / p["drive_unwind_time"]
+
+
+def _beyond(wanted: Expression, limit: Expression) -> Expression:
+    """By how much a torque is above the limit, its corner rounded."""
+    excess = wanted - limit
+    return (excess + ca.sqrt(excess**2 + (_ROUNDING * limit) ** 2)) / 2
 
 
 _Drive = Callable[[Expression, Symbols, Symbols, Symbols], tuple[Expression, Expression]]
