@@ -54,12 +54,14 @@ class Order:
         inputs: what drives the wheels.
         platforms: to build for.
         contacts: stiff for solvers that are implicit, soft for others.
+        limited: torque inputs are limited to what the motors can; speed loops always are.
     """
 
     version: FmiVersion
     inputs: Inputs
     platforms: tuple[Platform, ...]
     contacts: Contacts = Contacts.STIFF
+    limited: bool = False
 
 
 def build_fmu(
@@ -81,7 +83,7 @@ def build_fmu(
     Raises:
         UserError: a compiler is missing or fails.
     """
-    model = make_model(source, order.inputs, order.contacts)
+    model = make_model(source, order.inputs, order.contacts, order.limited)
     interface = _interface(source, model, order)
     token = _token(model, interface, order.version)
     sources = fmu_sources(model, interface, order.version, token)

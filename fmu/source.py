@@ -73,10 +73,12 @@ class Model:
     fastest: float
 
 
-def make_model(source: ModelSource, inputs: Inputs, contacts: Contacts = Contacts.STIFF) -> Model:
+def make_model(
+    source: ModelSource, inputs: Inputs, contacts: Contacts = Contacts.STIFF, limited: bool = False
+) -> Model:
     """The model with the confirmed effects, and with those of size zero that take no states of their own."""
     effects = _with_neutral(source.effects)
-    table = variable_table(source.vehicle, source.parameters, effects, inputs, contacts)
+    table = variable_table(source.vehicle, source.parameters, effects, inputs, contacts, limited)
     core = generate_core(table, effects, inputs)
     return Model(table, core.files, core.dependencies, core.fastest)
 

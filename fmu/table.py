@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 from fmu.effect_states import (
@@ -53,6 +54,7 @@ def variable_table(
     effects: Sequence[Effect] = (),
     inputs: Inputs = Inputs.TORQUE,
     contacts: Contacts = Contacts.STIFF,
+    limited: bool = False,
 ) -> VariableTable:
     """The table for a vehicle with its parameters (18) and effects.
 
@@ -62,13 +64,23 @@ def variable_table(
         effects: each adds its parameters; those of `slip` are start values of the friction limits.
         inputs: motor torques, or wheel speeds with the drives' inner loop.
         contacts: start value of their stiffness.
+        limited: torque inputs beyond what the motors can are limited to that.
     """
     memories = memories_of(terms_of(effects))
     states = _states(inputs, memories)
     derivatives = [_derivative(state) for state in states]
-    tunable = parameter_rows(vehicle, parameters, effects, inputs, contacts)
+    tunable = parameter_rows(vehicle, parameters, effects, inputs, contacts, limited)
     return numbered(
-        [[_time()], states, derivatives, _inputs(inputs), tunable, _outputs(memories), [_mode()], [_fastest()]]
+        [
+            [_time()],
+            states,
+            derivatives,
+            _inputs(vehicle, parameters, inputs),
+            tunable,
+            _outputs(memories),
+            [_mode()],
+            [_fastest()],
+        ]
     )
 
 
@@ -161,24 +173,75 @@ def _derivative(state: Variable) -> Variable:
     return Variable(f"der({state.name})", text, *kind, _PER_SECOND[state.unit], state=state.name)
 
 
-def _inputs(inputs: Inputs) -> list[Variable]:
-    command, text, unit = {
-        Inputs.TORQUE: ("torque", "Torque of motor {}, at its shaft", "Nm"),
-        Inputs.SPEED: ("speed", "Commanded rolling rate of wheel {}", "rad/s"),
-    }[inputs]
-    quarter = math.pi / 2
-    return [
-        *(_input(f"{command}_{wheel}", text.format(wheel), unit) for wheel in WHEELS),
-        _input("slope_x", "Angle by which the floor rises along the world's x", "rad", -quarter, quarter),
-        _input("slope_y", "Angle by which the floor rises along the world's y", "rad", -quarter, quarter),
-        _input("payload", "Mass over the centre of the chassis beyond m_ch", "kg", 0.0),
+@dataclass(frozen=True)
+class _Command:
+    """What a wheel is driven by: its name, what it says, unit, largest and usual size."""
+
+    name: str
+    text: str
+    unit: str
+    largest: Callable[[VehicleDescription], float]
+    usual: Callable[[VehicleDescription], float]
+
+
+_COMMANDS: Final = {
+    Inputs.TORQUE: _Command(
+        "torque",
+        "Torque of motor {}, at its shaft",
+        "Nm",
+        lambda vehicle: vehicle.limits.peak_torque,
+        lambda vehicle: vehicle.limits.rated_torque,
+    ),
+    Inputs.SPEED: _Command(
+        "speed",
+        "Commanded rolling rate of wheel {}",
+        "rad/s",
+        lambda vehicle: vehicle.limits.motor_speed / vehicle.geometry.gear_ratio,
+        lambda vehicle: vehicle.limits.motor_speed / vehicle.geometry.gear_ratio / 3,
+    ),
+}
+
+
+def _inputs(vehicle: VehicleDescription, parameters: Parameters, inputs: Inputs) -> list[Variable]:
+    command, quarter = _COMMANDS[inputs], math.pi / 2
+    largest = command.largest(vehicle)
+    slope = Variable(
+        "slope_x",
+        "Angle by which the floor rises along the world's x",
+        Causality.INPUT,
+        Variability.CONTINUOUS,
+        Block.INPUT,
+        "rad",
+        display_unit=DEGREES["rad"],
+        start=0.0,
+        minimum=-quarter,
+        maximum=quarter,
+        nominal=0.1,
+    )
+    across = replace(slope, name="slope_y", description="Angle by which the floor rises along the world's y")
+    drive = replace(
+        slope,
+        unit=command.unit,
+        display_unit=DEGREES.get(command.unit, ""),
+        minimum=-largest,
+        maximum=largest,
+        advisory=True,
+        nominal=command.usual(vehicle),
+    )
+    load = replace(
+        slope,
+        name="payload",
+        description="Mass over the centre of the chassis beyond m_ch",
+        unit="kg",
+        display_unit="",
+        minimum=0.0,
+        maximum=None,
+        nominal=parameters["m_ch"] / 4,
+    )
+    wheels = [
+        replace(drive, name=f"{command.name}_{wheel}", description=command.text.format(wheel)) for wheel in WHEELS
     ]
-
-
-def _input(name: str, text: str, unit: str, minimum: float | None = None, maximum: float | None = None) -> Variable:
-    display = DEGREES.get(unit, "")
-    kind = (Causality.INPUT, Variability.CONTINUOUS, Block.INPUT)
-    return Variable(name, text, *kind, unit, display_unit=display, start=0.0, minimum=minimum, maximum=maximum)
+    return [*wheels, slope, across, load]
 
 
 def neutral_effects() -> tuple[Effect, ...]:

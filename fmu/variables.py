@@ -64,7 +64,8 @@ class Variable:
         start: value at the start, None for what is computed.
         minimum, maximum: bounds, None where there is none.
         positive: the minimum itself, zero, is refused.
-        nominal: size that the absolute error of a state is measured in.
+        advisory: the bounds say what the model is meant for; values beyond them are taken.
+        nominal: size that the absolute error of a state is measured in; of an input, what is usual.
         state: name of the state that this is the derivative of, empty otherwise.
         value_reference: of FMI, the position in the table.
     """
@@ -81,6 +82,7 @@ class Variable:
     minimum: float | None = None
     maximum: float | None = None
     positive: bool = False
+    advisory: bool = False
     nominal: float = 1.0
     state: str = ""
     value_reference: int = 0

@@ -49,10 +49,13 @@ def build(
         Contacts,
         typer.Option(help="`stiff` for implicit solvers and co-simulation, `soft` for explicit ones as Runge-Kutta."),
     ] = Contacts.STIFF,
+    limits: Annotated[
+        bool, typer.Option("--limits", help="Torques beyond the motors' peak torque are limited to it.")
+    ] = False,
     force: ForceOption = False,
 ) -> None:
     """Package the identified model, with its confirmed effects, as an FMU for co-simulation and model exchange."""
-    order = Order(fmi, inputs, parse_platforms(platforms), contacts)
+    order = Order(fmi, inputs, parse_platforms(platforms), contacts, limits)
     with bars() as shown:
         task = shown.add_task("compiling", total=None)
 

@@ -85,6 +85,11 @@ static qo_status check_block(qo_model *model, const char *kind, const double *va
     return QO_OK;
 }
 
+static qo_status check_rates(qo_model *model) {
+    const int broken = qo_first_not_finite(model->ur, QO_NU);
+    return broken < 0 ? QO_OK : qo_fail(model, QO_ERROR, "The rate of ", qo_inputs[broken].name, " is not finite.");
+}
+
 qo_status qo_check(qo_model *model) {
     qo_status status = check_block(model, "Parameter ", model->p, qo_parameters, QO_NP);
     if (status == QO_OK) {
@@ -93,7 +98,7 @@ qo_status qo_check(qo_model *model) {
     if (status == QO_OK) {
         status = check_block(model, "State ", model->x, qo_states, QO_NX);
     }
-    return status;
+    return status == QO_OK ? check_rates(model) : status;
 }
 
 qo_status qo_outputs(qo_model *model) {

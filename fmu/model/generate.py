@@ -99,6 +99,7 @@ def _routines(model: Equations) -> tuple[list[_Routine], int]:
         _Routine("mode_distances", point, {"z": model.z}),
         _Routine("jacobian", point, {"jacobian": _nonzeros(jacobian)}),
         *_eliminations(jacobian.sparsity(), model.coupled),
+        _along_inputs(model, point),
         *_directional(model, point),
     ]
     return routines, jacobian.nnz()
@@ -126,6 +127,11 @@ def _eliminations(pattern: Any, count: int) -> list[_Routine]:
         _Routine("eliminate", {**system, "right": right}, {"coupled": side}),
         _Routine("expand", {**system, "right": right, "coupled": coupled}, {"solution": ca.vertcat(coupled, others)}),
     ]
+
+
+def _along_inputs(model: Equations, point: Mapping[str, Expression]) -> _Routine:
+    direction = ca.SX.sym("du", model.u.numel())
+    return _Routine("input_direction", {**point, "du": direction}, {"sxd": ca.jtimes(model.xd, model.u, direction)})
 
 
 def _directional(model: Equations, point: Mapping[str, Expression]) -> list[_Routine]:
@@ -226,7 +232,7 @@ def _table(table: VariableTable) -> str:
 
 
 def _row(row: Variable) -> str:
-    minimum = "-INFINITY" if row.minimum is None else repr(float(row.minimum))
-    maximum = "INFINITY" if row.maximum is None else repr(float(row.maximum))
+    minimum = "-INFINITY" if row.minimum is None or row.advisory else repr(float(row.minimum))
+    maximum = "INFINITY" if row.maximum is None or row.advisory else repr(float(row.maximum))
     start = repr(float(row.start or 0.0))
     return f'    {{"{row.name}", {start}, {minimum}, {maximum}, {row.nominal!r}, {int(row.positive)}}},'

@@ -66,6 +66,7 @@ class Core:
     def _fields(self) -> list[tuple[str, type]]:
         blocks = (Block.STATE, Block.INPUT, Block.PARAMETER, Block.OUTPUT)
         vectors = [(block.value, ctypes.c_double * self.sizes[block]) for block in blocks]
+        vectors.append(("ur", ctypes.c_double * self.sizes[Block.INPUT]))
         scalars = [("tolerance", ctypes.c_double), ("step_length", ctypes.c_double), ("mode", ctypes.c_int)]
         return [*vectors, *scalars, ("message", ctypes.c_char * 160)]
 
@@ -89,6 +90,10 @@ class Instance:
     @property
     def x(self) -> Array:
         return self.blocks[Block.STATE]
+
+    @property
+    def input_rates(self) -> Array:
+        return np.frombuffer(self.raw.ur, dtype=float)
 
     @property
     def u(self) -> Array:
