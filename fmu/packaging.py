@@ -23,7 +23,8 @@ from fmu.documentation import documentation_page
 from fmu.glue import wrapper_sources
 from fmu.interface import MODEL_IDENTIFIER, Experiment, Interface, with_indicators
 from fmu.platforms import PLATFORMS, Platform
-from fmu.source import Model, ModelSource, make_model
+from fmu.reference import Reference, reference_drive
+from fmu.source import Model, ModelSource, make_model, with_neutral
 from fmu.variables import Inputs
 from ident.plant.contact import Contacts
 
@@ -88,13 +89,16 @@ def build_fmu(
     token = _token(model, interface, order.version)
     sources = fmu_sources(model, interface, order.version, token)
     libraries = compile_libraries(sources, order.platforms, compiler, progress, cache)
+    reference = reference_drive(model.table, with_neutral(source.effects), order.inputs)
     units = [name for name in sorted(sources) if name.endswith(".c")]
     description = model_description(interface, order.version, token, units)
     files = {
         "modelDescription.xml": description,
         **{f"sources/{name}": text for name, text in sources.items()},
         **_binaries(libraries, order.version),
-        **_documentation(source, interface, order.inputs),
+        "sources/CMakeLists.txt": (resources.files("fmu") / "data" / "CMakeLists.txt").read_bytes(),
+        **{f"resources/{name}": content for name, content in reference.files().items()},
+        **_documentation(source, interface, order, reference),
         **_VERSION_FILES[order.version](order.inputs, units),
     }
     return _archive(files)
@@ -161,10 +165,10 @@ def _binaries(libraries: Mapping[str, bytes], version: FmiVersion) -> dict[str, 
     }
 
 
-def _documentation(source: ModelSource, interface: Interface, inputs: Inputs) -> dict[str, bytes]:
+def _documentation(source: ModelSource, interface: Interface, order: Order, reference: Reference) -> dict[str, bytes]:
     python = ".".join(str(part) for part in sys.version_info[:3])
     versions = {"quasiomni": version("quasiomni"), "casadi": version("casadi"), "python": python}
-    page = documentation_page(source, interface.table, inputs, versions)
+    page = documentation_page(source, interface, order.inputs, reference, versions)
     files = {"index.html": page.encode(), "licenses/license.txt": _LICENSE.encode(), **source.documents}
     return {f"documentation/{name}": content for name, content in files.items()}
 

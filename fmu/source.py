@@ -77,12 +77,13 @@ def make_model(
     source: ModelSource, inputs: Inputs, contacts: Contacts = Contacts.STIFF, limited: bool = False
 ) -> Model:
     """The model with the confirmed effects, and with those of size zero that take no states of their own."""
-    effects = _with_neutral(source.effects)
+    effects = with_neutral(source.effects)
     table = variable_table(source.vehicle, source.parameters, effects, inputs, contacts, limited)
     core = generate_core(table, effects, inputs)
     return Model(table, core.files, core.dependencies, core.fastest)
 
 
-def _with_neutral(confirmed: Sequence[Effect]) -> list[Effect]:
+def with_neutral(confirmed: Sequence[Effect]) -> list[Effect]:
+    """Effects of an FMU: the confirmed ones, and those of size zero that it always has."""
     found = {(effect.name, effect.where) for effect in confirmed}
     return [*confirmed, *(effect for effect in neutral_effects() if (effect.name, effect.where) not in found)]
