@@ -41,11 +41,14 @@ _STICTION: Final = {
     "lag": "Lagged load on the friction of {}",
 }
 
-_HELD_SLIP: Final = {"lat": "across", "long": "along"}
-"""How the contacts of the wheels creep."""
+_LOAD_SIZE: Final = 5.0
+"""Of a load on dry friction, as the argument of its tanh: at 4 the friction is that of sliding."""
 
-_HELD_SLIP_SIZE: Final = 1e-3
-"""Of what a contact remembers [m/s]: what a wheel on soft contacts creeps by under 100 N."""
+_HELD: Final = {"x_dot": ("forward", "m/s"), "y_dot": ("to the left", "m/s"), "gamma_dot": ("in yaw", "rad/s")}
+"""How a parked chassis creeps."""
+
+_HELD_SIZE: Final = 1e-3
+"""Of the creep that is remembered [m/s, rad/s]: that of a wheel on soft contacts under 100 N."""
 
 
 def variable_table(
@@ -104,7 +107,7 @@ def _states(inputs: Inputs, memories: Memories) -> list[Variable]:
         _state("x_dot", "Velocity of the chassis forward, in the chassis frame", "m/s", 0.1),
         _state("y_dot", "Velocity of the chassis to the left, in the chassis frame", "m/s", 0.1),
         _state("gamma_dot", "Yaw rate", "rad/s", 0.1),
-        *(_state(f"alpha_{side}_dot", f"Steering rate, {text}", "rad/s", 0.1) for side, text in _SIDES.items()),
+        *(_state(f"alpha_{side}_dot", f"Steering rate, {text}", "rad/s", 0.5) for side, text in _SIDES.items()),
         *(_state(f"beta_{wheel}_dot", f"Rolling rate of wheel {wheel}", "rad/s", 1.0) for wheel in WHEELS),
     ]
     angles = [
@@ -137,22 +140,18 @@ def _hidden_states(inputs: Inputs) -> list[Variable]:
         for name, text in _STICTION.items()
         for row in (
             *(
-                _state(f"{name}_alpha_{side}", text.format(f"the {word} steering"), "1", 1.0, local)
+                _state(f"{name}_alpha_{side}", text.format(f"the {word} steering"), "1", _LOAD_SIZE, local)
                 for side, word in _SIDES.items()
             ),
-            *(_state(f"{name}_beta_{wheel}", text.format(f"wheel {wheel}"), "1", 1.0, local) for wheel in WHEELS),
+            *(
+                _state(f"{name}_beta_{wheel}", text.format(f"wheel {wheel}"), "1", _LOAD_SIZE, local)
+                for wheel in WHEELS
+            ),
         )
     ]
     held = [
-        _state(
-            f"held_slip_{way}_{wheel}",
-            f"Creep of contact {wheel} {text} its wheel that it remembers, over stick_time",
-            "m/s",
-            _HELD_SLIP_SIZE,
-            local,
-        )
-        for way, text in _HELD_SLIP.items()
-        for wheel in WHEELS
+        _state(f"held_{name}", f"Creep {way} that contacts at rest remember, over stick_time", unit, _HELD_SIZE, local)
+        for name, (way, unit) in _HELD.items()
     ]
     integrals = [
         _state(f"integral_{wheel}", f"Integral part of the torque of drive {wheel}", "Nm", 0.1, local)

@@ -31,6 +31,8 @@ typedef struct {
     double ur[QO_NU]; /* rates of the inputs while time passes [per s]; zero: they are held */
     double tolerance; /* of a step, in units of the nominal values of the states */
     double step;      /* length that the next internal step tries [s] */
+    double after_jump; /* the same where the inputs have jumped */
+    double last_u[QO_NU]; /* inputs at the end of the last internal step */
     int mode;         /* k of (9) */
     char message[QO_MESSAGE_SIZE];
 } qo_model;

@@ -6,6 +6,7 @@ CasADi writes the equations as C; each function gets plain arrays for arguments,
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -97,7 +98,7 @@ def _routines(model: Equations) -> tuple[list[_Routine], int]:
         _Routine("derivatives", point, {"xd": model.xd}),
         _Routine("outputs", point, {"y": model.y}),
         _Routine("mode_distances", point, {"z": model.z}),
-        _Routine("jacobian", point, {"jacobian": _nonzeros(jacobian)}),
+        _Routine("linearize", point, {"xd": model.xd, "jacobian": _nonzeros(jacobian)}),
         *_eliminations(jacobian.sparsity(), model.coupled),
         _along_inputs(model, point),
         *_directional(model, point),
@@ -224,7 +225,7 @@ def _sizes(table: VariableTable, jacobian_size: int, model: Equations) -> str:
 
 
 def _table(table: VariableTable) -> str:
-    lines = ["/* The table of variables. Generated. */", '#include "qo_internal.h"', "", "#include <math.h>", ""]
+    lines = ["/* The table of variables. Generated. */", '#include "qo_internal.h"', ""]
     for name, size, block in _ROWS:
         lines += [f"const qo_row qo_{name}[QO_{size}] = {{", *map(_row, table.block(block)), "};", ""]
     names = [f'    "{row.name}",' for row in table.block(Block.OUTPUT)]
@@ -232,7 +233,9 @@ def _table(table: VariableTable) -> str:
 
 
 def _row(row: Variable) -> str:
-    minimum = "-INFINITY" if row.minimum is None or row.advisory else repr(float(row.minimum))
-    maximum = "INFINITY" if row.maximum is None or row.advisory else repr(float(row.maximum))
+    minimum, maximum = (
+        repr(unbounded if bound is None or row.advisory else float(bound))
+        for bound, unbounded in ((row.minimum, -sys.float_info.max), (row.maximum, sys.float_info.max))
+    )
     start = repr(float(row.start or 0.0))
     return f'    {{"{row.name}", {start}, {minimum}, {maximum}, {row.nominal!r}, {int(row.positive)}}},'

@@ -25,6 +25,9 @@
    and an error of it beyond what a contact sticks in makes steps bounce between its two sides. */
 #define RELATIVE_PART 0.01
 
+/* After inputs that jump: how much longer than the step that was right after the last jump the next one may be. */
+#define BOLDER 1.2
+
 static const double GAMMA = 0.5;
 static const double A[STAGES][STAGES] = {{0.0}, {0.0}, {2.0}, {2.0, 0.0, 1.0}};
 static const double C[STAGES][STAGES] = {{0.0}, {4.0}, {1.0, -1.0}, {1.0, -1.0, -8.0 / 3.0}};
@@ -159,10 +162,10 @@ static void inputs_after(const qo_model *model, double h, double *u) {
     }
 }
 
-static departure depart(const qo_model *model) {
+static departure depart(const qo_model *model, linear_system *system) {
     departure from;
     int index;
-    qo_eq_derivatives(model->x, model->u, model->p, from.slope);
+    qo_eq_linearize(model->x, model->u, model->p, from.slope, system->jacobian);
     from.ramps = 0;
     for (index = 0; index < QO_NU; ++index) {
         from.ramps |= model->ur[index] != 0.0;
@@ -240,21 +243,25 @@ static qo_status give_up(qo_model *model, int worst) {
 /* One step of at most h that the tolerance accepts; y stays. */
 static qo_status integrate(qo_model *model, double h, double *taken) {
     linear_system system;
-    const departure from = depart(model);
+    const departure from = depart(model, &system);
+    const int jumped = memcmp(model->u, model->last_u, sizeof model->u) != 0;
     double next[QO_NX];
-    double tried = fmin(fmax(model->step, SHORTEST_STEP), h);
+    double tried = fmin(fmax(jumped ? fmin(model->step, model->after_jump) : model->step, SHORTEST_STEP), h);
     int worst = 0, rejected = 0;
-    qo_eq_jacobian(model->x, model->u, model->p, system.jacobian);
     for (;;) {
         double ratio = attempt(model, &system, &from, tried, next, &worst);
         double proposed = tried * (ratio <= 1.0 && rejected ? fmin(1.0, growth(ratio)) : growth(ratio));
         if (ratio <= 1.0) {
             /* A step cut short by the end of the communication step says nothing against a longer one. */
             model->step = fmin(tried < model->step ? fmax(proposed, model->step) : proposed, LONGEST_STEP);
+            if (jumped) {
+                model->after_jump = fmin(model->step, BOLDER * tried);
+            }
             *taken = tried;
             flush(next);
             memcpy(model->x, next, sizeof next);
             inputs_after(model, tried, model->u);
+            memcpy(model->last_u, model->u, sizeof model->u);
             return QO_OK;
         }
         rejected = 1;

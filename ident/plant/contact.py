@@ -1,13 +1,14 @@
 """Wheel contacts that give a little, and hold where they stand: what turns constraints into forces.
 
-    force       F_i = -c e_i / sqrt(1 + (c |e_i| / (μ_i N_i))²),   e_i = s_i + z_i
-    memory      T ż_i = g s_i - 5 (1 - g) z_i
-    at rest     g = 1 / (1 + (w_i/(3 ε r))⁴),   w_i² = |s_i|² + (r β̇_i)²
+    force       F_i = -c e_i / sqrt(1 + (c |e_i| / (μ_i N_i))²),   e_i = s_i + J_i z
+    memory      T ż = g v - 5 (1 - g) z
+    at rest     g = 1 / (1 + (w/(3 ε r))⁴),   w² = ẋ² + ẏ² + (l b/4) γ̇² + Σ (r β̇_i)²
 
 s_i (2,) is the velocity of contact i over the floor, c the creep stiffness, μ_i N_i the largest force. It is smooth,
 opposes the slip in its direction, and for c → ∞ the wheels roll. Without memory a parked vehicle creeps for ever under
-any slope. z_i, two states of each contact, is the way that it has crept while it stands, over T: what it holds ends
-F_i T/c from where it was. Once the wheel turns or slides z fades within T/5.
+any slope, its wheels being held by their friction: v (3,), its twist, is all the slip that there is, J_i v at contact
+i. z, three states, is the way that it has crept so, over T: it ends F T/c from where it was, F the force on a contact.
+What z holds goes through the contacts, up to what they carry. Once the vehicle or a wheel moves z fades within T/5.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ CREEP_STIFFNESS: Final[Mapping[Contacts, float]] = MappingProxyType({Contacts.SO
 """c where nobody sets one [N s/m]; chosen in docs/adr/0046. Under 100 N a wheel on stiff contacts slips by 33 um/s."""
 
 _RESTING: Final = 3.0
-"""Speed of a contact and of its wheel over ε r below which it stands."""
+"""Speed of chassis and wheels over ε r below which the vehicle stands."""
 
 _FADING: Final = 5.0
 """How many times faster z fades in motion than it grows at rest."""
@@ -54,21 +55,22 @@ def static_loads(p: Symbols, terms: Sequence[Term]) -> Expression:
     return GRAVITY / 4 * ca.vertcat(*quarters)
 
 
-def held_slip(x: Symbols) -> Expression:
-    """z (8,) [m/s], ordered as the slip: across the wheels, then along them."""
-    return ca.vertcat(x.wheels("held_slip_lat_{}"), x.wheels("held_slip_long_{}"))
+def held_twist(x: Symbols) -> Expression:
+    """z (3,) [m/s, m/s, rad/s]."""
+    return x.stacked("held_x_dot", "held_y_dot", "held_gamma_dot")
 
 
-def held_slip_rates(x: Symbols, p: Symbols, slip: Expression, rolling: Expression) -> Expression:
-    """ż (8,) [m/s²]; from the slip (8,) [m/s] and the rates of the wheels (4,) [rad/s]."""
-    speeds = slip[:4] ** 2 + slip[4:] ** 2 + (p["wheel_radius"] * rolling) ** 2
+def held_twist_rates(x: Symbols, p: Symbols, rates: Expression) -> Expression:
+    """ż (3,) [m/s², m/s², rad/s²]; from q̇ (9,)."""
+    lever = p["wheelbase"] * p["track_width"] / 4
+    chassis = rates[0] ** 2 + rates[1] ** 2 + lever * rates[2] ** 2
+    speeds = chassis + p["wheel_radius"] ** 2 * ca.sumsqr(rates[5:9])
     resting = 1 / (1 + (speeds / (_RESTING * p["epsilon"] * p["wheel_radius"]) ** 2) ** 2)
-    both = ca.vertcat(resting, resting)
-    return (both * slip - _FADING * (1 - both) * held_slip(x)) / p["stick_time"]
+    return (resting * rates[:3] - _FADING * (1 - resting) * held_twist(x)) / p["stick_time"]
 
 
 def contact_forces(creeping: Expression, loads: Expression, p: Symbols) -> Expression:
-    """Forces of the floor on the wheels (8,) [N], ordered as s + z (8,) [m/s]: across, then along."""
+    """Forces of the floor on the wheels (8,) [N], ordered as e (8,) [m/s]: across, then along."""
     across, along = creeping[:4], creeping[4:]
     creep = p["creep_stiffness"]
     limits = p.wheels("friction_limit_{}") * loads

@@ -67,8 +67,9 @@ class Core:
         blocks = (Block.STATE, Block.INPUT, Block.PARAMETER, Block.OUTPUT)
         vectors = [(block.value, ctypes.c_double * self.sizes[block]) for block in blocks]
         vectors.append(("ur", ctypes.c_double * self.sizes[Block.INPUT]))
-        scalars = [("tolerance", ctypes.c_double), ("step_length", ctypes.c_double), ("mode", ctypes.c_int)]
-        return [*vectors, *scalars, ("message", ctypes.c_char * 160)]
+        scalars = [(name, ctypes.c_double) for name in ("tolerance", "step_length", "after_jump")]
+        memory = [("last_u", ctypes.c_double * self.sizes[Block.INPUT]), ("mode", ctypes.c_int)]
+        return [*vectors, *scalars, *memory, ("message", ctypes.c_char * 160)]
 
     def new(self, **values: float) -> Instance:
         instance = Instance(self)

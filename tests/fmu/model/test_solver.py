@@ -57,7 +57,8 @@ def test_the_motion_is_that_of_a_tight_reference_in_every_posture(core: Any, pos
     rows = core.table.block(Block.STATE)
     for row, value, expected in zip(rows, instance.x, truth.x, strict=True):
         if row.causality.value == "output":
-            assert value == pytest.approx(expected, abs=1e-3 * max(abs(expected), 0.1 * row.nominal)), row.name
+            least = 1e-2 if row.name.startswith("alpha") else 0.1 * row.nominal
+            assert value == pytest.approx(expected, abs=1e-3 * max(abs(expected), least)), row.name
 
 
 def test_a_tighter_tolerance_gives_a_smaller_error(prototype: Any) -> None:
