@@ -1,14 +1,15 @@
 """Wheel contacts that give a little, and hold where they stand: what turns constraints into forces.
 
     force       F_i = -c e_i / sqrt(1 + (c |e_i| / (μ_i N_i))²),   e_i = s_i + J_i z
-    memory      T ż = g v - 5 (1 - g) z
+    memory      T ż = g W⁻¹ Jᵀ s - 5 (1 - g) z,   W = diag(4, 4, l² + b²)
     at rest     g = 1 / (1 + (w/(3 ε r))⁴),   w² = ẋ² + ẏ² + (l b/4) γ̇² + Σ (r β̇_i)²
 
 s_i (2,) is the velocity of contact i over the floor, c the creep stiffness, μ_i N_i the largest force. It is smooth,
 opposes the slip in its direction, and for c → ∞ the wheels roll. Without memory a parked vehicle creeps for ever under
-any slope, its wheels being held by their friction: v (3,), its twist, is all the slip that there is, J_i v at contact
-i. z, three states, is the way that it has crept so, over T: it ends F T/c from where it was, F the force on a contact.
-What z holds goes through the contacts, up to what they carry. Once the vehicle or a wheel moves z fades within T/5.
+any slope, its wheels being held by their friction: slip then is a twist of the chassis, J_i times it at contact i, and
+W⁻¹ Jᵀ s is that twist. z, three states, is the way that it has crept so, over T: it ends F T/c from where it was, F the
+force on a contact. What z holds goes through the contacts, up to what they carry. Once the vehicle or a wheel moves z
+fades within T/5.
 """
 
 from __future__ import annotations
@@ -60,13 +61,15 @@ def held_twist(x: Symbols) -> Expression:
     return x.stacked("held_x_dot", "held_y_dot", "held_gamma_dot")
 
 
-def held_twist_rates(x: Symbols, p: Symbols, rates: Expression) -> Expression:
-    """ż (3,) [m/s², m/s², rad/s²]; from q̇ (9,)."""
+def held_twist_rates(x: Symbols, p: Symbols, rates: Expression, rolling: Expression, slip: Expression) -> Expression:
+    """ż (3,) [m/s², m/s², rad/s²]; from q̇ (9,), A (8, 9 + n) and the slip (8,) [m/s]."""
+    squares = ca.vertcat(4, 4, p["wheelbase"] ** 2 + p["track_width"] ** 2)
+    creep = rolling[:, :3].T @ slip / squares
     lever = p["wheelbase"] * p["track_width"] / 4
     chassis = rates[0] ** 2 + rates[1] ** 2 + lever * rates[2] ** 2
     speeds = chassis + p["wheel_radius"] ** 2 * ca.sumsqr(rates[5:9])
     resting = 1 / (1 + (speeds / (_RESTING * p["epsilon"] * p["wheel_radius"]) ** 2) ** 2)
-    return (resting * rates[:3] - _FADING * (1 - resting) * held_twist(x)) / p["stick_time"]
+    return (resting * creep - _FADING * (1 - resting) * held_twist(x)) / p["stick_time"]
 
 
 def contact_forces(creeping: Expression, loads: Expression, p: Symbols) -> Expression:

@@ -106,6 +106,7 @@ def equations(x: Symbols, u: Symbols, p: Symbols, effects: Sequence[Term], input
     torques, integral_rates = DRIVES[inputs](motor_rates, x, u, p)
     shaft = shaft_torques(terms, late_torques(x, terms, memories, torques), motor_angles)
     resistance = Resistance(terms, parameters, lambda state: stop_torques(state.alpha, state.rates, p))
+    slip = motion.slip_with(ca.SX.zeros(3))
     forces = contact_forces(motion.slip_with(held_twist(x)), static_loads(p, terms), p)
     accelerations = _acceleration(motion, resistance, forces, shaft, gears)
     slope_rates, filtered_rates = filter_rates(x, terms, memories, torques, rates[3:5])
@@ -114,7 +115,7 @@ def equations(x: Symbols, u: Symbols, p: Symbols, effects: Sequence[Term], input
         *(twist_acceleration(each, shaft[each.place], accelerations[5 + each.place]) for each in gears),
         slope_rates,
         memory_rates(x, p, rates),
-        held_twist_rates(x, p, rates),
+        held_twist_rates(x, p, rates, motion.rolling, slip),
         integral_rates,
         *(twisted.rate for twisted in (*couplings, *gears)),
         filtered_rates,
@@ -123,7 +124,6 @@ def equations(x: Symbols, u: Symbols, p: Symbols, effects: Sequence[Term], input
         _pose_rate(state.heading, rates),
     )
     reported = late_angles(x, terms, memories, alpha + steering_errors(terms))
-    slip = motion.slip_with(ca.SX.zeros(3))
     at_shafts = (angle for each in gears for angle in (motor_angles[each.place], motor_rates[each.place]))
     y = ca.vertcat(reported, torques, slip[4:], slip[:4], _motor_wrench(motion, shaft), *at_shafts)
     distances = symbolic.mode_distances(alpha, p["mode_tolerance"])
