@@ -21,7 +21,7 @@ from typing import Final
 
 import casadi as ca
 
-from ident.plant.symbolic import CORNERS, Expression
+from ident.plant.symbolic import CORNERS, Expression, constraint_matrix
 from ident.plant.symbols import Symbols
 from ident.plant.terms import Term, centre_of_mass, loaded_mass
 from ident.vehicle.quantities import GRAVITY
@@ -61,10 +61,11 @@ def held_twist(x: Symbols) -> Expression:
     return x.stacked("held_x_dot", "held_y_dot", "held_gamma_dot")
 
 
-def held_twist_rates(x: Symbols, p: Symbols, rates: Expression, rolling: Expression, slip: Expression) -> Expression:
-    """ż (3,) [m/s², m/s², rad/s²]; from q̇ (9,), A (8, 9 + n) and the slip (8,) [m/s]."""
+def held_twist_rates(x: Symbols, p: Symbols, alpha: Expression, rates: Expression) -> Expression:
+    """ż (3,) [m/s², m/s², rad/s²]; from α (2,) and q̇ (9,). Its slip is that of rigid couplings and equal wheels."""
+    rolling = constraint_matrix(alpha)
     squares = ca.vertcat(4, 4, p["wheelbase"] ** 2 + p["track_width"] ** 2)
-    creep = rolling[:, :3].T @ slip / squares
+    creep = rolling[:, :3].T @ (rolling @ rates) / squares
     lever = p["wheelbase"] * p["track_width"] / 4
     chassis = rates[0] ** 2 + rates[1] ** 2 + lever * rates[2] ** 2
     speeds = chassis + p["wheel_radius"] ** 2 * ca.sumsqr(rates[5:9])

@@ -115,7 +115,7 @@ def equations(x: Symbols, u: Symbols, p: Symbols, effects: Sequence[Term], input
         *(twist_acceleration(each, shaft[each.place], accelerations[5 + each.place]) for each in gears),
         slope_rates,
         memory_rates(x, p, rates),
-        held_twist_rates(x, p, rates, motion.rolling, slip),
+        held_twist_rates(x, p, alpha, rates),
         integral_rates,
         *(twisted.rate for twisted in (*couplings, *gears)),
         filtered_rates,
