@@ -130,6 +130,7 @@ _KINDS_FMI2: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
         "ModelExchange": _STATE_FMI2,
         "CoSimulation": {
             "canHandleVariableCommunicationStepSize": "true",
+            "canInterpolateInputs": "true",
             "maxOutputDerivativeOrder": "1",
             **_STATE_FMI2,
         },
@@ -212,7 +213,7 @@ def _real(row: Variable) -> dict[str, str]:
     if row.display_unit:
         values["displayUnit"] = row.display_unit
     values |= _bounds(row, number)
-    if row.block is Block.STATE:
+    if row.block in (Block.STATE, Block.INPUT):
         values["nominal"] = number(row.nominal)
     if row.start is not None:
         values["start"] = number(row.start)
@@ -237,6 +238,6 @@ def _variable_fmi3(parent: Element, row: Variable, interface: Interface) -> None
     values = _head(row) | _real(row)
     if row.state:
         values["derivative"] = str(interface.table[row.state].value_reference)
-    if row.causality is Causality.OUTPUT:
+    if row.causality in (Causality.INPUT, Causality.OUTPUT):
         values["intermediateUpdate"] = "true"
     SubElement(parent, "Float64", values)

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 
 import jinja2
 
+from fmu.interface import MODEL_IDENTIFIER, Interface
+from fmu.picture import picture_of
+from fmu.reference import SUGGESTED_TOLERANCE, Reference
 from fmu.source import ModelSource
-from fmu.variables import Causality, Inputs, Variable, VariableTable
+from fmu.variables import Causality, Inputs, Variable
 from ident.effects import Effect
 from ident.report.digits import unit_text
 
@@ -24,20 +27,23 @@ class _Row:
     std: str
 
 
-def documentation_page(source: ModelSource, table: VariableTable, inputs: Inputs, versions: Mapping[str, str]) -> str:
+def documentation_page(
+    source: ModelSource, interface: Interface, inputs: Inputs, reference: Reference, versions: Mapping[str, str]
+) -> str:
     """`index.html`, self-contained.
 
     Args:
         source: of the model.
-        table: of its variables.
+        interface: its variables and default experiment.
         inputs: what drives the wheels.
+        reference: the drive to check the FMU with.
         versions: of the programs that made the FMU, by name.
     """
     loader = jinja2.PackageLoader("fmu")
     environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     deviations = source.standard_deviations
     rows = {
-        causality: _rows([row for row in table.variables if row.causality is causality], deviations)
+        causality: _rows([row for row in interface.table.variables if row.causality is causality], deviations)
         for causality in Causality
     }
     return environment.get_template("index.html.j2").render(
@@ -47,6 +53,12 @@ def documentation_page(source: ModelSource, table: VariableTable, inputs: Inputs
         provenance={**source.provenance, **versions},
         effects=[_effect_text(effect) for effect in source.effects],
         documents=sorted(source.documents),
+        picture=picture_of(source.vehicle.geometry),
+        experiment=interface.experiment,
+        model=MODEL_IDENTIFIER,
+        reference_end={name: f"{values[-1]:.4f}" for name, values in reference.outputs.items()},
+        reference_tolerance=f"{SUGGESTED_TOLERANCE:g}",
+        reference_stop=reference.times[-1],
     )
 
 

@@ -25,6 +25,7 @@ _ROLES: Final[Mapping[Block, str]] = MappingProxyType(
         Block.PARAMETER: "QO_PARAMETER",
         Block.OUTPUT: "QO_OUTPUT",
         Block.MODE: "QO_DISCRETE",
+        Block.CALCULATED: "QO_CALCULATED",
         Block.INDICATOR: "QO_INDICATOR",
     }
 )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
+from fmu.model.generate import TOLERANCE
 from fmu.units import Unit, unit_of
 from fmu.variables import Block, Causality, Variability, Variable, VariableTable
 
@@ -26,7 +27,7 @@ class Experiment:
 
     start_time: float = 0.0
     stop_time: float = 10.0
-    tolerance: float = 1e-6
+    tolerance: float = TOLERANCE
     step_size: float = 2e-3
 
 
@@ -68,11 +69,12 @@ class Interface:
 
     @property
     def initial_unknowns(self) -> tuple[Variable, ...]:
-        """What is computed at initialization, in the order of the table: outputs and derivatives."""
+        """What is computed at initialization, in the order of the table."""
         return tuple(
             row
             for row in self.table.variables
-            if row.block is Block.DERIVATIVE or (row.causality is Causality.OUTPUT and row.start is None)
+            if row.block is Block.DERIVATIVE
+            or (row.causality in (Causality.OUTPUT, Causality.CALCULATED) and row.start is None)
         )
 
     def dependencies_of(self, row: Variable) -> tuple[Variable, ...] | None:

@@ -14,15 +14,19 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from fmu.attachments import build_description, terminals
 from fmu.compiling import Compiler, compile_libraries, universal_binary
 from fmu.description import FmiVersion, model_description
 from fmu.documentation import documentation_page
 from fmu.glue import wrapper_sources
-from fmu.interface import MODEL_IDENTIFIER, Interface, with_indicators
+from fmu.interface import MODEL_IDENTIFIER, Experiment, Interface, with_indicators
 from fmu.platforms import PLATFORMS, Platform
-from fmu.source import Model, ModelSource, make_model
+from fmu.reference import Reference, reference_drive
+from fmu.source import Model, ModelSource, make_model, with_neutral
 from fmu.variables import Inputs
+from ident.plant.contact import Contacts
 
 INDICATORS: Final = 4
 """Event indicators of the model, one for each condition of (9)."""
@@ -50,11 +54,15 @@ class Order:
         version: of FMI.
         inputs: what drives the wheels.
         platforms: to build for.
+        contacts: stiff for solvers that are implicit, soft for others.
+        limited: torque inputs are limited to what the motors can; speed loops always are.
     """
 
     version: FmiVersion
     inputs: Inputs
     platforms: tuple[Platform, ...]
+    contacts: Contacts = Contacts.STIFF
+    limited: bool = False
 
 
 def build_fmu(
@@ -76,18 +84,21 @@ def build_fmu(
     Raises:
         UserError: a compiler is missing or fails.
     """
-    model = make_model(source, order.inputs)
-    interface = _interface(source, model, order.inputs)
+    model = make_model(source, order.inputs, order.contacts, order.limited)
+    interface = _interface(source, model, order)
     token = _token(model, interface, order.version)
     sources = fmu_sources(model, interface, order.version, token)
     libraries = compile_libraries(sources, order.platforms, compiler, progress, cache)
+    reference = reference_drive(model.table, with_neutral(source.effects), order.inputs)
     units = [name for name in sorted(sources) if name.endswith(".c")]
     description = model_description(interface, order.version, token, units)
     files = {
         "modelDescription.xml": description,
         **{f"sources/{name}": text for name, text in sources.items()},
         **_binaries(libraries, order.version),
-        **_documentation(source, interface, order.inputs),
+        "sources/CMakeLists.txt": (resources.files("fmu") / "data" / "CMakeLists.txt").read_bytes(),
+        **{f"resources/{name}": content for name, content in reference.files().items()},
+        **_documentation(source, interface, order, reference),
         **_VERSION_FILES[order.version](order.inputs, units),
     }
     return _archive(files)
@@ -99,17 +110,31 @@ def fmu_sources(model: Model, interface: Interface, version: FmiVersion, token: 
     return core | wrapper_sources(interface.table, version, token)
 
 
-def _interface(source: ModelSource, model: Model, inputs: Inputs) -> Interface:
+def _interface(source: ModelSource, model: Model, order: Order) -> Interface:
     return Interface(
         name=f"quasiomni.{_identifier(source.vehicle.name)}",
-        description=f"Identified model of {source.vehicle.name}, {inputs} inputs",
+        description=f"Identified model of {source.vehicle.name}, {order.inputs} inputs, {order.contacts} contacts",
         version=version("quasiomni"),
         tool=f"quasiomni {version('quasiomni')}",
         copyright=_COPYRIGHT,
         license="Apache-2.0",
         table=with_indicators(model.table, INDICATORS),
         dependencies=model.dependencies,
+        experiment=_EXPERIMENTS[order.contacts](model),
     )
+
+
+def _for_implicit_solvers(_model: Model) -> Experiment:
+    return Experiment()
+
+
+def _for_explicit_solvers(model: Model) -> Experiment:
+    """A step within the fastest time constant, one digit of it."""
+    digit = 10.0 ** np.floor(np.log10(model.fastest))
+    return Experiment(step_size=float(f"{np.floor(model.fastest / digit) * digit:.0e}"))
+
+
+_EXPERIMENTS: Final = {Contacts.STIFF: _for_implicit_solvers, Contacts.SOFT: _for_explicit_solvers}
 
 
 def _identifier(name: str) -> str:
@@ -140,10 +165,10 @@ def _binaries(libraries: Mapping[str, bytes], version: FmiVersion) -> dict[str, 
     }
 
 
-def _documentation(source: ModelSource, interface: Interface, inputs: Inputs) -> dict[str, bytes]:
+def _documentation(source: ModelSource, interface: Interface, order: Order, reference: Reference) -> dict[str, bytes]:
     python = ".".join(str(part) for part in sys.version_info[:3])
     versions = {"quasiomni": version("quasiomni"), "casadi": version("casadi"), "python": python}
-    page = documentation_page(source, interface.table, inputs, versions)
+    page = documentation_page(source, interface, order.inputs, reference, versions)
     files = {"index.html": page.encode(), "licenses/license.txt": _LICENSE.encode(), **source.documents}
     return {f"documentation/{name}": content for name, content in files.items()}
 

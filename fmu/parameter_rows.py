@@ -9,8 +9,8 @@ from typing import Final
 from fmu.variables import DEGREES, Block, Causality, Inputs, Variability, Variable
 from ident.effects import Effect, kind_of, terms_of
 from ident.effects.base import Sign
-from ident.plant.contact import CREEP_STIFFNESS
-from ident.plant.drives import DRIVE_GAIN, DRIVE_INTEGRAL_GAIN, DRIVE_UNWIND_TIME
+from ident.plant.contact import CREEP_STIFFNESS, Contacts
+from ident.plant.drives import DRIVE_GAIN, DRIVE_INTEGRAL_GAIN, DRIVE_TORQUE_LIMIT, DRIVE_UNWIND_TIME
 from ident.plant.memories import Memories, memories_of
 from ident.plant.modes import MODE_TOLERANCE
 from ident.plant.springs import DAMPING_RATIO, MOTOR_SHARE, STIFFEST
@@ -44,7 +44,12 @@ _GEOMETRY: Final = {
 
 
 def parameter_rows(
-    vehicle: VehicleDescription, parameters: Parameters, effects: Sequence[Effect], inputs: Inputs
+    vehicle: VehicleDescription,
+    parameters: Parameters,
+    effects: Sequence[Effect],
+    inputs: Inputs,
+    contacts: Contacts,
+    limited: bool,
 ) -> list[Variable]:
     """All of them, in the order of the table; arguments as of `fmu.table.variable_table`."""
     dynamic = [
@@ -54,11 +59,11 @@ def parameter_rows(
     geometry = [
         _positive(name, text, GEOMETRY_UNITS[name], getattr(vehicle.geometry, name)) for name, text in _GEOMETRY.items()
     ]
-    drives = _drives(vehicle) if inputs is Inputs.SPEED else []
+    drives = _drives(vehicle, inputs, limited)
     of_effects = [row for effect in effects for row in _effect_parameters(effect)]
     springs = _springs(memories_of(terms_of(effects)))
     limits = _friction_limits(vehicle, effects)
-    return dynamic + geometry + _regularisation() + limits + drives + springs + of_effects
+    return dynamic + geometry + _regularisation(contacts) + limits + drives + springs + of_effects
 
 
 def _parameter(
@@ -77,12 +82,12 @@ def _not_negative(name: str, text: str, unit: str, start: float) -> Variable:
     return _parameter(name, text, unit, start, minimum=0.0)
 
 
-def _regularisation() -> list[Variable]:
+def _regularisation(contacts: Contacts) -> list[Variable]:
     coulomb = "Rate at which Coulomb friction has reached 76 %, epsilon of (16)"
     return [
         _positive("epsilon", coulomb, "rad/s", COULOMB_EPSILON),
         _positive("stick_time", "How long motion below stiction goes on before it is held", "s", STICK_TIME),
-        _positive("creep_stiffness", "Contact force per slip velocity of a wheel", "N s/m", CREEP_STIFFNESS),
+        _positive("creep_stiffness", "Contact force per slip velocity of a wheel", "N s/m", CREEP_STIFFNESS[contacts]),
         _positive("mode_tolerance", "Of the steering angles, for the mode", "rad", MODE_TOLERANCE),
     ]
 
@@ -96,14 +101,17 @@ def _friction_limits(vehicle: VehicleDescription, effects: Sequence[Effect]) -> 
     return [_positive(name, text.format(name.rpartition("_")[2]), "1", limit) for name, limit in limits.items()]
 
 
-def _drives(vehicle: VehicleDescription) -> list[Variable]:
+def _drives(vehicle: VehicleDescription, inputs: Inputs, limited: bool) -> list[Variable]:
+    """Those of the speed loops; torque inputs have their limit alone, on request."""
     gain = "Proportional gain of the speed loops, motor torque per wheel rate"
-    limit = "Largest motor torque of the speed loops"
+    limit = _positive(DRIVE_TORQUE_LIMIT, "Largest torque of a motor, either way", "Nm", vehicle.limits.peak_torque)
+    if inputs is Inputs.TORQUE:
+        return [limit] if limited else []
     unwind = "In which the integral of a speed loop follows a torque at its limit"
     return [
         _not_negative("drive_gain", gain, "Nm s/rad", DRIVE_GAIN),
         _not_negative("drive_integral_gain", "Integral gain of the speed loops", "Nm/rad", DRIVE_INTEGRAL_GAIN),
-        _positive("drive_torque_limit", limit, "Nm", vehicle.limits.peak_torque),
+        limit,
         _positive("drive_unwind_time", unwind, "s", DRIVE_UNWIND_TIME),
     ]
 

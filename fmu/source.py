@@ -12,6 +12,7 @@ from fmu.table import neutral_effects, variable_table
 from fmu.variables import Inputs, VariableTable
 from ident.effects import Effect
 from ident.errors import DataFileError
+from ident.plant.contact import Contacts
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
@@ -63,21 +64,26 @@ class Model:
         table: of its variables.
         files: C sources by name.
         dependencies: derivative or output -> the states and inputs that it depends on.
+        fastest: time constant [s], at rest.
     """
 
     table: VariableTable
     files: Mapping[str, str]
     dependencies: Mapping[str, tuple[str, ...]]
+    fastest: float
 
 
-def make_model(source: ModelSource, inputs: Inputs) -> Model:
+def make_model(
+    source: ModelSource, inputs: Inputs, contacts: Contacts = Contacts.STIFF, limited: bool = False
+) -> Model:
     """The model with the confirmed effects, and with those of size zero that take no states of their own."""
-    effects = _with_neutral(source.effects)
-    table = variable_table(source.vehicle, source.parameters, effects, inputs)
+    effects = with_neutral(source.effects)
+    table = variable_table(source.vehicle, source.parameters, effects, inputs, contacts, limited)
     core = generate_core(table, effects, inputs)
-    return Model(table, core.files, core.dependencies)
+    return Model(table, core.files, core.dependencies, core.fastest)
 
 
-def _with_neutral(confirmed: Sequence[Effect]) -> list[Effect]:
+def with_neutral(confirmed: Sequence[Effect]) -> list[Effect]:
+    """Effects of an FMU: the confirmed ones, and those of size zero that it always has."""
     found = {(effect.name, effect.where) for effect in confirmed}
     return [*confirmed, *(effect for effect in neutral_effects() if (effect.name, effect.where) not in found)]

@@ -22,6 +22,7 @@ class Causality(enum.StrEnum):
 
     INDEPENDENT = "independent"
     PARAMETER = "parameter"
+    CALCULATED = "calculatedParameter"
     INPUT = "input"
     OUTPUT = "output"
     LOCAL = "local"
@@ -45,6 +46,7 @@ class Block(enum.Enum):
     PARAMETER = "p"
     OUTPUT = "y"
     MODE = "mode"
+    CALCULATED = "calculated"
     INDICATOR = "z"
 
 
@@ -62,7 +64,8 @@ class Variable:
         start: value at the start, None for what is computed.
         minimum, maximum: bounds, None where there is none.
         positive: the minimum itself, zero, is refused.
-        nominal: size that the absolute error of a state is measured in.
+        advisory: the bounds say what the model is meant for; values beyond them are taken.
+        nominal: size that the absolute error of a state is measured in; of an input, what is usual.
         state: name of the state that this is the derivative of, empty otherwise.
         value_reference: of FMI, the position in the table.
     """
@@ -79,6 +82,7 @@ class Variable:
     minimum: float | None = None
     maximum: float | None = None
     positive: bool = False
+    advisory: bool = False
     nominal: float = 1.0
     state: str = ""
     value_reference: int = 0
@@ -86,7 +90,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class VariableTable:
-    """All variables by value reference: time, states, derivatives, inputs, parameters, outputs, mode."""
+    """All variables by value reference: time, states, derivatives, inputs, parameters, outputs, mode, calculated."""
 
     variables: tuple[Variable, ...]
 

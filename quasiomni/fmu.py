@@ -20,6 +20,7 @@ from hil.cosimulation.assessment import refuse_unusable_fmu
 from hil.cosimulation.export import export_run
 from hil.cosimulation.replay import Outcome, replay, write_plot
 from ident.extras import Extra, require
+from ident.plant.contact import Contacts
 from ident.report.digits import percent, unit_text
 from ident.writing import refuse_inputs
 from quasiomni.application import app, console
@@ -44,10 +45,17 @@ def build(
     inputs: Annotated[
         Inputs, typer.Option(help="Motor torques, or wheel speeds with the drives' inner loop.")
     ] = Inputs.TORQUE,
+    contacts: Annotated[
+        Contacts,
+        typer.Option(help="`stiff` for implicit solvers and co-simulation, `soft` for explicit ones as Runge-Kutta."),
+    ] = Contacts.STIFF,
+    limits: Annotated[
+        bool, typer.Option("--limits", help="Torques beyond the motors' peak torque are limited to it.")
+    ] = False,
     force: ForceOption = False,
 ) -> None:
     """Package the identified model, with its confirmed effects, as an FMU for co-simulation and model exchange."""
-    order = Order(fmi, inputs, parse_platforms(platforms))
+    order = Order(fmi, inputs, parse_platforms(platforms), contacts, limits)
     with bars() as shown:
         task = shown.add_task("compiling", total=None)
 

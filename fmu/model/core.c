@@ -55,34 +55,38 @@ void qo_init(qo_model *model) {
     start_values(model->u, qo_inputs, QO_NU);
     start_values(model->p, qo_parameters, QO_NP);
     model->tolerance = QO_TOLERANCE;
-    model->step = QO_FIRST_STEP;
+    model->step = model->after_jump = QO_FIRST_STEP;
+    memcpy(model->last_u, model->u, sizeof model->u);
     model->mode = 1;
     qo_update_discrete(model, &changed);
     qo_outputs(model);
+}
+
+/* Bounds are finite, so that what is no number or infinite is not between them. */
+static int fits(const qo_row *row, double value) {
+    return value >= row->minimum && value <= row->maximum && !(row->positive && value == 0.0);
 }
 
 static const char *objection(const qo_row *row, double value) {
     if (!isfinite(value)) {
         return " is not finite.";
     }
-    if (value < row->minimum || value > row->maximum) {
-        return " is out of its bounds.";
-    }
-    if (row->positive && value == 0.0) {
-        return " must be greater than zero.";
-    }
-    return NULL;
+    return row->positive && value == 0.0 ? " must be greater than zero." : " is out of its bounds.";
 }
 
 static qo_status check_block(qo_model *model, const char *kind, const double *values, const qo_row *rows, int count) {
     int index;
     for (index = 0; index < count; ++index) {
-        const char *what = objection(&rows[index], values[index]);
-        if (what != NULL) {
-            return qo_fail(model, QO_ERROR, kind, rows[index].name, what);
+        if (!fits(&rows[index], values[index])) {
+            return qo_fail(model, QO_ERROR, kind, rows[index].name, objection(&rows[index], values[index]));
         }
     }
     return QO_OK;
+}
+
+static qo_status check_rates(qo_model *model) {
+    const int broken = qo_first_not_finite(model->ur, QO_NU);
+    return broken < 0 ? QO_OK : qo_fail(model, QO_ERROR, "The rate of ", qo_inputs[broken].name, " is not finite.");
 }
 
 qo_status qo_check(qo_model *model) {
@@ -93,7 +97,7 @@ qo_status qo_check(qo_model *model) {
     if (status == QO_OK) {
         status = check_block(model, "State ", model->x, qo_states, QO_NX);
     }
-    return status;
+    return status == QO_OK ? check_rates(model) : status;
 }
 
 qo_status qo_outputs(qo_model *model) {

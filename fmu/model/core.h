@@ -28,8 +28,11 @@ typedef struct {
     double u[QO_NU];
     double p[QO_NP];
     double y[QO_NY];
+    double ur[QO_NU]; /* rates of the inputs while time passes [per s]; zero: they are held */
     double tolerance; /* of a step, in units of the nominal values of the states */
     double step;      /* length that the next internal step tries [s] */
+    double after_jump; /* the same where the inputs have jumped */
+    double last_u[QO_NU]; /* inputs at the end of the last internal step */
     int mode;         /* k of (9) */
     char message[QO_MESSAGE_SIZE];
 } qo_model;
@@ -43,7 +46,7 @@ const char *qo_input_name(int index);
 const char *qo_parameter_name(int index);
 const char *qo_output_name(int index);
 
-/* Whether every x, u and p is finite and within its bounds. All functions below do this first. */
+/* Whether every x, u and p is finite and within its bounds, and every rate of an input finite. All functions below do this first. */
 qo_status qo_check(qo_model *model);
 
 /* y from x, u, p. */
@@ -58,10 +61,14 @@ qo_status qo_event_indicators(qo_model *model, double *z);
 /* mode from x, p. *changed tells whether it is another one now. */
 qo_status qo_update_discrete(qo_model *model, int *changed);
 
-/* Integrates over h [s], inputs held: x, y and mode at the end. As many internal steps as the tolerance asks for. */
+/* Time constant [s] of the fastest part of the model with the parameters p, at rest and straight ahead. */
+qo_status qo_fastest(qo_model *model, double *seconds);
+
+/* Integrates over h [s]: x, y, mode, and u where it has rates, at the end. As many internal steps as the tolerance asks for. */
 qo_status qo_step(qo_model *model, double h);
 
-/* One internal step of at most h [s]; *taken is its length. For a caller that stops at events. x and y, not mode. */
+/* One internal step of at most h [s]; *taken is its length. For a caller that stops at events. x, u and y,
+ * not mode. */
 qo_status qo_advance(qo_model *model, double h, double *taken);
 
 /* Derivatives at x, u, p along a direction: sxd (QO_NX), sy (QO_NY) = d(xd, y)/d(x, u, p) (dx, du, dp). */

@@ -6,6 +6,7 @@ CasADi writes the equations as C; each function gets plain arrays for arguments,
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -13,6 +14,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import casadi as ca
+import numpy as np
 
 from fmu.model.equations import equations
 from fmu.variables import Block, Inputs, Variable, VariableTable
@@ -26,7 +28,7 @@ TOLERANCE: Final = 1e-4
 FIRST_STEP: Final = 1e-3
 """Length that the first internal step tries [s]."""
 
-_WRITTEN: Final = ("core.h", "core.c", "solver.c", "qo_internal.h")
+_WRITTEN: Final = ("core.h", "core.c", "solver.c", "fastest.c", "qo_internal.h")
 """Files of the core that are written by hand."""
 
 _ROWS: Final = (("states", "NX", Block.STATE), ("inputs", "NU", Block.INPUT), ("parameters", "NP", Block.PARAMETER))
@@ -51,10 +53,12 @@ class Core:
     Attributes:
         files: name -> text; compile all that end in `.c`.
         dependencies: derivative or output -> the states and inputs that it depends on, in the order of the table.
+        fastest: time constant [s] with the parameters of the table, at rest and straight ahead.
     """
 
     files: Mapping[str, str]
     dependencies: Mapping[str, tuple[str, ...]]
+    fastest: float
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,14 @@ def generate_core(table: VariableTable, effects: Sequence[Effect], inputs: Input
         "qo_equations.h": _prototypes(routines),
         "qo_equations.c": _definitions(routines),
     }
-    return Core(MappingProxyType({**written, **generated}), MappingProxyType(_dependencies(model, table)))
+    files, dependencies = MappingProxyType({**written, **generated}), MappingProxyType(_dependencies(model, table))
+    return Core(files, dependencies, _fastest(model, table))
+
+
+def _fastest(model: Equations, table: VariableTable) -> float:
+    jacobian = ca.Function("jacobian", [model.x, model.u, model.p], [ca.jacobian(model.xd, model.x)])
+    starts = [[row.start or 0.0 for row in table.block(block)] for block in (Block.STATE, Block.INPUT, Block.PARAMETER)]
+    return float(1.0 / np.abs(np.linalg.eigvals(np.asarray(jacobian(*starts)))).max())
 
 
 def _routines(model: Equations) -> tuple[list[_Routine], int]:
@@ -87,8 +98,9 @@ def _routines(model: Equations) -> tuple[list[_Routine], int]:
         _Routine("derivatives", point, {"xd": model.xd}),
         _Routine("outputs", point, {"y": model.y}),
         _Routine("mode_distances", point, {"z": model.z}),
-        _Routine("jacobian", point, {"jacobian": _nonzeros(jacobian)}),
+        _Routine("linearize", point, {"xd": model.xd, "jacobian": _nonzeros(jacobian)}),
         *_eliminations(jacobian.sparsity(), model.coupled),
+        _along_inputs(model, point),
         *_directional(model, point),
     ]
     return routines, jacobian.nnz()
@@ -116,6 +128,11 @@ def _eliminations(pattern: Any, count: int) -> list[_Routine]:
         _Routine("eliminate", {**system, "right": right}, {"coupled": side}),
         _Routine("expand", {**system, "right": right, "coupled": coupled}, {"solution": ca.vertcat(coupled, others)}),
     ]
+
+
+def _along_inputs(model: Equations, point: Mapping[str, Expression]) -> _Routine:
+    direction = ca.SX.sym("du", model.u.numel())
+    return _Routine("input_direction", {**point, "du": direction}, {"sxd": ca.jtimes(model.xd, model.u, direction)})
 
 
 def _directional(model: Equations, point: Mapping[str, Expression]) -> list[_Routine]:
@@ -208,7 +225,7 @@ def _sizes(table: VariableTable, jacobian_size: int, model: Equations) -> str:
 
 
 def _table(table: VariableTable) -> str:
-    lines = ["/* The table of variables. Generated. */", '#include "qo_internal.h"', "", "#include <math.h>", ""]
+    lines = ["/* The table of variables. Generated. */", '#include "qo_internal.h"', ""]
     for name, size, block in _ROWS:
         lines += [f"const qo_row qo_{name}[QO_{size}] = {{", *map(_row, table.block(block)), "};", ""]
     names = [f'    "{row.name}",' for row in table.block(Block.OUTPUT)]
@@ -216,7 +233,9 @@ def _table(table: VariableTable) -> str:
 
 
 def _row(row: Variable) -> str:
-    minimum = "-INFINITY" if row.minimum is None else repr(float(row.minimum))
-    maximum = "INFINITY" if row.maximum is None else repr(float(row.maximum))
+    minimum, maximum = (
+        repr(unbounded if bound is None or row.advisory else float(bound))
+        for bound, unbounded in ((row.minimum, -sys.float_info.max), (row.maximum, sys.float_info.max))
+    )
     start = repr(float(row.start or 0.0))
     return f'    {{"{row.name}", {start}, {minimum}, {maximum}, {row.nominal!r}, {int(row.positive)}}},'

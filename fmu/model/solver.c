@@ -25,6 +25,9 @@
    and an error of it beyond what a contact sticks in makes steps bounce between its two sides. */
 #define RELATIVE_PART 0.01
 
+/* After inputs that jump: how much longer than the step that was right after the last jump the next one may be. */
+#define BOLDER 1.2
+
 static const double GAMMA = 0.5;
 static const double A[STAGES][STAGES] = {{0.0}, {0.0}, {2.0}, {2.0, 0.0, 1.0}};
 static const double C[STAGES][STAGES] = {{0.0}, {4.0}, {1.0, -1.0}, {1.0, -1.0, -8.0 / 3.0}};
@@ -32,6 +35,9 @@ static const double B[STAGES] = {2.0, 0.0, 1.0, 1.0};
 static const double E[STAGES] = {0.0, 0.0, 0.0, 1.0};
 /* Whether a stage has an argument of its own; the second one shares that of the first. */
 static const int EVALUATES[STAGES] = {1, 0, 1, 1};
+/* Where in the step a stage sees the inputs, and how much of what their rates change in the derivatives it adds. */
+static const double MOMENT[STAGES] = {0.0, 0.0, 1.0, 1.0};
+static const double DRIFT[STAGES] = {0.5, 1.5, 0.0, 0.0};
 static const double ORDER_OF_ERROR = 3.0;
 
 typedef struct {
@@ -40,6 +46,13 @@ typedef struct {
     double matrix[QO_NV][QO_NV];
     int pivot[QO_NV];
 } linear_system;
+
+/* Where a step begins. */
+typedef struct {
+    double slope[QO_NX]; /* of the states */
+    double drift[QO_NX]; /* of the slope, by the inputs alone */
+    int ramps;           /* whether any input has a rate */
+} departure;
 
 /* LU decomposition with row pivoting, in place. Whether there is one. */
 static int decompose(linear_system *system) {
@@ -106,14 +119,19 @@ static void solve(const linear_system *system, const double *right, double *k) {
     qo_eq_expand(system->jacobian, &system->shift, right, coupled, k);
 }
 
+static void add_scaled(double *sum, const double *values, double weight) {
+    int index;
+    for (index = 0; index < QO_NX; ++index) {
+        sum[index] += weight * values[index];
+    }
+}
+
 static void add(double *sum, const double *weights, double (*k)[QO_NX], int count, double scale) {
-    int stage, index;
+    int stage;
     for (stage = 0; stage < count; ++stage) {
         double weight = weights[stage] * scale;
         if (weight != 0.0) {
-            for (index = 0; index < QO_NX; ++index) {
-                sum[index] += weight * k[stage][index];
-            }
+            add_scaled(sum, k[stage], weight);
         }
     }
 }
@@ -137,8 +155,37 @@ static double error_ratio(const qo_model *model, const double *next, const doubl
     return largest;
 }
 
-/* A step of h from the derivative f: the state after it, and its error ratio. */
-static double attempt(const qo_model *model, linear_system *system, const double *f, double h, double *next,
+static void inputs_after(const qo_model *model, double h, double *u) {
+    int index;
+    for (index = 0; index < QO_NU; ++index) {
+        u[index] = model->u[index] + h * model->ur[index];
+    }
+}
+
+static departure depart(const qo_model *model, linear_system *system) {
+    departure from;
+    int index;
+    qo_eq_linearize(model->x, model->u, model->p, from.slope, system->jacobian);
+    from.ramps = 0;
+    for (index = 0; index < QO_NU; ++index) {
+        from.ramps |= model->ur[index] != 0.0;
+    }
+    if (from.ramps) {
+        qo_eq_input_direction(model->x, model->u, model->p, model->ur, from.drift);
+    }
+    return from;
+}
+
+static void evaluate(const qo_model *model, const departure *from, const double *argument, double h, double *slope) {
+    double u[QO_NU];
+    if (from->ramps) {
+        inputs_after(model, h, u);
+    }
+    qo_eq_derivatives(argument, from->ramps ? u : model->u, model->p, slope);
+}
+
+/* A step of h: the state after it, and its error ratio. */
+static double attempt(const qo_model *model, linear_system *system, const departure *from, double h, double *next,
                       int *worst) {
     double k[STAGES][QO_NX];
     double slope[QO_NX], error[QO_NX];
@@ -147,17 +194,20 @@ static double attempt(const qo_model *model, linear_system *system, const double
         *worst = 0;
         return INFINITY;
     }
-    memcpy(slope, f, sizeof slope);
+    memcpy(slope, from->slope, sizeof slope);
     for (stage = 0; stage < STAGES; ++stage) {
         double right[QO_NX];
         if (EVALUATES[stage] && stage > 0) {
             double argument[QO_NX];
             memcpy(argument, model->x, sizeof argument);
             add(argument, A[stage], k, stage, 1.0);
-            qo_eq_derivatives(argument, model->u, model->p, slope);
+            evaluate(model, from, argument, MOMENT[stage] * h, slope);
         }
         memcpy(right, slope, sizeof right);
         add(right, C[stage], k, stage, 1.0 / h);
+        if (from->ramps) {
+            add_scaled(right, from->drift, DRIFT[stage] * h);
+        }
         solve(system, right, k[stage]);
     }
     memcpy(next, model->x, QO_NX * sizeof *next);
@@ -193,20 +243,25 @@ static qo_status give_up(qo_model *model, int worst) {
 /* One step of at most h that the tolerance accepts; y stays. */
 static qo_status integrate(qo_model *model, double h, double *taken) {
     linear_system system;
-    double f[QO_NX], next[QO_NX];
-    double tried = fmin(fmax(model->step, SHORTEST_STEP), h);
+    const departure from = depart(model, &system);
+    const int jumped = memcmp(model->u, model->last_u, sizeof model->u) != 0;
+    double next[QO_NX];
+    double tried = fmin(fmax(jumped ? fmin(model->step, model->after_jump) : model->step, SHORTEST_STEP), h);
     int worst = 0, rejected = 0;
-    qo_eq_derivatives(model->x, model->u, model->p, f);
-    qo_eq_jacobian(model->x, model->u, model->p, system.jacobian);
     for (;;) {
-        double ratio = attempt(model, &system, f, tried, next, &worst);
+        double ratio = attempt(model, &system, &from, tried, next, &worst);
         double proposed = tried * (ratio <= 1.0 && rejected ? fmin(1.0, growth(ratio)) : growth(ratio));
         if (ratio <= 1.0) {
             /* A step cut short by the end of the communication step says nothing against a longer one. */
             model->step = fmin(tried < model->step ? fmax(proposed, model->step) : proposed, LONGEST_STEP);
+            if (jumped) {
+                model->after_jump = fmin(model->step, BOLDER * tried);
+            }
             *taken = tried;
             flush(next);
             memcpy(model->x, next, sizeof next);
+            inputs_after(model, tried, model->u);
+            memcpy(model->last_u, model->u, sizeof model->u);
             return QO_OK;
         }
         rejected = 1;

@@ -296,10 +296,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
                                        const fmi2Integer order[], const fmi2Real value[])
 {
     INSTANCE_AS(fmi2SetRealInputDerivatives, QO_CO_SIMULATION, QO_INSTANTIATED | QO_INITIALIZATION | QO_STEP)
-    (void)vr;
-    (void)order;
-    (void)value;
-    return (fmi2Status)qo_no_variables(me, "interpolated input", nvr);
+    return (fmi2Status)qo_set_input_rates(me, vr, nvr, order, value);
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,

@@ -31,13 +31,14 @@ static void write_message(const qo_instance *me, qo_answer status, const char *c
     log_message(me->environment, (fmi3Status)status, category, message);
 }
 
-/* Offers the importer the outputs of an internal step; not zero where it asks to end the step there. */
+/* Offers the importer the outputs of an internal step and asks for its inputs; not zero where it asks to end the step
+ * there. */
 static int intermediate_update(qo_instance *me)
 {
     fmi3IntermediateUpdateCallback update = (fmi3IntermediateUpdateCallback)me->intermediate;
     fmi3Boolean requested = fmi3False;
     fmi3Float64 return_time = me->now.time;
-    update(me->environment, me->now.time, fmi3False, fmi3True, fmi3True, me->early_return != 0, &requested,
+    update(me->environment, me->now.time, fmi3True, fmi3True, fmi3True, me->early_return != 0, &requested,
            &return_time);
     return me->early_return && requested;
 }
@@ -50,7 +51,7 @@ const char *fmi3GetVersion(void)
 fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[])
 {
-    INSTANCE(fmi3SetDebugLogging, QO_ANY_MODE)
+    INSTANCE(fmi3SetDebugLogging, QO_READABLE)
     if (nCategories > 0) {
         GIVEN(categories)
     }
@@ -179,21 +180,21 @@ fmi3Status fmi3Reset(fmi3Instance instance)
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           fmi3Float64 values[], size_t nValues)
 {
-    INSTANCE(fmi3GetFloat64, QO_ANY_MODE)
+    INSTANCE(fmi3GetFloat64, QO_READABLE)
     return (fmi3Status)qo_get(me, valueReferences, nValueReferences, values, nValues);
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           const fmi3Float64 values[], size_t nValues)
 {
-    INSTANCE(fmi3SetFloat64, SETTABLE)
+    INSTANCE(fmi3SetFloat64, SETTABLE | QO_UPDATING)
     return (fmi3Status)qo_set(me, valueReferences, nValueReferences, values, nValues);
 }
 
 fmi3Status fmi3GetInt32(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                         fmi3Int32 values[], size_t nValues)
 {
-    INSTANCE(fmi3GetInt32, QO_ANY_MODE)
+    INSTANCE(fmi3GetInt32, QO_READABLE)
     return (fmi3Status)qo_get_integers(me, valueReferences, nValueReferences, values, nValues);
 }
 
@@ -347,7 +348,7 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
                                         const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                         size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
-    INSTANCE(fmi3GetDirectionalDerivative, QO_INITIALIZATION | QO_RUNNING | QO_TERMINATED)
+    INSTANCE(fmi3GetDirectionalDerivative, QO_INITIALIZATION | QO_RUNNING | QO_UPDATING | QO_TERMINATED)
     return (fmi3Status)qo_directional(me, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity,
                                       nSensitivity);
 }
@@ -356,7 +357,7 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
                                     const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                     size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
-    INSTANCE(fmi3GetAdjointDerivative, QO_INITIALIZATION | QO_RUNNING | QO_TERMINATED)
+    INSTANCE(fmi3GetAdjointDerivative, QO_INITIALIZATION | QO_RUNNING | QO_UPDATING | QO_TERMINATED)
     return (fmi3Status)qo_adjoint(me, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity);
 }
 
@@ -481,7 +482,7 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueRefere
                                     size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[],
                                     size_t nValues)
 {
-    INSTANCE_AS(fmi3GetOutputDerivatives, QO_CO_SIMULATION, QO_STEP | QO_TERMINATED)
+    INSTANCE_AS(fmi3GetOutputDerivatives, QO_CO_SIMULATION, QO_STEP | QO_UPDATING | QO_TERMINATED)
     return (fmi3Status)qo_output_derivatives(me, valueReferences, nValueReferences, orders, values, nValues);
 }
 

@@ -19,6 +19,7 @@ static const struct {
     {QO_INSTANTIATED, "before initialization"}, {QO_INITIALIZATION, "in initialization mode"},
     {QO_EVENT, "in event mode"},                {QO_CONTINUOUS_TIME, "in continuous-time mode"},
     {QO_STEP, "in step mode"},                  {QO_TERMINATED, "after termination"},
+    {QO_UPDATING, "in intermediate update"},
 };
 
 static int is_finite(double value)

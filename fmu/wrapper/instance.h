@@ -23,10 +23,12 @@ typedef enum {
     QO_EVENT = 4,
     QO_CONTINUOUS_TIME = 8,
     QO_STEP = 16,
-    QO_TERMINATED = 32
+    QO_TERMINATED = 32,
+    QO_UPDATING = 64 /* within the callback between two internal steps */
 } qo_mode;
 
 #define QO_ANY_MODE (QO_INSTANTIATED | QO_INITIALIZATION | QO_EVENT | QO_CONTINUOUS_TIME | QO_STEP | QO_TERMINATED)
+#define QO_READABLE (QO_ANY_MODE | QO_UPDATING)
 #define QO_RUNNING (QO_EVENT | QO_CONTINUOUS_TIME | QO_STEP)
 
 typedef enum { QO_LOG_ERROR = 1, QO_LOG_DISCARD = 2, QO_LOG_EVENTS = 4 } qo_category;
@@ -47,15 +49,18 @@ typedef struct {
     qo_model model;
     double derivatives[QO_NX];
     double indicators[QO_NZ];
+    double fastest; /* time constant [s] */
     double time;
     double stop_time; /* infinite where none is set */
     int mode;         /* of the interface, a qo_mode; k of (9) is in the model */
+    int follows;      /* whether the importer sets inputs between internal steps */
     int known;        /* set of QO_KNOWN_...: what belongs to the present x, u and p */
 } qo_snapshot;
 
 #define QO_KNOWN_OUTPUTS 1
 #define QO_KNOWN_DERIVATIVES 2
 #define QO_KNOWN_INDICATORS 4
+#define QO_KNOWN_FASTEST 8
 
 struct qo_instance {
     qo_snapshot now;
@@ -111,6 +116,9 @@ const qo_variable *qo_find(const qo_instance *me, unsigned reference);
 qo_answer qo_get(qo_instance *me, const unsigned references[], size_t n, double values[], size_t n_values);
 qo_answer qo_set(qo_instance *me, const unsigned references[], size_t n, const double values[], size_t n_values);
 qo_answer qo_get_integers(qo_instance *me, const unsigned references[], size_t n, int values[], size_t n_values);
+/* Rates of inputs, for the next co-simulation step. */
+qo_answer qo_set_input_rates(qo_instance *me, const unsigned references[], size_t n, const int orders[],
+                             const double rates[]);
 /* References of types that the model has no variables of. */
 qo_answer qo_no_variables(const qo_instance *me, const char *type, size_t n);
 

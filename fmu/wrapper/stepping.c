@@ -1,5 +1,6 @@
 /* The co-simulation step: through the model's own solver, stopping at events where the importer wants to know. */
 #include <math.h>
+#include <string.h>
 
 #include "instance.h"
 
@@ -11,6 +12,9 @@
 
 /* Share of a step that is left over by rounding alone. */
 #define SPLINTER 1e-12
+
+/* How long an input is held where the importer sets it between internal steps [s]. */
+#define LONGEST_HOLD 2e-3
 
 /* Internal steps of one communication step, with those of the search for its event. */
 #define MOST_STEPS 50000
@@ -43,6 +47,23 @@ static qo_status look_for_event(const qo_model *model, int *event)
     return qo_update_discrete(&copy, event);
 }
 
+/* An input that the importer sets between internal steps is held no longer than promised. */
+static double longest_step(const qo_instance *me, double longest)
+{
+    return me->now.follows ? fmin(longest, LONGEST_HOLD) : longest;
+}
+
+/* What the importer does between two internal steps; whether it asks to end the step. */
+static int update(qo_instance *me)
+{
+    int early;
+    me->now.known = QO_KNOWN_OUTPUTS;
+    me->now.mode = QO_UPDATING;
+    early = me->between(me);
+    me->now.mode = QO_STEP;
+    return early;
+}
+
 /* Internal steps up to `size`, or to an event, or to where the importer asks to return, where it allows that. */
 static qo_answer advance(qo_instance *me, double time, double size, qo_step_end *end)
 {
@@ -52,7 +73,7 @@ static qo_answer advance(qo_instance *me, double time, double size, qo_step_end 
     for (count = 0; done < size && !end->early; count++) {
         const qo_model before = *model;
         double taken;
-        qo_status status = qo_advance(model, fmin(longest, size - done), &taken);
+        qo_status status = qo_advance(model, fmin(longest_step(me, longest), size - done), &taken);
         if (status == QO_OK) {
             status = me->events_told ? look_for_event(model, &end->event) : qo_update_discrete(model, &changed);
         }
@@ -72,8 +93,7 @@ static qo_answer advance(qo_instance *me, double time, double size, qo_step_end 
         me->now.time = end->time = time + done;
         end->early = end->event && me->early_return;
         if (me->between != NULL) {
-            me->now.known = QO_KNOWN_OUTPUTS;
-            end->early |= me->between(me);
+            end->early |= update(me);
         }
         end->early &= done < size;
     }
@@ -102,7 +122,8 @@ qo_answer qo_do_step(qo_instance *me, double time, double size, qo_step_end *end
         me->now.known = 0;
         return answer;
     }
+    memset(me->now.model.ur, 0, sizeof me->now.model.ur);
     me->now.time = end->time;
-    me->now.known = QO_KNOWN_OUTPUTS;
+    me->now.known = me->between == NULL ? QO_KNOWN_OUTPUTS : 0;
     return me->now.model.mode == before.mode ? QO_ANSWER_OK : qo_tell_event(me);
 }

@@ -42,6 +42,8 @@ static qo_status compute(qo_instance *me, int what)
         status = qo_derivatives(&now->model, now->derivatives);
     } else if (what == QO_KNOWN_INDICATORS) {
         status = qo_event_indicators(&now->model, now->indicators);
+    } else if (what == QO_KNOWN_FASTEST) {
+        status = qo_fastest(&now->model, &now->fastest);
     }
     now->known |= status == QO_OK ? what : 0;
     return status;
@@ -54,10 +56,11 @@ static const struct {
     [QO_TIME] = {0, 0},
     [QO_STATE] = {0, SETTABLE_STATES},
     [QO_DERIVATIVE] = {QO_KNOWN_DERIVATIVES, 0},
-    [QO_INPUT] = {0, SETTABLE_PARAMETERS | QO_CONTINUOUS_TIME},
+    [QO_INPUT] = {0, SETTABLE_PARAMETERS | QO_CONTINUOUS_TIME | QO_UPDATING},
     [QO_PARAMETER] = {0, SETTABLE_PARAMETERS},
     [QO_OUTPUT] = {QO_KNOWN_OUTPUTS, 0},
     [QO_DISCRETE] = {0, 0},
+    [QO_CALCULATED] = {QO_KNOWN_FASTEST, 0},
     [QO_INDICATOR] = {QO_KNOWN_INDICATORS, 0},
 };
 
@@ -69,6 +72,7 @@ static double *place(qo_snapshot *now, const qo_variable *variable)
     case QO_INPUT: return now->model.u + variable->index;
     case QO_PARAMETER: return now->model.p + variable->index;
     case QO_OUTPUT: return now->model.y + variable->index;
+    case QO_CALCULATED: return &now->fastest;
     case QO_INDICATOR: return now->indicators + variable->index;
     default: return &now->time;
     }
@@ -170,10 +174,36 @@ qo_answer qo_set(qo_instance *me, const unsigned references[], size_t n, const d
     answer = settle(me, variable);
     if (answer == QO_ANSWER_OK) {
         me->now.known = 0;
+        me->now.follows |= me->now.mode == QO_UPDATING;
     } else {
         me->now.model = before;
     }
     return answer;
+}
+
+qo_answer qo_set_input_rates(qo_instance *me, const unsigned references[], size_t n, const int orders[],
+                             const double rates[])
+{
+    const qo_model before = me->now.model;
+    size_t i;
+    if (!fits(me, references, n, rates, n) || !fits(me, references, n, orders, n)) {
+        return QO_ANSWER_ERROR;
+    }
+    for (i = 0; i < n; i++) {
+        const qo_variable *variable = qo_find(me, references[i]);
+        const char *objection = variable == NULL                ? NULL
+                                : variable->role != QO_INPUT    ? "is no input"
+                                : orders[i] != 1                ? "has rates of order 1 only"
+                                : rates[i] - rates[i] != 0.0    ? "has a rate that is not finite"
+                                                                : "";
+        if (objection == NULL || objection[0] != '\0') {
+            me->now.model = before;
+            return objection == NULL ? QO_ANSWER_ERROR
+                                     : qo_tell(me, QO_ANSWER_ERROR, "%s %s.", variable->name, objection);
+        }
+        me->now.model.ur[variable->index] = rates[i];
+    }
+    return QO_ANSWER_OK;
 }
 
 qo_answer qo_update(qo_instance *me, int *changed)

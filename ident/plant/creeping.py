@@ -15,7 +15,7 @@ import casadi as ca
 
 from ident.plant import symbolic
 from ident.plant.balance import Resistance
-from ident.plant.contact import contact_forces, static_loads
+from ident.plant.contact import contact_forces, held_twist, held_twist_rates, static_loads
 from ident.plant.delays import filter_rates, late_angles, late_torques
 from ident.plant.drives import DRIVES, Inputs
 from ident.plant.memories import Memories, memories_of
@@ -82,10 +82,10 @@ class Motion:
     rolling: Expression
     couplings: Sequence[Twist]
 
-    @property
-    def slip(self) -> Expression:
-        """s (8,): across the four wheels, then along them [m/s]."""
-        return self.rolling @ ca.vertcat(self.state.rates, *(coupling.rate for coupling in self.couplings))
+    def slip_with(self, twist: Expression) -> Expression:
+        """Slip (8,) of the contacts with a twist (3,) more of the chassis: across the wheels, then along them [m/s]."""
+        rates = ca.vertcat(self.state.rates[:3] + twist, self.state.rates[3:])
+        return self.rolling @ ca.vertcat(rates, *(coupling.rate for coupling in self.couplings))
 
 
 def equations(x: Symbols, u: Symbols, p: Symbols, effects: Sequence[Term], inputs: Inputs) -> Equations:
@@ -106,7 +106,8 @@ def equations(x: Symbols, u: Symbols, p: Symbols, effects: Sequence[Term], input
     torques, integral_rates = DRIVES[inputs](motor_rates, x, u, p)
     shaft = shaft_torques(terms, late_torques(x, terms, memories, torques), motor_angles)
     resistance = Resistance(terms, parameters, lambda state: stop_torques(state.alpha, state.rates, p))
-    forces = contact_forces(motion.slip, static_loads(p, terms), p)
+    slip = motion.slip_with(ca.SX.zeros(3))
+    forces = contact_forces(motion.slip_with(held_twist(x)), static_loads(p, terms), p)
     accelerations = _acceleration(motion, resistance, forces, shaft, gears)
     slope_rates, filtered_rates = filter_rates(x, terms, memories, torques, rates[3:5])
     xd = ca.vertcat(
@@ -114,6 +115,7 @@ def equations(x: Symbols, u: Symbols, p: Symbols, effects: Sequence[Term], input
         *(twist_acceleration(each, shaft[each.place], accelerations[5 + each.place]) for each in gears),
         slope_rates,
         memory_rates(x, p, rates),
+        held_twist_rates(x, p, alpha, rates),
         integral_rates,
         *(twisted.rate for twisted in (*couplings, *gears)),
         filtered_rates,
@@ -122,7 +124,6 @@ def equations(x: Symbols, u: Symbols, p: Symbols, effects: Sequence[Term], input
         _pose_rate(state.heading, rates),
     )
     reported = late_angles(x, terms, memories, alpha + steering_errors(terms))
-    slip = motion.slip
     at_shafts = (angle for each in gears for angle in (motor_angles[each.place], motor_rates[each.place]))
     y = ca.vertcat(reported, torques, slip[4:], slip[:4], _motor_wrench(motion, shaft), *at_shafts)
     distances = symbolic.mode_distances(alpha, p["mode_tolerance"])

@@ -20,6 +20,9 @@ class Inputs(enum.StrEnum):
     SPEED = "speed"
 
 
+DRIVE_TORQUE_LIMIT: Final = "drive_torque_limit"
+"""Name of the parameter that limits the torque of the drives."""
+
 DRIVE_GAIN: Final = 0.5
 """Proportional gain of the drives' speed loops before anyone tunes them, motor torque per wheel rate [Nm s/rad]."""
 
@@ -29,21 +32,36 @@ DRIVE_INTEGRAL_GAIN: Final = 2.0
 DRIVE_UNWIND_TIME: Final = 0.05
 """In which the integral of a speed loop follows a torque at its limit [s]."""
 
-_SHARPNESS: Final = 4
-"""Of the limit: at half of it 1.5 % of the torque is missing."""
+_ROUNDING: Final = 1e-4
+"""Of the corner where unwinding begins, over the limit: below it a parked drive keeps its integral."""
 
 
 def _torque_inputs(rates: Expression, x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
-    return u.wheels("torque_{}"), ca.SX.zeros(0)
+    """The torques as they are given, or up to the limit where the drives have one."""
+    given = u.wheels("torque_{}")
+    if DRIVE_TORQUE_LIMIT not in p:
+        return given, ca.SX.zeros(0)
+    limit = p[DRIVE_TORQUE_LIMIT]
+    return ca.fmin(ca.fmax(given, -limit), limit), ca.SX.zeros(0)
 
 
 def _speed_loops(rates: Expression, x: Symbols, u: Symbols, p: Symbols) -> tuple[Expression, Expression]:
-    """Proportional and integral action with a smooth limit; at the limit the integral follows the torque."""
+    """Proportional and integral action with a smooth limit; beyond it the integral follows the torque.
+
+    At half of the limit 1.5 % of the torque is missing.
+    """
     error = u.wheels("speed_{}") - rates
     wanted = p["drive_gain"] * error + x.wheels("integral_{}")
-    limit = p["drive_torque_limit"]
-    torque = wanted / (1 + (wanted / limit) ** _SHARPNESS) ** (1 / _SHARPNESS)
-    return torque, p["drive_integral_gain"] * error - (wanted - torque) / p["drive_unwind_time"]
+    limit = p[DRIVE_TORQUE_LIMIT]
+    torque = wanted / ca.sqrt(ca.sqrt(1 + (wanted / limit) ** 4))
+    beyond = _beyond(wanted, limit) - _beyond(-wanted, limit)
+    return torque, p["drive_integral_gain"] * error - beyond / p["drive_unwind_time"]
+
+
+def _beyond(wanted: Expression, limit: Expression) -> Expression:
+    """By how much a torque is above the limit, its corner rounded."""
+    excess = wanted - limit
+    return (excess + ca.sqrt(excess**2 + (_ROUNDING * limit) ** 2)) / 2
 
 
 _Drive = Callable[[Expression, Symbols, Symbols, Symbols], tuple[Expression, Expression]]

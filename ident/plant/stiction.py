@@ -51,7 +51,7 @@ def memory_rates(x: Symbols, p: Symbols, rates: Expression) -> Expression:
     memory, lagged = _of_joints(x, "stick"), _of_joints(x, "lag")
     relative = rates[3:] / p["epsilon"]
     load = relative + memory
-    bounded = load / (1 + (load / _LARGEST_LOAD) ** 4) ** 0.25
+    bounded = load / ca.sqrt(ca.sqrt(1 + (load / _LARGEST_LOAD) ** 4))
     creeping = 1 / (1 + (relative / _CREEP) ** 4)
     steady = 1 / (1 + ((bounded - lagged) / _STEADY) ** 4)
     growth = creeping * steady * relative - _FADING * (1 - creeping) * memory

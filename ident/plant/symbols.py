@@ -29,6 +29,9 @@ class Symbols:
     def __getitem__(self, name: str) -> Expression:
         return self._parts[name]
 
+    def __contains__(self, name: str) -> bool:
+        return name in self._parts
+
     def stacked(self, *names: str) -> Expression:
         """Several of them, (n,)."""
         return ca.vertcat(*(self._parts[name] for name in names))

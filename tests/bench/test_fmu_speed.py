@@ -32,6 +32,7 @@ DRIVER = Path(__file__).parents[1] / "fmu" / "drivers" / "timing.c"
 STEP = 2e-3
 STEPS = 4000
 PERIOD = 250
+JUMPING_LIMIT = 25.0
 MICROSECONDS_LIMIT = 10.0
 RATIO_LIMIT = 20.0
 
@@ -100,6 +101,7 @@ def seconds(
     start: Mapping[str, float],
     torques: Mapping[str, float],
     steps: int = STEPS,
+    ripple: float = 0.0,
 ) -> list[float]:
     library, guid, references = unpacked
     found = (ctypes.c_double * steps)()
@@ -114,6 +116,7 @@ def seconds(
         (ctypes.c_uint * len(torques))(*(references[name] for name in torques)),
         (ctypes.c_double * len(torques))(*torques.values()),
         len(torques),
+        ctypes.c_double(ripple),
         ctypes.c_double(STEP),
         steps,
         PERIOD,
@@ -157,6 +160,18 @@ def test_a_step_of_two_milliseconds_takes_at_most_ten_microseconds(
     with capsys.disabled():
         print(f"\n2 ms step, {case}: {median:.2f} us (limit {MICROSECONDS_LIMIT:.0f})")
     assert median <= MICROSECONDS_LIMIT
+
+
+@pytest.mark.parametrize("case", ["straight", "alignment", "lateral", "rotation", "held"])
+def test_a_step_with_torques_that_jump_every_step_takes_at_most_twenty_five_microseconds(
+    timing: ctypes.CDLL, ours: tuple[Path, str, dict[str, int]], case: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By up to a tenth of a newton metre each, at random: a controller at work."""
+    start, torques = CASES[case]
+    median = statistics.median(seconds(timing, ours, start, torques, ripple=0.1)) * 1e6
+    with capsys.disabled():
+        print(f"\n2 ms step, {case}, torques that jump every step: {median:.2f} us (limit {JUMPING_LIMIT:.0f})")
+    assert median <= JUMPING_LIMIT
 
 
 def test_it_is_twenty_times_faster_than_the_same_model_by_pythonfmu(

@@ -73,15 +73,6 @@ static void hear3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3St
     snprintf(last_message, sizeof last_message, "%s", message);
 }
 
-static void between3(fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Boolean set_requested,
-                     fmi3Boolean get_allowed, fmi3Boolean finished, fmi3Boolean may_return, fmi3Boolean *requested,
-                     fmi3Float64 *return_time)
-{
-    (void)environment, (void)set_requested, (void)get_allowed, (void)finished;
-    *requested = may_return && below(20) == 0;
-    *return_time = time;
-}
-
 /* Mostly something a user could mean, sometimes anything. */
 static double any_value(double usual)
 {
@@ -199,12 +190,41 @@ static void set_one(void)
     }
 }
 
+/* Between two internal steps: an input, or something that must not be set there. */
+static void between3(fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Boolean set_requested,
+                     fmi3Boolean get_allowed, fmi3Boolean finished, fmi3Boolean may_return, fmi3Boolean *requested,
+                     fmi3Float64 *return_time)
+{
+    (void)environment, (void)get_allowed, (void)finished;
+    if (set_requested && below(4) == 0) {
+        const unsigned reference = any_of_role(below(4) ? QO_INPUT : QO_PARAMETER);
+        const double value = any_value(1.0);
+        last_message[0] = '\0';
+        check(fmi3SetFloat64(now.instance, &reference, 1, &value, 1));
+    }
+    *requested = may_return && below(20) == 0;
+    *return_time = time;
+}
+
+/* Rates of two inputs, or of something that has none. */
+static void ramp(void)
+{
+    const unsigned references[2] = {any_of_role(QO_INPUT), any_of_role(below(10) ? QO_INPUT : QO_PARAMETER)};
+    const double rates[2] = {any_value(10.0), any_value(10.0)};
+    const int orders[2] = {1, below(20) == 0 ? 2 : 1};
+    last_message[0] = '\0';
+    check(fmi2SetRealInputDerivatives(now.instance, references, 2, orders, rates));
+}
+
 static void do_step(void)
 {
     const double size = step_size();
     const double at = below(30) == 0 ? any_value(now.time) : now.time;
     int status;
     double end = at + size;
+    if (!now.is3 && below(3) == 0) {
+        ramp();
+    }
     last_message[0] = '\0';
     if (now.is3) {
         fmi3Boolean event, terminate, early;

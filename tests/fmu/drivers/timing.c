@@ -19,19 +19,30 @@ static double now(void)
     return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
+/* Between -1 and 1, by xorshift. */
+static double noise(unsigned long long *state)
+{
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    return (double)(*state >> 11) / 4503599627370496.0 - 1.0;
+}
+
 #define LOAD(name) name##TYPE *name = (name##TYPE *)dlsym(library, #name);
 
-/* Seconds of each of `steps` steps of `size`; the inputs alternate between `values` and their negatives. The first
+/* Seconds of each of `steps` steps of `size`; the inputs alternate between `values` and their negatives,
+ * every `period` steps, and to each is added up to `ripple`, another number each step. The first
  * `n_start` of `references` get `start`. Gives 0, or the status that stopped it. */
 int measure(const char *path, const char *guid, const char *resources, const unsigned start_references[],
-            const double start[], int n_start, const unsigned references[], const double values[], int n, double size,
-            int steps, int period, double seconds[])
+            const double start[], int n_start, const unsigned references[], const double values[], int n, double ripple,
+            double size, int steps, int period, double seconds[])
 {
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     fmi2CallbackFunctions callbacks = {hear, calloc, free, NULL, NULL};
     fmi2Component instance;
     double inputs[8];
     int step, i, status = 0;
+    unsigned long long state = 88172645463325252ULL;
     if (library == NULL || n > 8) {
         return -1;
     }
@@ -53,7 +64,7 @@ int measure(const char *path, const char *guid, const char *resources, const uns
     for (step = 0; step < steps && status == 0; step++) {
         double begin;
         for (i = 0; i < n; i++) {
-            inputs[i] = step / period % 2 ? -values[i] : values[i];
+            inputs[i] = (step / period % 2 ? -values[i] : values[i]) + ripple * noise(&state);
         }
         begin = now();
         status = fmi2SetReal(instance, references, (size_t)n, inputs);

@@ -66,8 +66,10 @@ class Core:
     def _fields(self) -> list[tuple[str, type]]:
         blocks = (Block.STATE, Block.INPUT, Block.PARAMETER, Block.OUTPUT)
         vectors = [(block.value, ctypes.c_double * self.sizes[block]) for block in blocks]
-        scalars = [("tolerance", ctypes.c_double), ("step_length", ctypes.c_double), ("mode", ctypes.c_int)]
-        return [*vectors, *scalars, ("message", ctypes.c_char * 160)]
+        vectors.append(("ur", ctypes.c_double * self.sizes[Block.INPUT]))
+        scalars = [(name, ctypes.c_double) for name in ("tolerance", "step_length", "after_jump")]
+        memory = [("last_u", ctypes.c_double * self.sizes[Block.INPUT]), ("mode", ctypes.c_int)]
+        return [*vectors, *scalars, *memory, ("message", ctypes.c_char * 160)]
 
     def new(self, **values: float) -> Instance:
         instance = Instance(self)
@@ -89,6 +91,10 @@ class Instance:
     @property
     def x(self) -> Array:
         return self.blocks[Block.STATE]
+
+    @property
+    def input_rates(self) -> Array:
+        return np.frombuffer(self.raw.ur, dtype=float)
 
     @property
     def u(self) -> Array:

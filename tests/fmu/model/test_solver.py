@@ -31,11 +31,12 @@ def speed_controlled(core_of: Callable[..., Any]) -> Any:
 
 
 def reference(instance: Any, duration: float) -> Array:
-    """State after `duration` with the inputs as they are, by SciPy's Radau at a tolerance of 1e-10."""
+    """State after `duration` with the inputs as they go, by SciPy's Radau at a tolerance of 1e-10."""
     probe = instance.copy()
+    u, ramps = instance.u.copy(), instance.input_rates.copy()
 
-    def rates(_: float, x: Array) -> Array:
-        probe.x[:] = x
+    def rates(time: float, x: Array) -> Array:
+        probe.x[:], probe.u[:] = x, u + time * ramps
         return probe.derivatives()
 
     solution = integrate.solve_ivp(rates, (0.0, duration), instance.x.copy(), "Radau", rtol=1e-10, atol=1e-12)
@@ -56,7 +57,8 @@ def test_the_motion_is_that_of_a_tight_reference_in_every_posture(core: Any, pos
     rows = core.table.block(Block.STATE)
     for row, value, expected in zip(rows, instance.x, truth.x, strict=True):
         if row.causality.value == "output":
-            assert value == pytest.approx(expected, abs=1e-3 * max(abs(expected), 0.1 * row.nominal)), row.name
+            least = 1e-2 if row.name.startswith("alpha") else 0.1 * row.nominal
+            assert value == pytest.approx(expected, abs=1e-3 * max(abs(expected), least)), row.name
 
 
 def test_a_tighter_tolerance_gives_a_smaller_error(prototype: Any) -> None:
@@ -189,12 +191,14 @@ def test_whatever_it_is_given_it_answers_with_finite_numbers_or_with_an_error(
         assert any(name in outcome.message for name in [*names, "step"])
 
 
-def test_halving_the_step_divides_the_error_by_eight(prototype: Any) -> None:
-    """Order three, on a vehicle soft enough for it to show; nothing is rejected, every step has one length."""
+@pytest.mark.parametrize("ramp", [0.0, 3.0])
+def test_halving_the_step_divides_the_error_by_eight(prototype: Any, ramp: float) -> None:
+    """Order three, inputs held or ramped, on a vehicle soft enough for it to show; all steps are alike."""
     soft = {"creep_stiffness": 5e2, "epsilon": 50.0, "stick_time": 100.0}
     start = prototype.new(alpha_l=0.3, alpha_r=0.2, torque_fl=1.5, torque_rl=1.2, torque_fr=1.4, torque_rr=1.0, **soft)
+    start.input_rates[:4] = ramp * np.array([1.0, -0.5, 0.7, 1.2])
     expected, errors = reference(start, 0.32), []
-    for length in (0.005, 0.0025, 0.00125):
+    for length in (0.0025, 0.00125, 0.000625):
         instance = start.copy()
         instance.raw.tolerance, instance.raw.step_length = 1e9, 1.0
         for _ in range(round(0.32 / length)):

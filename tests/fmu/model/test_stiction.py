@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fmu.variables import Inputs
+from ident.plant.contact import CREEP_STIFFNESS, Contacts
+
 DRIFT = 2e-3
 
 
@@ -89,14 +92,62 @@ def test_sliding_friction_is_that_of_the_paper_whatever_was_held_before(prototyp
     assert instance["alpha_l_dot"] == pytest.approx(at_axis / viscous, rel=1e-3)
 
 
-def test_a_parked_vehicle_stays_on_a_slope_that_its_wheels_hold(core: Any) -> None:
-    """Nothing but the creep of the wheels and of friction that takes up the load."""
-    grade = 0.5 * 4 * core.vehicle.prior["d_cw"] / core.vehicle.geometry.wheel_radius
-    instance = core.new(slope_x=np.arcsin(grade / (core.vehicle.prior["m_ch"] * 9.80665)))
-    for _ in range(4000):
-        instance.step(0.01)
-    creep = 40.0 * grade / (4 * core.table["creep_stiffness"].start)
-    assert -1e-3 - creep < instance["pose_x"] < 0.0
+def slope_for(core: Any, force: float) -> float:
+    """Angle at which the vehicle's weight pulls it down by a force [N]."""
+    return float(np.arcsin(force / (core.vehicle.prior["m_ch"] * 9.80665)))
+
+
+def wheel_friction(core: Any) -> float:
+    """Force along the floor that the friction of all four wheels holds [N]."""
+    return float(4 * core.vehicle.prior["d_cw"] / core.vehicle.geometry.wheel_radius)
+
+
+def hours_travel(instance: Any) -> float:
+    """How far the chassis gets in an hour [m]."""
+    for _ in range(3600):
+        instance.step(1.0)
+    return float(np.hypot(instance["pose_x"], instance["pose_y"]))
+
+
+@pytest.mark.parametrize("contacts", list(Contacts))
+@pytest.mark.parametrize("downhill", ["slope_x", "slope_y"])
+def test_a_vehicle_parked_at_half_of_its_friction_moves_less_than_a_millimetre_in_an_hour(
+    core: Any, posture: np.ndarray, downhill: str, contacts: Contacts
+) -> None:
+    slope = {downhill: slope_for(core, 0.5 * wheel_friction(core))}
+    stiffness = CREEP_STIFFNESS[contacts]
+    instance = core.new(alpha_l=posture[0], alpha_r=posture[1], creep_stiffness=stiffness, **slope)
+    assert hours_travel(instance) < 1e-3
+    assert abs(instance["gamma"]) < 1e-3
+
+
+@pytest.mark.parametrize("contacts", list(Contacts))
+def test_a_vehicle_parked_by_its_drives_moves_less_than_a_millimetre_in_an_hour(
+    core_of: Callable[..., Any], contacts: Contacts
+) -> None:
+    """On a slope that its friction alone does not hold; the drives are told to stand."""
+    core = core_of("prototype", (), Inputs.SPEED)
+    started = core.new(slope_x=0.05, creep_stiffness=CREEP_STIFFNESS[contacts])
+    assert slope_for(core, wheel_friction(core)) < 0.05
+    started.step(10.0)
+    settled = started["pose_x"]
+    for _ in range(3600):
+        started.step(1.0)
+    assert abs(started["pose_x"] - settled) < 1e-3
+
+
+def test_a_vehicle_that_was_parked_starts_as_one_that_never_stood(core: Any) -> None:
+    """What the contacts hold fades in motion and pushes nothing."""
+    parked, fresh = (core.new(slope_x=slope_for(core, 0.5 * wheel_friction(core))) for _ in range(2))
+    for _ in range(60):
+        parked.step(1.0)
+    origin = parked["pose_x"]
+    for instance in (parked, fresh):
+        instance.set(slope_x=0.0, torque_fl=1.0, torque_rl=1.0, torque_fr=1.0, torque_rr=1.0)
+        for _ in range(1000):
+            instance.step(0.002)
+    assert fresh["pose_x"] > 0.5
+    assert parked["pose_x"] - origin == pytest.approx(fresh["pose_x"], rel=1e-3)
 
 
 def test_a_vehicle_on_a_steep_slope_rolls_down_as_gravity_and_friction_say(core: Any) -> None:
