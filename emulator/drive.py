@@ -109,6 +109,8 @@ class Drive:
 
     def disable(self) -> None:
         """Switch the power stage off: the torque vanishes at once and the set-point is forgotten."""
+        # What made it respond is over with the power: the next thing that it notices is a new one.
+        self._stage.clear()
         self._enabled = False
         self._target = self._setpoint = self.torque = self.wheel_torque = 0.0
         self._steps_left = 0

@@ -16,13 +16,14 @@ from emulator.firmware.pdos import Pdos
 from emulator.firmware.sdo import SdoServer
 from emulator.firmware.storage import Memory, ParameterStorage
 from emulator.firmware.sync import SyncService
+from emulator.firmware.time_of_day import TimeOfDay
 from emulator.firmware.timers import Timers
 
 _ERROR_BEHAVIOUR = {0: NmtState.PRE_OPERATIONAL, 1: None, 2: NmtState.STOPPED}
 """1029h:1 -> the NMT state that a communication error leads to from operational (CiA 301, 7.5.2.32)."""
 
 _TALKING = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
-"""NMT states with SDO, EMCY and SYNC (CiA 301, table 38)."""
+"""NMT states with SDO, EMCY, SYNC and TIME (CiA 301, table 38)."""
 
 
 class Application(Protocol):
@@ -79,6 +80,7 @@ class Node:
         self.nmt = NmtSlave(node_id, self._initialise, self._send_boot_up, self._nmt_changed)
         self.emergency = Emergency(objects, timers, node_id, self._send_emergency)
         self.sync = SyncService(objects, timers, bus.listen_to_sync, bus.produce_sync)
+        self._clock = TimeOfDay(objects, timers, bus)
         self._sdo = SdoServer(objects, timers, self._send_sdo)
         self._storage = ParameterStorage(objects, memory, node_id, lambda: self.nmt.state is not NmtState.OPERATIONAL)
         self._producer = HeartbeatProducer(objects, timers, self._send_heartbeat)
@@ -150,6 +152,9 @@ class Node:
             self.emergency.reset()
         self.pdos.load()
         self.sync.reset()
+        self._clock.reset()
+        if application:
+            self._clock.restart()
         self._producer.reset()
         self._consumer.reset()
         self._guarding.reset()
@@ -161,6 +166,7 @@ class Node:
         self.application.nmt_changed(state)
         self.pdos.wire(state is NmtState.OPERATIONAL)
         self.sync.run(state in _TALKING)
+        self._clock.run(state in _TALKING)
         if state not in _TALKING:
             self._sdo.reset()
 
