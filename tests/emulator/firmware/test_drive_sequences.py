@@ -1,8 +1,8 @@
 """Sequences of controlwords, modes, targets, faults and NMT commands, drawn at random, against a second description.
 
-The description below was written from CiA 402-2 and docs/drives.md, and shares no code with the drive. It is exact to the
-millisecond, because the shaft does not turn by itself and the gains of the drive are zero: a velocity loop then keeps
-the torque that it began with.
+The description below was written from CiA 402-2 and docs/drives.md, and shares no code with the drive. It is exact to
+the millisecond, because the shaft does not turn by itself and the gains of the drive are zero: a velocity loop then
+keeps the torque that it began with.
 """
 
 from __future__ import annotations
@@ -191,25 +191,35 @@ class Model:
 
     def _command(self, command: str) -> None:
         state, options = self.state, self.options
+        resumes = state == QUICK_STOP and options.quick_stop >= 5
         if (state, command) in EDGES:
             self.state = EDGES[state, command]
-        elif command == "enable operation" and state in (READY, SWITCHED_ON):
+        elif command == "enable operation" and (state in (READY, SWITCHED_ON) or resumes):
             self._enable()
-        elif command == "enable operation" and state == QUICK_STOP and options.quick_stop >= 5:
-            self._enable()
-        elif command == "disable voltage" and state in (ENABLED, QUICK_STOP):
+        elif command == "disable voltage" and state == QUICK_STOP:
             self._off(DISABLED)
-        elif state == ENABLED and command == "switch on":
+        elif state == ENABLED:
+            self._leave_operation(command)
+
+    def _leave_operation(self, command: str) -> None:
+        """Transitions 5, 8, 9 and 11."""
+        options = self.options
+        if command == "disable voltage":
+            self._off(DISABLED)
+        elif command == "switch on":
             self._leave(options.disable == 1, SWITCHED_ON)
-        elif state == ENABLED and command == "shutdown":
+        elif command == "shutdown":
             self._leave(options.shutdown == 1, READY)
-        elif state == ENABLED and command == "quick stop":
-            self.state = QUICK_STOP
-            self.targets = Targets()
-            if options.quick_stop == 0:
-                self._off(DISABLED)
-            else:
-                self._stop(options.quick_stop in (1, 5), DISABLED if options.quick_stop < 5 else None)
+        elif command == "quick stop":
+            self._stop_quickly(options.quick_stop)
+
+    def _stop_quickly(self, option: int) -> None:
+        self.state = QUICK_STOP
+        self.targets = Targets()
+        if option == 0:
+            self._off(DISABLED)
+        else:
+            self._stop(option in (1, 5), DISABLED if option < 5 else None)
 
     def _enable(self) -> None:
         self.state = ENABLED
