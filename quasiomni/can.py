@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hil.bench import control
+from hil.bus.listener import ListenerReport
 from hil.bus.socketcan import build_library, environment, is_served
 from ident.errors import BusError
 from quasiomni.application import app, console, tell
@@ -96,8 +98,15 @@ def load(
     network: NetworkOption = None,
     bit_rate: Annotated[float | None, typer.Option(min=1.0, help="Another bit rate [bit/s].")] = None,
     cycle: Annotated[float | None, typer.Option(min=1e-5, help="Another cycle period [s].")] = None,
+    bus: Annotated[
+        str | None, typer.Option(help="Show who listens on the bus of a running emulator, and who has lost frames.")
+    ] = None,
+    at: ControlOption = None,
 ) -> None:
-    """Whether a network file's frames fit on a real bus; exit code 1 where they do not."""
+    """Whether a network file's frames fit on a real bus: exit code 1 where they do not. With --bus, who loses some."""
+    if bus is not None or at is not None:
+        _show_clients(control.clients(at or control.control_path(bus or DEFAULT_BUS)))
+        return
     from hil.bus.schedule import schedule
     from hil.campaign.folder import network_file_of
     from hil.network import load_network
@@ -125,6 +134,18 @@ def load(
         console.print(late, highlight=False, style="red")
         raise typer.Exit(code=1)
     console.print("Every frame is through before the next one of its kind.", highlight=False)
+
+
+def _show_clients(clients: Sequence[ListenerReport]) -> None:
+    table = Table("process", "program", "waiting", "lost", "", box=box.SIMPLE_HEAD)
+    for one in clients:
+        lost = Text(str(one.dropped), style="red" if one.dropped else "")
+        table.add_row(str(one.pid), one.program, str(one.waiting), lost, "has left" if one.gone else "")
+    console.print(table if clients else "Nobody listens.")
+    lost_in_all = sum(one.dropped for one in clients)
+    if lost_in_all:
+        remedy = "Who reads too slowly has to read faster, or to filter: candump can0,181:7FF."
+        console.print(f"{lost_in_all} frames are lost. {remedy}", highlight=False, style="red")
 
 
 def hub_path(bus: str) -> Path:

@@ -137,6 +137,7 @@ class DriveApplication:
         if self._after_stop in _DEFERRED and controlword & _COMMAND_BITS == _ENABLE_OPERATION:
             self._after_stop = None
             self._operate()
+            self._update_status()
         self.follow()
 
     def follow(self) -> None:

@@ -447,3 +447,17 @@ class TestTrips:
         drive.enable(Mode.PROFILE_VELOCITY)
         drive.wire.nmt(0x81, 1)
         assert drive.status & 0x4F == 0x40
+
+
+def test_operation_that_goes_on_before_its_ramp_is_over_shows_that_it_follows(drive: Drive) -> None:
+    """6041h, bit 12 in cyclic synchronous modes: the controller follows the target (Nanotec, N5 manual). 605Ch = 1 puts
+    off transition 5; enable operation before its end takes it back."""
+    drive.enable(Mode.CYCLIC_TORQUE)
+    drive.put(0x6071, "<h", 500)
+    drive.wait(0.01)
+    drive.control(0x07)
+    drive.wait(0.01)
+    assert not drive.status & BIT_12
+    drive.control(ENABLE)
+    assert drive.status & (BIT_12 | 0x6F) == BIT_12 | 0x27
+    assert drive.get(0x6074) == 500
