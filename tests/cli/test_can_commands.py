@@ -101,6 +101,10 @@ MISTAKES = {
     "nobody to list": (("can", "load", "--bus", "unix:/nowhere/bus"), "No emulator takes commands"),
     "no place for commands": (("can", "fault", "death", "--bus", "socketcan:can0"), "--control"),
     "another bus": (("can", "exec", "--bus", "socketcan:can0", "--", "true"), "not on this machine"),
+    "two buses of one name": (
+        ("can", "exec", "--bus", "unix:/a", "--bus", "can0=unix:/b", "--", "true"),
+        "called can0",
+    ),
     "no such program": (("can", "exec", "--", "no-such-program"), "no-such-program cannot be run"),
     "a vehicle that is none": (("can", "load", "--vehicle", "nix"), "There is no 'nix'"),
     "a file that is none": (("emulate", "--bus", "unix:/tmp/never", "--fault", "bad_day.txt"), "bad_day.txt does not"),
@@ -128,6 +132,16 @@ def test_a_program_on_a_bus_that_nobody_serves_is_told_so(tmp_path: Path) -> Non
     assert done.returncode == 0
     assert "Nobody serves" in done.stderr
     assert "quasiomni emulate" in " ".join(done.stderr.split())
+
+
+NAMES = "import socket; print([name for _, name in socket.if_nameindex() if 'can' in name])"
+
+
+def test_a_program_finds_as_many_buses_as_it_was_given(tmp_path: Path) -> None:
+    buses = [word for name in ("can0", "can7") for word in ("--bus", f"{name}=unix:{tmp_path / name}")]
+    command = quasiomni("can", "exec", *buses, "--", sys.executable, "-c", NAMES)
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.stdout == "['can0', 'can7']\n"
 
 
 def test_an_emulator_takes_faults_from_a_script_and_live_and_candump_sees_them(
