@@ -15,6 +15,7 @@
 #include <linux/sockios.h>
 #include <net/if.h>
 #include <net/if_arp.h>
+#include <pthread.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -136,10 +137,12 @@ struct own_addresses {
 };
 
 static struct own_addresses *given;
+static pthread_mutex_t given_lock = PTHREAD_MUTEX_INITIALIZER;
 
 int getifaddrs(struct ifaddrs **list) {
     typedef int (*getifaddrs_t)(struct ifaddrs **);
-    if (REAL(getifaddrs_t, "getifaddrs")(list) < 0 || interface_count == 0) return *list ? 0 : -1;
+    int answer = REAL(getifaddrs_t, "getifaddrs")(list);
+    if (answer < 0 || interface_count == 0) return answer;
     struct own_addresses *own = calloc(1, sizeof *own);
     if (!own) return 0;
     for (int k = 0; k < interface_count; k++) {
@@ -153,13 +156,16 @@ int getifaddrs(struct ifaddrs **list) {
         own->entries[k].ifa_next = k + 1 < interface_count ? &own->entries[k + 1] : *list;
     }
     *list = own->entries;
-    do own->next = __atomic_load_n(&given, __ATOMIC_RELAXED);
-    while (!__atomic_compare_exchange_n(&given, &own->next, own, 0, __ATOMIC_RELEASE, __ATOMIC_RELAXED));
+    pthread_mutex_lock(&given_lock);
+    own->next = given;
+    given = own;
+    pthread_mutex_unlock(&given_lock);
     return 0;
 }
 
 void freeifaddrs(struct ifaddrs *list) {
     typedef void (*freeifaddrs_t)(struct ifaddrs *);
+    pthread_mutex_lock(&given_lock);
     for (struct own_addresses **place = &given; *place; place = &(*place)->next) {
         struct own_addresses *own = *place;
         if (list != own->entries) continue;
@@ -168,6 +174,7 @@ void freeifaddrs(struct ifaddrs *list) {
         free(own);
         break;
     }
+    pthread_mutex_unlock(&given_lock);
     if (list) REAL(freeifaddrs_t, "freeifaddrs")(list);
 }
 
@@ -176,7 +183,10 @@ static int open_counters(int source) {
     char line[512];
     int copy = memfd_create("net_dev", MFD_CLOEXEC);
     FILE *in = copy < 0 ? NULL : fdopen(dup(source), "r");
-    if (!in) return source;
+    if (!in) {
+        if (copy >= 0) close(copy);
+        return source;
+    }
     while (fgets(line, sizeof line, in)) dprintf(copy, "%s", line);
     fclose(in);
     for (int k = 0; k < interface_count; k++)

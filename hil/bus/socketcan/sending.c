@@ -41,12 +41,23 @@ static int takes_commands(int fd) {
     return entry && entry->broadcast && socket_of(fd);
 }
 
+/* A packet to the hub. One that is gone is an interface that is down, and no reason to end the program by a signal. */
+static ssize_t hand_over(int fd, const void *data, size_t size, int flags) {
+    typedef ssize_t (*send_t)(int, const void *, size_t, int);
+    ssize_t sent = REAL(send_t, "send")(fd, data, size, flags | MSG_NOSIGNAL);
+    if (sent < 0 && errno == EPIPE) errno = ENETDOWN;
+    return sent;
+}
+
 ssize_t write(int fd, const void *data, size_t size) {
     typedef ssize_t (*write_t)(int, const void *, size_t);
     struct can_socket *entry = socket_remembered(fd);
     if (entry && takes_commands(fd)) return broadcast_command(fd, data, size);
     int error = entry ? check(fd, entry, data, size) : PASSES;
-    return error ? refuse(error) : REAL(write_t, "write")(fd, data, size);
+    if (error) return refuse(error);
+    ssize_t sent = entry ? hand_over(fd, data, size, 0) : -1;
+    /* What is no socket any more was closed past us. */
+    return entry && (sent >= 0 || errno != ENOTSOCK) ? sent : REAL(write_t, "write")(fd, data, size);
 }
 
 ssize_t send(int fd, const void *data, size_t size, int flags) {
@@ -54,7 +65,8 @@ ssize_t send(int fd, const void *data, size_t size, int flags) {
     struct can_socket *entry = socket_remembered(fd);
     if (entry && takes_commands(fd)) return broadcast_command(fd, data, size);
     int error = entry ? check(fd, entry, data, size) : PASSES;
-    return error ? refuse(error) : REAL(send_t, "send")(fd, data, size, flags);
+    if (error) return refuse(error);
+    return entry ? hand_over(fd, data, size, flags) : REAL(send_t, "send")(fd, data, size, flags);
 }
 
 /* A frame to an interface that the socket is not bound to: by a connection of its own. */

@@ -378,6 +378,7 @@ EVERY_CALL = """
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <sys/uio.h>
 #include <unistd.h>
 static struct can_frame frame = {.can_id = 0x555, .can_dlc = 1};
@@ -449,8 +450,21 @@ static void interfaces(void) {
     struct ifreq asked = {.ifr_name = "can1"};
     said("ethtool", ioctl(socket(AF_INET, SOCK_DGRAM, 0), SIOCETHTOOL, &asked));
 }
+static void until_down(void) {
+    int s = bound("can1"), pipes[2];
+    frame.can_id = 0x557;
+    while (write(s, &frame, sizeof frame) > 0) usleep(10000);
+    said("down", -1);
+    said("send", send(s, &frame, sizeof frame, 0));
+    syscall(SYS_close, s);
+    /* The number is given out again behind the library's back. */
+    said("again", pipe(pipes) == 0 && pipes[0] == s ? 1 : 0);
+    dup2(pipes[1], 50);
+    said("frame in a pipe", write(pipes[1], &frame, sizeof frame));
+    said("text in a pipe", write(pipes[1], "abc", 3));
+}
 int main(int count, char **words) {
-    void (*parts[])(void) = {sizes, addresses, duplicates, interfaces};
+    void (*parts[])(void) = {sizes, addresses, duplicates, interfaces, until_down};
     parts[count > 1 ? words[1][0] - '0' : 0]();
     return 0;
 }
@@ -516,6 +530,24 @@ def test_a_duplicate_is_the_same_socket_and_a_number_given_out_again_is_not(serv
 def test_interfaces_are_in_every_list(served: Served, every_call: Path, tmp_path: Path) -> None:
     served.add("can1", tmp_path / "can1")
     assert said(served, every_call, 3) == ["can0 1 1", "can1 1 1", "lo", "can0", "can1", "ethtool -1 EOPNOTSUPP"]
+
+
+def test_a_hub_that_goes_is_a_network_that_is_down_and_no_signal(
+    served: Served, every_call: Path, tmp_path: Path
+) -> None:
+    served.add("can1", tmp_path / "can1")
+    with UnixHub(tmp_path / "can1") as other:
+        running = served.start(str(every_call), "4")
+        while (message := other.recv(0.1)) is None or message.arbitration_id != 0x557:
+            assert running.poll() is None
+    written = running.communicate(timeout=PATIENCE)[0].splitlines()
+    assert [line.strip() for line in written] == [
+        "down -1 ENETDOWN",
+        "send -1 ENETDOWN",
+        "again 1",
+        f"frame in a pipe {FRAME_SIZE}",
+        "text in a pipe 3",
+    ]
 
 
 INTERFACES = """
