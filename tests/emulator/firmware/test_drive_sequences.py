@@ -119,6 +119,7 @@ class Model:
     followed: bool = False
     count: int = 0
     home: int = 0
+    error: int = 0
 
     # What the master does.
 
@@ -130,6 +131,7 @@ class Model:
         if rising:
             if self.state == FAULT:
                 self.state = DISABLED
+                self.error = 0
         else:
             self._command(command_of(controlword))
         self._take_halt(bool(controlword & 0x100))
@@ -162,7 +164,7 @@ class Model:
         self.operational = operational
         if leaves and self.state in MOVING:
             if self.options.abort == 1 and self.state != REACTION:
-                self.fail(fatal=False)
+                self.fail(0x8100, fatal=False)
             elif self.options.abort == 2:
                 self.targets = Targets()
                 self._command("disable voltage")
@@ -172,7 +174,8 @@ class Model:
     def turn(self, counts: int) -> None:
         self.count += counts
 
-    def fail(self, fatal: bool) -> None:
+    def fail(self, error: int, *, fatal: bool) -> None:
+        self.error = error
         if self.state == FAULT:
             return
         if self.state == REACTION:
@@ -427,6 +430,7 @@ class Bench:
         word, known = model.statusword()
         assert read(0x6041, 0) & known & mask == word & known & mask, (hex(read(0x6041, 0)), hex(word), model)
         assert read(0x6061, 0) == model.mode
+        assert read(0x603F, 0) == model.error, model
         assert self.shaft.enabled is (model.state in MOVING)
         if mask == 0xFFFF:
             assert read(0x6074, 0) == model.torque, model
@@ -465,9 +469,9 @@ class Bench:
         self.model.nmt(value == 0x01)
 
     def _trip(self, value: int) -> None:
-        trip = (Trip.OVER_CURRENT, Trip.OVER_TEMPERATURE)[value]
+        trip, error = ((Trip.OVER_CURRENT, 0x2310), (Trip.OVER_TEMPERATURE, 0x4310))[value]
         self.shaft.trip(trip)
-        self.model.fail(fatal=trip is Trip.OVER_CURRENT)
+        self.model.fail(error, fatal=trip is Trip.OVER_CURRENT)
 
     def _turn(self, value: int) -> None:
         self.shaft.counts += value
