@@ -444,6 +444,11 @@ class Bench:
         self.wire.send(0x201, struct.pack("<H", value))
         self.model.control(value)
 
+    def _pulse(self, value: int) -> None:
+        """Bit 4 up and down again, as a master gives set-points and starts homing."""
+        for controlword in (value | 0x10, value & ~0x10):
+            self._rpdo(controlword)
+
     def _mode(self, value: int) -> None:
         self.put(0x6060, "<b", value)
         self.model.select(value)
@@ -497,6 +502,7 @@ ACTIONS = st.one_of(
     st.tuples(st.just("rpdo"), CONTROLWORDS),
     st.tuples(st.just("rpdo"), CONTROLWORDS),
     st.tuples(st.just("rpdo"), RUNNING),
+    st.tuples(st.just("pulse"), st.sampled_from((0x0F, 0x0F, 0x2F, 0x10F))),
     st.tuples(st.just("sdo"), CONTROLWORDS),
     st.tuples(st.just("sdo"), CONTROLWORDS),
     st.tuples(st.just("mode"), MODES),
