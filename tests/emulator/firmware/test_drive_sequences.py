@@ -524,10 +524,12 @@ def bench(wire_type) -> Bench:
     return Bench(wire_type)
 
 
-def run(bench: Bench, options: Options, mode: int, start: tuple[int, ...], steps) -> None:
+def run(bench: Bench, options: Options, mode: int, aimed: bool, start: tuple[int, ...], steps) -> None:
     bench.begin(options)
     bench.act("nmt", 0x01)
     bench.act("mode", mode)
+    if aimed:
+        bench.act("position", FAR)
     for controlword in start:
         bench.act("rpdo", controlword)
     for (kind, value), milliseconds in steps:
@@ -538,17 +540,19 @@ def run(bench: Bench, options: Options, mode: int, start: tuple[int, ...], steps
         bench.wait(milliseconds)
 
 
-DRAWN = given(OPTIONS, MODES, STARTS, STEPS)
+DRAWN = given(OPTIONS, MODES, st.booleans(), STARTS, STEPS)
 
 
 @settings(max_examples=500, deadline=None, suppress_health_check=QUIET)
 @DRAWN
-def test_no_sequence_leads_anywhere_but_where_the_documents_say(bench: Bench, options, mode, start, steps) -> None:
-    run(bench, options, mode, start, steps)
+def test_no_sequence_leads_anywhere_but_where_the_documents_say(
+    bench: Bench, options, mode, aimed, start, steps
+) -> None:
+    run(bench, options, mode, aimed, start, steps)
 
 
 @pytest.mark.slow
 @settings(max_examples=100_000, deadline=None, suppress_health_check=QUIET, database=None)
 @DRAWN
-def test_of_a_hundred_thousand_sequences_none_does(bench: Bench, options, mode, start, steps) -> None:
-    run(bench, options, mode, start, steps)
+def test_of_a_hundred_thousand_sequences_none_does(bench: Bench, options, mode, aimed, start, steps) -> None:
+    run(bench, options, mode, aimed, start, steps)
