@@ -99,7 +99,9 @@ class Drive:
         self._stage.watch(tripped)
 
     def trip(self, cause: Trip) -> None:
-        """Let the protection respond to something that it has noticed."""
+        """Let the protection respond to something that it has noticed; without power it may do so again and again."""
+        if not self._enabled:
+            self._stage.clear()
         self._stage.report(cause)
 
     def enable(self) -> None:
@@ -109,8 +111,6 @@ class Drive:
 
     def disable(self) -> None:
         """Switch the power stage off: the torque vanishes at once and the set-point is forgotten."""
-        # What made it respond is over with the power: the next thing that it notices is a new one.
-        self._stage.clear()
         self._enabled = False
         self._target = self._setpoint = self.torque = self.wheel_torque = 0.0
         self._steps_left = 0
