@@ -99,7 +99,9 @@ class Drive:
         self._stage.watch(tripped)
 
     def trip(self, cause: Trip) -> None:
-        """Let the protection respond to something that it has noticed."""
+        """Let the protection respond to something that it has noticed; without power it may do so again and again."""
+        if not self._enabled:
+            self._stage.clear()
         self._stage.report(cause)
 
     def enable(self) -> None:

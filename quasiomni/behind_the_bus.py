@@ -14,6 +14,7 @@ from rich.text import Text
 
 from hil.bus.clock import Clock, FreeRunningClock, WallClock
 from hil.bus.opening import open_bus
+from hil.bus.unix import UnixBus
 from hil.campaign.driving import drive_run, keep_unusable_aside
 from hil.campaign.folder import Run
 from hil.campaign.lock import driving
@@ -94,6 +95,9 @@ def drive_on_bus(run: Run, order: Order, name: str, *, ask: bool, lockstep: bool
     clock = FreeRunningClock() if lockstep else WallClock()
     with _opened(name, run.network.bit_rate) as bus, _stop_is_no_error(order.out):
         _drive(run, order, bus, clock, HumanOperator(), may_move, lockstep=lockstep)
+        lost = bus.dropped if isinstance(bus, UnixBus) else 0
+        if lost:
+            console.print(f"{lost} frames of the bus were lost: this program did not read in time.", style="yellow")
 
 
 def _drive(

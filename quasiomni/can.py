@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hil.bench import control
+from hil.bus.listener import ListenerReport
 from hil.bus.socketcan import build_library, environment, is_served
 from ident.errors import BusError
 from quasiomni.application import app, console, tell
@@ -29,15 +31,22 @@ BusOption = Annotated[str, typer.Option(help="The emulator's bus, as `quasiomni 
 @can_app.command("exec", context_settings={"ignore_unknown_options": True})
 def execute(
     command: Annotated[list[str], typer.Argument(help="Program and arguments, e.g. `candump can0`; after `--`.")],
-    bus: BusOption = DEFAULT_BUS,
-    interface: Annotated[str, typer.Option(help="Name under which the program finds the bus.")] = "can0",
+    bus: Annotated[
+        list[str] | None,
+        typer.Option(help="The emulator's bus. Several: `--bus can0=unix:/tmp/can0 --bus can1=unix:/tmp/can1`."),
+    ] = None,
+    interface: Annotated[
+        str, typer.Option(help="Name under which the program finds a bus that was given without one.")
+    ] = "can0",
 ) -> None:
-    """Run an unmodified SocketCAN program on a `unix:` bus: `quasiomni can exec -- candump can0`."""
-    library, path = build_library(), hub_path(bus)
-    found = environment(os.environ, library, {interface: path})
-    if not is_served(path):
-        # No refusal: the program may start the emulator itself, or wait for it.
-        tell(BusError(f"Nobody serves {bus} yet.", f"Start the emulator first: quasiomni emulate --bus {bus}."))
+    """Run an unmodified SocketCAN program on a `unix:` bus, or several: `quasiomni can exec -- candump can0`."""
+    interfaces = parse_interfaces(bus or [DEFAULT_BUS], interface)
+    found = environment(os.environ, build_library(), interfaces)
+    for path in interfaces.values():
+        if not is_served(path):
+            # No refusal: the program may start the emulator itself, or wait for it.
+            remedy = f"Start the emulator first: quasiomni emulate --bus unix:{path}."
+            tell(BusError(f"Nobody serves unix:{path} yet.", remedy))
     try:
         os.execvpe(command[0], command, found)
     except OSError as error:
@@ -96,8 +105,15 @@ def load(
     network: NetworkOption = None,
     bit_rate: Annotated[float | None, typer.Option(min=1.0, help="Another bit rate [bit/s].")] = None,
     cycle: Annotated[float | None, typer.Option(min=1e-5, help="Another cycle period [s].")] = None,
+    bus: Annotated[
+        str | None, typer.Option(help="Show who listens on the bus of a running emulator, and who has lost frames.")
+    ] = None,
+    at: ControlOption = None,
 ) -> None:
-    """Whether a network file's frames fit on a real bus; exit code 1 where they do not."""
+    """Whether a network file's frames fit on a real bus: exit code 1 where they do not. With --bus, who loses some."""
+    if bus is not None or at is not None:
+        _show_clients(control.clients(at or control.control_path(bus or DEFAULT_BUS)))
+        return
     from hil.bus.schedule import schedule
     from hil.campaign.folder import network_file_of
     from hil.network import load_network
@@ -125,6 +141,39 @@ def load(
         console.print(late, highlight=False, style="red")
         raise typer.Exit(code=1)
     console.print("Every frame is through before the next one of its kind.", highlight=False)
+
+
+def parse_interfaces(buses: Sequence[str], unnamed: str) -> dict[str, Path]:
+    """Names of CAN interfaces and paths of their hubs.
+
+    Args:
+        buses: `unix:PATH` or `NAME=unix:PATH`.
+        unnamed: name of the one that has none.
+
+    Raises:
+        BusError: one is no `unix:` bus, or two have one name.
+    """
+    found: dict[str, Path] = {}
+    for text in buses:
+        name, equals, bus = text.partition("=")
+        if not equals or ":" in name:
+            name, bus = unnamed, text
+        if name in found:
+            raise BusError(f"Two buses are called {name}.", "Name them: --bus can0=unix:PATH --bus can1=unix:PATH.")
+        found[name] = hub_path(bus)
+    return found
+
+
+def _show_clients(clients: Sequence[ListenerReport]) -> None:
+    table = Table("process", "program", "waiting", "lost", "", box=box.SIMPLE_HEAD)
+    for one in clients:
+        lost = Text(str(one.dropped), style="red" if one.dropped else "")
+        table.add_row(str(one.pid), one.program, str(one.waiting), lost, "has left" if one.gone else "")
+    console.print(table if clients else "Nobody listens.")
+    lost_in_all = sum(one.dropped for one in clients)
+    if lost_in_all:
+        remedy = "Who reads too slowly has to read faster, or to filter: candump can0,181:7FF."
+        console.print(f"{lost_in_all} frames are lost. {remedy}", highlight=False, style="red")
 
 
 def hub_path(bus: str) -> Path:

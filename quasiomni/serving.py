@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,7 @@ from rich.text import Text
 
 from hil.bench.control import ControlServer, Injection, control_path
 from hil.bus.clock import WallClock
+from hil.bus.listener import ListenerReport
 from hil.bus.unix import UnixHub
 from hil.campaign.folder import network_file_of
 from hil.network import load_network
@@ -112,7 +114,10 @@ def emulate(
         )
         for one in faults:
             server.faults.add(one)
-        with _commands(control, bus, server.faults) as poll, contextlib.suppress(KeyboardInterrupt):
+        with (
+            _commands(control, bus, server.faults, partial(_clients, opened)) as poll,
+            contextlib.suppress(KeyboardInterrupt),
+        ):
             server.serve(lambda: poll() or (end is not None and time.monotonic() > end))
         served = server.report
         _say_who_has_lost_frames(opened)
@@ -120,19 +125,26 @@ def emulate(
 
 
 def _say_who_has_lost_frames(bus: can.BusABC) -> None:
-    """Clients that did not read fast enough, of those that are still there."""
-    for listener in bus.listeners if isinstance(bus, UnixHub) else ():
-        if listener.dropped:
-            console.print(f"Process {listener.pid} has lost {listener.dropped} frames that it did not read.")
+    """Clients that did not read fast enough, those that have left included."""
+    for client in _clients(bus):
+        if client.dropped:
+            name = f"{client.program} ({client.pid})"
+            console.print(f"{name} has lost {client.dropped} frames that it did not read.", highlight=False)
+
+
+def _clients(bus: can.BusABC) -> tuple[ListenerReport, ...]:
+    return (*bus.listeners, *bus.departed) if isinstance(bus, UnixHub) else ()
 
 
 @contextlib.contextmanager
-def _commands(path: Path | None, bus: str, faults: Injection) -> Iterator[Callable[[], None]]:
+def _commands(
+    path: Path | None, bus: str, faults: Injection, clients: Callable[[], Sequence[ListenerReport]]
+) -> Iterator[Callable[[], None]]:
     """Where commands are taken while the emulator serves; gives what has to be called now and then."""
     if path is None and not bus.startswith("unix:"):
         yield lambda: None
         return
-    server = ControlServer(path or control_path(bus), faults)
+    server = ControlServer(path or control_path(bus), faults, clients)
     try:
         yield server.poll
     finally:

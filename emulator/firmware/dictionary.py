@@ -77,6 +77,12 @@ STORE_EDS = 0x1021
 _ACCESS = {"rww": "rw", "rwr": "rw"}
 """CiA 306 access types with a PDO direction in them -> what SDO may do."""
 
+_RECEIVABLE = ("wo", "rww", "rw")
+"""Access types of what an RPDO may carry where PDOMapping is 1: process outputs (CiA 306)."""
+
+_TRANSMITTABLE = ("ro", "const", "rwr", "rw")
+"""Access types of what a TPDO may carry where PDOMapping is 1: process inputs (CiA 306)."""
+
 
 @lru_cache(maxsize=64)
 def _parse(content: str, node_id: int) -> canopen.ObjectDictionary:
@@ -108,6 +114,9 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
         eds: EDS file (CiA 306).
         node_id: replaces $NODEID in it.
 
+    Attributes:
+        receivable, transmittable: what an RPDO, a TPDO may carry, as (index, sub-index).
+
     Raises:
         DataFileError: the file cannot be read, or an object has a data type, access type or limits that cannot be
             emulated.
@@ -116,7 +125,8 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
     def __init__(self, eds: Path, node_id: int) -> None:
         super().__init__()
         self._source = eds
-        self.mappable: set[tuple[int, int]] = set()
+        self.receivable: set[tuple[int, int]] = set()
+        self.transmittable: set[tuple[int, int]] = set()
         self._pdo_writers: dict[tuple[int, int], Callable[[int], None]] = {}
         content = read_text(eds)
         for item in _parse(content, node_id).values():
@@ -136,7 +146,9 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
 
     def _variable(self, item: ODVariable) -> Any:
         if item.pdo_mappable:
-            self.mappable.add((item.index, item.subindex))
+            for access_types, mappable in ((_RECEIVABLE, self.receivable), (_TRANSMITTABLE, self.transmittable)):
+                if item.access_type in access_types:
+                    mappable.add((item.index, item.subindex))
         default = item.default
         try:
             return Variable(
@@ -181,6 +193,10 @@ class Dictionary(ObjectDictionary):  # type: ignore[misc]  # durand carries no t
     def on_write(self, index: int, subindex: int, write: Callable[[int], None]) -> None:
         """Call `write` with a value before it is stored; it may refuse by raising `AbortError`."""
         self.validate_callbacks[index, subindex].add(write)
+
+    def on_change(self, index: int, subindex: int, take: Callable[[int], None]) -> None:
+        """Call `take` with a value that nobody has refused and that is stored."""
+        self.update_callbacks[index, subindex].add(take)
 
     def on_pdo_write(self, index: int, subindex: int, write: Callable[[int], None]) -> None:
         """Let an RPDO write this object through `write` instead of the way an SDO goes."""

@@ -13,6 +13,7 @@ from emulator.firmware.description import (
     NetworkDescription,
     NodeDescription,
 )
+from emulator.firmware.device import Device
 from emulator.firmware.drive import DriveApplication
 from emulator.firmware.encoder import EncoderApplication
 from emulator.firmware.hardware import VehicleHardware
@@ -46,6 +47,9 @@ class DeviceNetwork:
         description: which node is where.
         send: transmits a frame (CAN identifier, data).
         memory: where stored parameters outlive the nodes; without one, they outlive resets only.
+
+    Attributes:
+        nodes: the nodes by their node-IDs in the description, whatever LSS has made of them.
     """
 
     def __init__(
@@ -61,14 +65,16 @@ class DeviceNetwork:
         self._timers = Timers(vehicle.time)
         self._moved = vehicle.time
         self.nodes: dict[int, Node] = {}
+        self._devices: dict[int, Device] = {}
         self._groups: dict[int, _SyncGroup] = {}
         self._in_flight: deque[tuple[NodeBus, int, bytes]] = deque()
         self._free = 0.0
         self._routes = Routes(self._transmit, self._produce_sync, self._find_listeners)
         for node in description.nodes:
-            self.nodes[node.node_id] = self._make_node(node)
-        for made in self.nodes.values():
-            made.power_on()
+            device = self._devices[node.node_id] = self._make_device(node)
+            self.nodes[node.node_id] = device.node
+        for device in self._devices.values():
+            device.power_on()
 
     @property
     def time(self) -> float:
@@ -99,22 +105,22 @@ class DeviceNetwork:
 
     def power_off(self, node_id: int) -> None:
         """The supply of a node fails: its power stage is off, it neither hears nor sends."""
-        self.nodes[node_id].power_off()
+        self._devices[node_id].power_off()
         self._find_listeners()
 
     def power_on(self, node_id: int) -> None:
         """The supply of a node is back: it boots."""
-        self.nodes[node_id].power_on()
+        self._devices[node_id].power_on()
         self._find_listeners()
 
     def bus_off(self, node_id: int) -> None:
         """The CAN controller of a node goes bus-off: it neither hears nor sends, its application goes on."""
-        self.nodes[node_id].bus_off()
+        self._devices[node_id].bus_off()
         self._find_listeners()
 
     def bus_on(self, node_id: int) -> None:
         """The CAN controller of a node has recovered from bus-off."""
-        self.nodes[node_id].bus_on()
+        self._devices[node_id].bus_on()
         self._find_listeners()
 
     def _find_listeners(self) -> None:
@@ -169,11 +175,20 @@ class DeviceNetwork:
             self._moved = instant
             self._vehicle.advance(duration)
 
-    def _make_node(self, description: NodeDescription) -> Node:
+    def _make_device(self, description: NodeDescription) -> Device:
+        place = description.node_id
+
         def application(node: Node) -> Application:
             if description.role in DRIVE_ROLES:
                 return DriveApplication(node, self._vehicle.drives[DRIVE_ROLES.index(description.role)])
             return EncoderApplication(node, self._vehicle.encoders[ENCODER_ROLES.index(description.role)])
 
-        bus = NodeBus(self._routes)
-        return Node(description.node_id, description.eds, bus, self._timers, self._memory, application)
+        def make_node(node_id: int, renumbered: Callable[[], bool]) -> Node:
+            bus, name = NodeBus(self._routes), f"node_{place}"
+            return Node(node_id, description.eds, bus, self._timers, self._memory, name, application, renumbered)
+
+        def replaced(node: Node) -> None:
+            self.nodes[place] = node
+            self._find_listeners()
+
+        return Device(place, description.eds, NodeBus(self._routes), self._memory, make_node, replaced)

@@ -40,6 +40,7 @@ class NmtSlave:
         initialise: called in a reset, with True when the application is reset too; sends nothing.
         boot_up: sends the boot-up message.
         changed: called with every new state.
+        renumbered: asked with every reset command; True where the node is another one now, and this one is off.
     """
 
     def __init__(
@@ -48,11 +49,13 @@ class NmtSlave:
         initialise: Callable[[bool], None],
         boot_up: Callable[[], None],
         changed: Callable[[NmtState], None],
+        renumbered: Callable[[], bool],
     ) -> None:
         self._node_id = node_id
         self._initialise = initialise
         self._boot_up = boot_up
         self._changed = changed
+        self._renumbered = renumbered
         self.state = NmtState.INITIALISATION
 
     def receive(self, _can_id: int, data: bytes) -> None:
@@ -60,7 +63,8 @@ class NmtSlave:
         if len(data) != 2 or data[1] not in (0, self._node_id):
             return
         if data[0] in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
-            self.reset(application=data[0] == NmtCommand.RESET_NODE)
+            if not self._renumbered():
+                self.reset(application=data[0] == NmtCommand.RESET_NODE)
         elif data[0] in _TARGETS:
             self.enter(_TARGETS[NmtCommand(data[0])])
 

@@ -16,13 +16,14 @@ from emulator.firmware.pdos import Pdos
 from emulator.firmware.sdo import SdoServer
 from emulator.firmware.storage import Memory, ParameterStorage
 from emulator.firmware.sync import SyncService
+from emulator.firmware.time_of_day import TimeOfDay
 from emulator.firmware.timers import Timers
 
 _ERROR_BEHAVIOUR = {0: NmtState.PRE_OPERATIONAL, 1: None, 2: NmtState.STOPPED}
 """1029h:1 -> the NMT state that a communication error leads to from operational (CiA 301, 7.5.2.32)."""
 
 _TALKING = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
-"""NMT states with SDO, EMCY and SYNC (CiA 301, table 38)."""
+"""NMT states with SDO, EMCY, SYNC and TIME (CiA 301, table 38)."""
 
 
 class Application(Protocol):
@@ -56,7 +57,9 @@ class Node:
         bus: its CAN controller.
         timers: simulated time.
         memory: where stored parameters outlive it.
+        stored_as: their name there.
         make_application: builds the device profile on this node.
+        renumbered: asked with every reset by NMT; True where the device has become another node instead.
 
     Attributes:
         object_dictionary, nmt, sync, emergency, timers: services that device profiles use.
@@ -70,17 +73,20 @@ class Node:
         bus: NodeBus,
         timers: Timers,
         memory: Memory,
+        stored_as: str,
         make_application: Callable[[Node], Application],
+        renumbered: Callable[[], bool],
     ) -> None:
         self.node_id = node_id
         self.network = bus
         self.timers = timers
         objects = self.object_dictionary = Dictionary(eds, node_id)
-        self.nmt = NmtSlave(node_id, self._initialise, self._send_boot_up, self._nmt_changed)
+        self.nmt = NmtSlave(node_id, self._initialise, self._send_boot_up, self._nmt_changed, renumbered)
         self.emergency = Emergency(objects, timers, node_id, self._send_emergency)
         self.sync = SyncService(objects, timers, bus.listen_to_sync, bus.produce_sync)
+        self._clock = TimeOfDay(objects, timers, bus)
         self._sdo = SdoServer(objects, timers, self._send_sdo)
-        self._storage = ParameterStorage(objects, memory, node_id, lambda: self.nmt.state is not NmtState.OPERATIONAL)
+        self._storage = ParameterStorage(objects, memory, stored_as, lambda: self.nmt.state is not NmtState.OPERATIONAL)
         self._producer = HeartbeatProducer(objects, timers, self._send_heartbeat)
         self._consumer = HeartbeatConsumer(objects, timers, bus, self._heartbeat_lost, self._heartbeat_found)
         self._guarding = NodeGuarding(objects, timers, self._send_guarding, self._guarding_lost, self._heartbeat_found)
@@ -102,6 +108,13 @@ class Node:
         self._consumer.reset()
         self._guarding.reset()
         self.application.reset()
+
+    def retire(self) -> None:
+        """The device becomes another node: this one is off for good, and no timer of it is left."""
+        self.power_off()
+        self.object_dictionary.restore()
+        self._producer.reset()
+        self._consumer.reset()
 
     def bus_off(self) -> None:
         """The CAN controller has counted 256 transmit errors (ISO 11898-1) and left the bus: a lost connection."""
@@ -150,6 +163,9 @@ class Node:
             self.emergency.reset()
         self.pdos.load()
         self.sync.reset()
+        self._clock.reset()
+        if application:
+            self._clock.restart()
         self._producer.reset()
         self._consumer.reset()
         self._guarding.reset()
@@ -161,6 +177,7 @@ class Node:
         self.application.nmt_changed(state)
         self.pdos.wire(state is NmtState.OPERATIONAL)
         self.sync.run(state in _TALKING)
+        self._clock.run(state in _TALKING)
         if state not in _TALKING:
             self._sdo.reset()
 

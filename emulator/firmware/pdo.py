@@ -159,14 +159,12 @@ class PdoParameters(ABC):
 
     def _code(self, entry: int) -> str:
         index, subindex = entry >> 16, entry >> 8 & 0xFF
-        if self.receives and index in DUMMIES and subindex == 0:
+        if index in DUMMIES and subindex == 0:
+            if not self.receives:
+                raise AbortError(AbortCode.NOT_MAPPABLE)
             return DUMMIES[index]
-        try:
-            variable = self._dictionary.lookup(index, subindex)
-        except KeyError as error:
-            raise AbortError(AbortCode.OBJECT_MISSING) from error
-        allowed = variable.writable if self.receives else variable.readable
-        known = variable.datatype in STRUCT_CODES
-        if (index, subindex) not in self._dictionary.mappable or not allowed or not known:
+        variable = self._dictionary.find(index, subindex)
+        mappable = self._dictionary.receivable if self.receives else self._dictionary.transmittable
+        if (index, subindex) not in mappable or variable.datatype not in STRUCT_CODES:
             raise AbortError(AbortCode.NOT_MAPPABLE)
         return STRUCT_CODES[variable.datatype]

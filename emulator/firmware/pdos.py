@@ -11,6 +11,7 @@ from emulator.firmware.event_pdo import EventSender
 from emulator.firmware.nodebus import NodeBus
 from emulator.firmware.pdo import PdoIndices
 from emulator.firmware.rpdo import Rpdo, RpdoEvents
+from emulator.firmware.sync import SyncService
 from emulator.firmware.timers import Timers
 from emulator.firmware.tpdo import SAMPLED_FOR_REMOTE, Tpdo
 
@@ -36,6 +37,7 @@ class PdoNode(Protocol):
     timers: Timers
     object_dictionary: Dictionary
     emergency: Emergency
+    sync: SyncService
 
     @property
     def application(self) -> PdoReactions:
@@ -140,4 +142,5 @@ class Pdos:
             missing=missing,
             back=lambda: emergency.end_communication(ErrorCode.RPDO_TIMEOUT, k + 1),
         )
-        return Rpdo(self._node.object_dictionary, PdoIndices(0x1400 + k, 0x1600 + k), self._node.timers, events)
+        indices = PdoIndices(0x1400 + k, 0x1600 + k)
+        return Rpdo(self._node.object_dictionary, indices, self._node.timers, self._node.sync, events)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from emulator.firmware.dictionary import Dictionary
 from emulator.firmware.pdo import DUMMIES, PdoIndices, PdoParameters
+from emulator.firmware.sync import SyncService
 from emulator.firmware.timers import Timer, Timers
 
 _EVENT_TIMER = 5
@@ -42,13 +43,17 @@ class Rpdo(PdoParameters):
         dictionary: the object dictionary of the node.
         indices: where its parameters are.
         timers: simulated time, for the event timer.
+        sync: knows whether the synchronous window is still open.
         events: what it tells its node.
     """
 
     receives = True
 
-    def __init__(self, dictionary: Dictionary, indices: PdoIndices, timers: Timers, events: RpdoEvents) -> None:
+    def __init__(
+        self, dictionary: Dictionary, indices: PdoIndices, timers: Timers, sync: SyncService, events: RpdoEvents
+    ) -> None:
         super().__init__(dictionary, indices, events.changed)
+        self._sync = sync
         self._timers = timers
         self._events = events
         self._struct = struct.Struct("<")
@@ -95,7 +100,8 @@ class Rpdo(PdoParameters):
         if self._period:
             self._meet_deadline()
         if self.synchronous:
-            self._waiting = data
+            if not (self._sync.window and self._sync.window_closed):
+                self._waiting = data
         else:
             self._apply(data)
 

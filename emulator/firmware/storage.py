@@ -33,33 +33,33 @@ COMMANDS = frozenset((0x1010, 0x1011, 0x6003, 0x6040, 0x6060, 0x6071, 0x607A, 0x
 
 
 class Memory(Protocol):
-    """Non-volatile memory for the parameters of all nodes."""
+    """Non-volatile memory for what all devices store, by name."""
 
-    def load(self, node_id: int, device: str) -> Values:
-        """What was saved for this node and this kind of device."""
+    def load(self, name: str, device: str) -> Values:
+        """What was saved under this name by this kind of device."""
 
-    def save(self, node_id: int, device: str, values: Mapping[tuple[int, int], int | bytes]) -> None:
-        """Keep these values of a node."""
+    def save(self, name: str, device: str, values: Mapping[tuple[int, int], int | bytes]) -> None:
+        """Keep these values."""
 
 
 @dataclass
 class VolatileMemory:
     """Outlives the resets of the nodes, not the process."""
 
-    _values: dict[int, Values] = field(default_factory=dict)
+    _values: dict[str, Values] = field(default_factory=dict)
 
-    def load(self, node_id: int, device: str) -> Values:
-        """What was saved for this node."""
-        return dict(self._values.get(node_id, {}))
+    def load(self, name: str, device: str) -> Values:
+        """What was saved under this name."""
+        return dict(self._values.get(name, {}))
 
-    def save(self, node_id: int, device: str, values: Mapping[tuple[int, int], int | bytes]) -> None:
-        """Keep these values of a node."""
-        self._values[node_id] = dict(values)
+    def save(self, name: str, device: str, values: Mapping[tuple[int, int], int | bytes]) -> None:
+        """Keep these values."""
+        self._values[name] = dict(values)
 
 
 @dataclass(frozen=True)
 class FolderMemory:
-    """One JSON file a node in a folder: outlives the process, and can be read by people.
+    """One JSON file a name in a folder: outlives the process, and can be read by people.
 
     Attributes:
         folder: where the files are; made when something is saved.
@@ -67,30 +67,30 @@ class FolderMemory:
 
     folder: Path
 
-    def load(self, node_id: int, device: str) -> Values:
-        """What was saved for this node.
+    def load(self, name: str, device: str) -> Values:
+        """What was saved under this name.
 
         Raises:
             DataFileError: the file cannot be read, or is of another kind of device.
         """
-        path = self._path(node_id)
+        path = self._path(name)
         if not path.exists():
             return {}
         try:
             document = read_json(path)
             saved_by = document["device"]
-            values = {_key(name): _value(text) for name, text in document["values"].items()}
+            values = {_key(key): _value(text) for key, text in document["values"].items()}
         except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
             raise DataFileError(f"{path}: not stored parameters of a node ({error}).", "Delete the file.") from error
         if saved_by != device:
             raise DataFileError(
-                f"{path}: parameters of {saved_by}, but node {node_id} is {device}.",
+                f"{path}: parameters of {saved_by}, but {name.replace('_', ' ')} is {device}.",
                 "Delete the file, or use another storage folder.",
             )
         return values
 
-    def save(self, node_id: int, device: str, values: Mapping[tuple[int, int], int | bytes]) -> None:
-        """Keep these values of a node; the file is replaced as a whole.
+    def save(self, name: str, device: str, values: Mapping[tuple[int, int], int | bytes]) -> None:
+        """Keep these values; the file is replaced as a whole.
 
         Raises:
             OSError: the file cannot be written.
@@ -102,10 +102,10 @@ class FolderMemory:
                 for (index, subindex), value in sorted(values.items())
             },
         }
-        replace_whole(json.dumps(document, indent=1) + "\n", self._path(node_id))
+        replace_whole(json.dumps(document, indent=1) + "\n", self._path(name))
 
-    def _path(self, node_id: int) -> Path:
-        return self.folder / f"node_{node_id}.json"
+    def _path(self, name: str) -> Path:
+        return self.folder / f"{name}.json"
 
 
 class ParameterStorage:
@@ -114,14 +114,14 @@ class ParameterStorage:
     Args:
         dictionary: the object dictionary of the node.
         memory: non-volatile memory.
-        node_id: whose parameters.
+        name: what they are stored under.
         may_store: whether the state of the node allows it.
     """
 
-    def __init__(self, dictionary: Dictionary, memory: Memory, node_id: int, may_store: Callable[[], bool]) -> None:
+    def __init__(self, dictionary: Dictionary, memory: Memory, name: str, may_store: Callable[[], bool]) -> None:
         self._dictionary = dictionary
         self._memory = memory
-        self._node_id = node_id
+        self._name = name
         self._may_store = may_store
         self._device = ":".join(f"{dictionary.value(*key, default=0):08X}" for key in _IDENTITY)
         for subindex, (first, last) in GROUPS.items():
@@ -132,7 +132,7 @@ class ParameterStorage:
 
     def stored(self) -> Values:
         """What a reset starts with instead of the defaults; values that no longer fit the dictionary are left out."""
-        return {key: value for key, value in self._memory.load(self._node_id, self._device).items() if self._fits(key)}
+        return {key: value for key, value in self._memory.load(self._name, self._device).items() if self._fits(key)}
 
     def _fits(self, key: tuple[int, int]) -> bool:
         try:
@@ -164,7 +164,7 @@ class ParameterStorage:
         new = {key: value for key, value in values.items() if first <= key[0] <= last and self._fits(key)}
         try:
             kept = {key: value for key, value in self.stored().items() if not first <= key[0] <= last}
-            self._memory.save(self._node_id, self._device, kept | new)
+            self._memory.save(self._name, self._device, kept | new)
         except (OSError, DataFileError) as error:
             raise AbortError(AbortCode.CANNOT_STORE) from error
 

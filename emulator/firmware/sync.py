@@ -1,4 +1,4 @@
-"""SYNC consumer and producer of a node: 1005h, 1006h, 1019h (CiA 301, 7.2.5)."""
+"""SYNC consumer and producer of a node: 1005h, 1006h, 1007h, 1019h (CiA 301, 7.2.5)."""
 
 from __future__ import annotations
 
@@ -16,18 +16,22 @@ USUAL_COB_ID = 0x080
 
 _COUNTER_MAX = 240
 
+_MICROSECOND = 1e-6
+"""Unit of 1006h and 1007h [s]."""
+
 
 class SyncService:
     """What one node knows of the SYNC.
 
     Args:
-        dictionary: holds 1005h, 1006h and 1019h.
+        dictionary: holds 1005h, 1006h, 1007h and 1019h.
         timers: simulated time.
         listen: called with the CAN identifier of the SYNC, and when `plain` changes.
         produce: transmits a SYNC (CAN identifier, data), and lets this node act on it.
 
     Attributes:
         counter: the number in the last SYNC, 0 where SYNCs are not numbered.
+        window: 1007h, time after a SYNC in which synchronous RPDOs are taken [s], 0 for any time.
     """
 
     def __init__(
@@ -47,21 +51,31 @@ class SyncService:
         self._period = 0
         self._overflow = 0
         self._misfit = False
+        self._seen_at = 0.0
         self.counter = 0
+        self.window = 0.0
+        dictionary.on_write(0x1007, 0, self._write_window)
         dictionary.on_write(0x1005, 0, self._write_cob_id)
         dictionary.on_write(0x1006, 0, self._write_period)
         dictionary.on_write(0x1019, 0, self._write_overflow)
 
     @property
     def plain(self) -> bool:
-        """SYNCs carry no number, and the last one did not either: nothing about them needs a look."""
-        return not self._overflow and not self._misfit
+        """SYNCs carry no number, the last one did not either, no window begins: nothing about them needs a look."""
+        return not self._overflow and not self._misfit and not self.window
+
+    @property
+    def window_closed(self) -> bool:
+        """The synchronous window of the last SYNC is over (1007h)."""
+        return self._timers.now - self._seen_at > self.window > 0.0
 
     def reset(self) -> None:
         """Take everything from the dictionary."""
         read = self._dictionary.value
         self._cob_id = read(0x1005, default=USUAL_COB_ID)
         self._period, self._overflow = read(0x1006, default=0), read(0x1019, default=0)
+        self.window = read(0x1007, default=0) * _MICROSECOND
+        self._seen_at = self._timers.now
         self.counter = 0
         self._misfit = False
         self._listen(self._cob_id & IDENTIFIER)
@@ -80,6 +94,7 @@ class SyncService:
             self._listen(self._cob_id & IDENTIFIER)
         if not misfit:
             self.counter = data[0] if data else 0
+            self._seen_at = self._timers.now
         return not misfit
 
     def _restart(self) -> None:
@@ -87,10 +102,10 @@ class SyncService:
             self._timer.cancel()
             self._timer = None
         if self._running and self._cob_id & PRODUCES and self._period:
-            self._timer = self._timers.after(self._period * 1e-6, self._send)
+            self._timer = self._timers.after(self._period * _MICROSECOND, self._send)
 
     def _send(self) -> None:
-        self._timer = self._timers.after(self._period * 1e-6, self._send)
+        self._timer = self._timers.after(self._period * _MICROSECOND, self._send)
         following = self.counter % self._overflow + 1 if self._overflow else 0
         self._produce(self._cob_id & IDENTIFIER, bytes((following,)) if following else b"")
 
@@ -108,6 +123,11 @@ class SyncService:
     def _write_period(self, value: int) -> None:
         self._period = value
         self._restart()
+
+    def _write_window(self, value: int) -> None:
+        self.window = value * _MICROSECOND
+        self._seen_at = self._timers.now
+        self._listen(self._cob_id & IDENTIFIER)
 
     def _write_overflow(self, value: int) -> None:
         if self._period:

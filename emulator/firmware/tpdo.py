@@ -96,8 +96,7 @@ class Tpdo(PdoParameters):
         if self.transmission_type == 1 and not self._awaits_start:
             return True
         if self.transmission_type == 0:
-            due, self.event_pending = self.event_pending, False
-            return due
+            return self._has_changed()
         if self._awaits_start and counter and not self._starts_with(counter):
             return False
         self._syncs += 1
@@ -105,6 +104,12 @@ class Tpdo(PdoParameters):
             return False
         self._syncs = 0
         return True
+
+    def _has_changed(self) -> bool:
+        """Whether an event, or another value than in the last one, is there for the SYNC of transmission type 0."""
+        last, self._sampled = self._sampled, self.data()
+        due, self.event_pending = self.event_pending or self._sampled != last, False
+        return due
 
     def _starts_with(self, counter: int) -> bool:
         """The SYNC with the start value counts as the first one (CiA 301, 7.5.2.37), so the PDO goes out with it."""

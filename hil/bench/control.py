@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Protocol
 
+from hil.bus.listener import ListenerReport
 from hil.bus.unix_paths import listen
 from ident.errors import BusError, UserError
 
@@ -57,13 +60,20 @@ class ControlServer:
     Args:
         path: of its socket; one that a dead emulator of this user left there is replaced, nothing else.
         faults: what is commanded.
+        clients: those of the bus, and what became of the frames for them.
         monotonic: paces the looks at the socket [s].
 
     Raises:
         BusError: somebody listens there, something else is there, or the path cannot be used.
     """
 
-    def __init__(self, path: Path, faults: Injection, monotonic: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        path: Path,
+        faults: Injection,
+        clients: Callable[[], Sequence[ListenerReport]] = tuple,
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._faults = faults
         self._monotonic = monotonic
         self._next = 0.0
@@ -72,6 +82,7 @@ class ControlServer:
             "remove": self._remove,
             "clear": self._clear,
             "list": lambda _: "\n".join(faults.describe()) or "no faults",
+            "clients": lambda _: json.dumps([asdict(client) for client in clients()]),
         }
         try:
             self._bound = listen(path)
@@ -162,3 +173,12 @@ def command(path: Path, text: str) -> str:
         what, _, remedy = rest.partition("\n")
         raise UserError(what or "The emulator has closed the connection.", remedy)
     return rest
+
+
+def clients(path: Path) -> tuple[ListenerReport, ...]:
+    """The clients of the bus that the emulator at `path` serves.
+
+    Raises:
+        BusError: nobody listens or answers there.
+    """
+    return tuple(ListenerReport(**one) for one in json.loads(command(path, "clients")))

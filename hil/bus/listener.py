@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import struct
 from collections import deque
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from hil.bus.packets import DROPS, FRAME_SIZE, Hello
@@ -26,13 +28,17 @@ class ListenerReport:
 
     Attributes:
         pid: its process; 0 where the system does not say.
+        program: name of the process, empty where the system does not say.
         waiting: frames that wait in the hub because its socket is full.
         dropped: frames that it has lost because it did not read.
+        gone: it has left the bus.
     """
 
     pid: int
+    program: str
     waiting: int
     dropped: int
+    gone: bool = False
 
 
 class Listener:
@@ -60,6 +66,7 @@ class Listener:
         self.dropped = 0
         self.taken = 0
         self.watched = 0
+        self._told = 0
         self._room = room
         self._waiting: deque[bytes] = deque()
         self._waiting_frames = 0
@@ -69,9 +76,10 @@ class Listener:
         """Whether frames wait for room in its socket."""
         return bool(self._waiting)
 
-    def report(self) -> ListenerReport:
+    def report(self, gone: bool = False) -> ListenerReport:
         """What became of its frames."""
-        return ListenerReport(_process_of(self.socket), self._waiting_frames, self.dropped)
+        pid = _process_of(self.socket)
+        return ListenerReport(pid, _program_of(pid), self._waiting_frames, self.dropped, gone)
 
     def hand(self, packet: bytes) -> bool:
         """Hand over a packet, let it wait, or drop it; whether it is the first that has to wait.
@@ -81,6 +89,7 @@ class Listener:
         """
         if self.dropped and self.wants is not None and self.wants.drops:
             packet += DROPS.pack(self.dropped & 0xFFFFFFFF)
+            self._told = self.dropped
         if self._waiting:
             self._queue(packet)
             return False
@@ -103,6 +112,19 @@ class Listener:
             except BlockingIOError:
                 return
             self._waiting_frames -= len(self._waiting.popleft()) // FRAME_SIZE
+        if not self._waiting:
+            self._tell_drops()
+
+    def _tell_drops(self) -> None:
+        """Say how many frames are lost after the last that was kept: perhaps nothing else comes for a long time.
+
+        Only to those who take packets of any number of frames, none too: others take every packet for a frame.
+        """
+        wants = self.wants
+        if wants is not None and wants.bursts and wants.drops and self._told != self.dropped:
+            with contextlib.suppress(BlockingIOError):
+                self.socket.send(DROPS.pack(self.dropped & 0xFFFFFFFF))
+                self._told = self.dropped
 
     def deafen(self) -> None:
         """It is gone, and gets nothing any more; what it has sent before can still be read."""
@@ -131,3 +153,10 @@ def _process_of(connection: socket.socket) -> int:
     except OSError:
         return 0
     return int(_CREDENTIALS.unpack(credentials)[0])
+
+
+def _program_of(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/comm").read_text(errors="replace").strip()
+    except OSError:
+        return ""

@@ -6,6 +6,7 @@ arbitration, bit times, bus errors. A client that does not read loses what finds
 
 from __future__ import annotations
 
+import logging
 import selectors
 import socket
 import time
@@ -21,6 +22,8 @@ from hil.bus.unix_hub import BURST, UnixHub
 
 __all__ = ["UnixBus", "UnixHub"]
 
+_LOG = logging.getLogger("can.unix")
+
 
 class UnixBus(can.BusABC):
     """A client of a `UnixHub`, for any program that takes a python-can bus.
@@ -29,8 +32,11 @@ class UnixBus(can.BusABC):
         path: the hub's socket.
         now: stamps the frames received [s].
 
+    Frames that are lost because this client does not read in time are counted, and a warning of the logger `can.unix`
+    says so: for the first time, and whenever they have doubled.
+
     Attributes:
-        dropped: frames that were lost, as the last frame received says, because this client did not read in time.
+        dropped: frames that were lost so far, as the hub has told with the last frames, or behind them.
 
     Raises:
         CanInitializationError: no hub listens there.
@@ -39,6 +45,7 @@ class UnixBus(can.BusABC):
     def __init__(self, path: Path, now: Callable[[], float] = time.time) -> None:
         self._now = now
         self.dropped = 0
+        self._warned = 0
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._arrived: deque[can.Message] = deque()
         enlarge(self._socket)
@@ -67,7 +74,9 @@ class UnixBus(can.BusABC):
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         if self._is_shutdown:
             raise can.CanOperationError("the bus has been shut down")
-        if not self._arrived and self._poll.select(timeout):
+        end = None if timeout is None else time.monotonic() + timeout
+        while not self._arrived and self._poll.select(_left(end)):
+            # What comes may be no frame, but the number of those that are lost.
             self._take()
         return (self._arrived.popleft() if self._arrived else None), False
 
@@ -81,12 +90,25 @@ class UnixBus(can.BusABC):
         now = self._now()
         end = len(packet) // FRAME_SIZE * FRAME_SIZE
         if end < len(packet):
-            self.dropped = int(DROPS.unpack_from(packet, end)[0])
+            self._lose(int(DROPS.unpack_from(packet, end)[0]))
         for begin in range(0, end, FRAME_SIZE):
             self._arrived.append(unpack_frame(packet[begin : begin + FRAME_SIZE], now))
+
+    def _lose(self, dropped: int) -> None:
+        self.dropped = dropped
+        if dropped >= max(2 * self._warned, 1):
+            self._warned = dropped
+            _LOG.warning(
+                "%s: %d frames are lost, because this program does not read in time", self.channel_info, dropped
+            )
 
     def shutdown(self) -> None:
         """Leave the bus."""
         super().shutdown()
         self._poll.close()
         self._socket.close()
+
+
+def _left(end: float | None) -> float | None:
+    """Time until an instant [s]."""
+    return None if end is None else max(end - time.monotonic(), 0.0)

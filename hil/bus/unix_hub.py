@@ -30,6 +30,9 @@ from hil.bus.unix_paths import BoundSocket, listen
 BURST: Final = 64
 """Most frames in one packet."""
 
+_REMEMBERED: Final = 64
+"""Clients that have left and had lost frames of which the hub still knows."""
+
 _LARGEST_HELLO: Final = 12 + 8 * 512
 
 
@@ -62,6 +65,7 @@ class UnixHub(can.BusABC):
         self._room = room
         self._received: deque[tuple[bytes, float]] = deque()
         self._clients: list[Listener] = []
+        self._departed: deque[ListenerReport] = deque(maxlen=_REMEMBERED)
         self._burst: list[bytes] | None = None
         self._pacing = Pacing(bit_rate, monotonic)
         self._bound = _listen(path)
@@ -80,6 +84,11 @@ class UnixHub(can.BusABC):
     def listeners(self) -> tuple[ListenerReport, ...]:
         """What became of the frames for each client that hears this bus."""
         return tuple(client.report() for client in self._clients if client.wants is not None)
+
+    @property
+    def departed(self) -> tuple[ListenerReport, ...]:
+        """The last clients that have left the bus and had lost frames."""
+        return tuple(self._departed)
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Send a frame to every client.
@@ -261,6 +270,8 @@ class UnixHub(can.BusABC):
         self._watch(client)
 
     def _drop(self, client: Listener) -> None:
+        if client.dropped:
+            self._departed.append(client.report(gone=True))
         self._clients.remove(client)
         self._pacing.forget(client)
         if client.watched:

@@ -21,6 +21,9 @@ _HISTORY = 0x1003
 _EXACT_OBJECTS = frozenset((0x1005, 0x1006, 0x1014, 0x1015, 0x1017, 0x1019, 0x1200, 0x1400, 0x1800))
 """Objects whose values CiA 301 or the trace itself fixes; the values of others are the device's own."""
 
+_OWN_ENTRIES = frozenset(((0x1800, 3),))
+"""Entries of those objects whose default is the manufacturer's: the inhibit time (CiA 301, 7.5.2.37)."""
+
 _SEGMENT, _BLOCK_END = 0xF1, 0xE3
 """What must agree in the first byte: command and toggle, not the number of unused bytes."""
 
@@ -68,12 +71,13 @@ class SdoExpectation:
         return self.request[0] >> 5 == 1 and answer[0] in (_DOWNLOADED, SDO_ABORT)
 
     def _same_object_with_its_own_value(self, answer: bytes) -> bool:
-        index = struct.unpack_from("<H", self.answer, 1)[0]
+        index, subindex = struct.unpack_from("<HB", self.answer, 1)
         if index == _HISTORY:
             # The upper half of an entry is the device's own.
             return answer[:6] == self.answer[:6]
         uploads = {answer[0] >> 5, self.answer[0] >> 5} <= {UPLOADED, _BLOCK_UPLOADED}
-        return uploads and answer[1:4] == self.answer[1:4] and index not in _EXACT_OBJECTS
+        own = index not in _EXACT_OBJECTS or (index, subindex) in _OWN_ENTRIES
+        return uploads and answer[1:4] == self.answer[1:4] and own
 
     def _has_more(self, answer: bytes) -> bool:
         """The node has what the device of the trace has not: TPDOs on remote request."""

@@ -112,7 +112,7 @@ def _trip(fault: Fault, reach: Reach) -> Begin:
 
     def begin() -> End:
         if isinstance(drive, DriveApplication):
-            drive.fail(cause)
+            drive.trip(cause)
         return _nothing
 
     return begin

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from emulator.drive import Drive
+from emulator.power_stage import Trip
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
 
@@ -53,6 +54,21 @@ def test_disabling_takes_the_torque_away_at_once_and_forgets_the_set_point(stand
     drive.enable()
     stand.advance(0.01)
     assert drive.measured_torque() == 0.0
+
+
+@pytest.mark.parametrize(("powered", "told"), [(False, 3), (True, 1)], ids=["without power", "with power"])
+def test_a_trip_is_told_whatever_the_power_does_and_with_power_once(
+    stand: EmulatedVehicle, powered: bool, told: int
+) -> None:
+    drive = (enabled(stand) if powered else stand.drives)[0]
+    trips: list[Trip] = []
+    drive.watch(trips.append)
+    for _ in range(3):
+        drive.trip(Trip.ENCODER)
+    assert trips == [Trip.ENCODER] * told
+    drive.disable()
+    drive.trip(Trip.BLOCKED)
+    assert trips[-1] is Trip.BLOCKED
 
 
 @settings(max_examples=20, deadline=None)

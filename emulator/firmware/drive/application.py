@@ -41,6 +41,8 @@ _ENABLE_OPERATION = 0x0F
 
 _OPERATING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
+_FAULTY = (State.FAULT_REACTION_ACTIVE, State.FAULT)
+
 _DEFERRED: Mapping[int, tuple[int, Mapping[int, StopKind]]] = {
     5: (0x605C, DISABLE_OPERATION_OPTIONS),
     8: (0x605B, SHUTDOWN_OPTIONS),
@@ -85,6 +87,7 @@ class DriveApplication:
         self.error_code = 0
         self.statusword = 0
         self._halted = False
+        self._found_at_boot: Fault | None = None
         hardware.watch(self._tripped)
         bind(self, node.object_dictionary)
 
@@ -92,6 +95,16 @@ class DriveApplication:
     def state(self) -> State:
         """State of the power drive system."""
         return self._machine.state
+
+    @property
+    def remote(self) -> bool:
+        """Bit 9 of the statusword: the controlword is processed."""
+        return self._node.nmt.state is NmtState.OPERATIONAL
+
+    @property
+    def moving(self) -> bool:
+        """The power is on, and the axis moves as it is told to or by its own ramps."""
+        return self.state in _OPERATING
 
     def reset(self) -> None:
         """Power-on values: torque off, no mode, state machine through transitions 0 and 1."""
@@ -110,6 +123,9 @@ class DriveApplication:
         """Leaving operational while the drive runs is a lost connection too (CiA 402, 6007h)."""
         if state is not NmtState.OPERATIONAL and self.state in _OPERATING:
             self._abort(NOT_OPERATIONAL)
+        found, self._found_at_boot = self._found_at_boot, None
+        if found is not None:
+            self.fail(found)
         self._update_status()
 
     def rpdo_applied(self) -> None:
@@ -121,6 +137,7 @@ class DriveApplication:
         if self._after_stop in _DEFERRED and controlword & _COMMAND_BITS == _ENABLE_OPERATION:
             self._after_stop = None
             self._operate()
+            self._update_status()
         self.follow()
 
     def follow(self) -> None:
@@ -156,20 +173,26 @@ class DriveApplication:
             self._update_status()
 
     def fail(self, fault: Fault) -> None:
-        """Transition 13, or the end of a fault reaction that has become impossible."""
-        if self.state is State.FAULT:
-            return
-        reacting = self.state is State.FAULT_REACTION_ACTIVE
-        if reacting and not fault.fatal:
-            return
+        """Transition 13, or the end of a fault reaction that has become impossible.
+
+        What goes wrong while a fault is there already is told, too: 603Fh is the last error.
+        """
         self.error_code = fault.code
         self._node.emergency.report(fault.code, fault.register)
-        if reacting:
-            self._machine.take(14)
+        if self.state in _FAULTY:
+            if fault.fatal:
+                self._machine.take(14)
             return
         kind = FAULT_REACTION_OPTIONS[self._option(0x605E)]
         self._reaction = StopKind.DISABLE if fault.fatal or self.state not in _OPERATING else kind
         self._machine.take(13)
+
+    def trip(self, fault: Fault) -> None:
+        """The protection has noticed something, whatever the power does; a drive without supply finds it at boot."""
+        if self._node.nmt.state is NmtState.INITIALISATION:
+            self._found_at_boot = fault
+        else:
+            self.fail(fault)
 
     def _option(self, index: int) -> int:
         return self._node.object_dictionary.value(index)
@@ -177,7 +200,9 @@ class DriveApplication:
     def _abort(self, fault: Fault) -> None:
         option = self._option(0x6007)
         if option == AbortConnection.FAULT:
-            self.fail(fault)
+            # A drive that has a fault already leaves operational, or its master leaves it, because of that.
+            if self.state not in _FAULTY:
+                self.fail(fault)
         elif option == AbortConnection.DISABLE_VOLTAGE:
             self._points.forget()
             self._machine.command(Command.DISABLE_VOLTAGE)
@@ -185,7 +210,7 @@ class DriveApplication:
             self._machine.command(Command.QUICK_STOP)
 
     def _tripped(self, trip: Trip) -> None:
-        self.fail(OF_TRIP[trip])
+        self.trip(OF_TRIP[trip])
 
     def _ready(self, number: int) -> bool:
         """Whether a transition may be taken now; one that a ramp comes before is taken at the end of the ramp."""
@@ -287,7 +312,7 @@ class DriveApplication:
         last, motion = self.statusword, self._activity.motion
         self.statusword = compose(
             self._machine.state,
-            remote=self._node.nmt.state is NmtState.OPERATIONAL,
+            remote=self.remote,
             warns=self._supervision.warns,
             limited=self.axis.limited,
             of_mode=motion.status() if motion is not None else 0,

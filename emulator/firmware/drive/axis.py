@@ -37,10 +37,13 @@ class Setpoints:
     """What the master has written, in the units of the objects.
 
     Attributes:
+        controlword: the last one that was processed.
+        written_controlword: the last one that was written; one of a drive under local control is not processed.
         position_writes: times that 607Ah was written since there was nothing to go by.
     """
 
     controlword: int = 0
+    written_controlword: int = 0
     target_torque: int = 0
     target_velocity: int = 0
     target_position: int = 0
@@ -56,9 +59,9 @@ class Setpoints:
 
     def forget(self) -> None:
         """What was asked for counts for nothing any more; the controlword is the master's."""
-        controlword = self.controlword
+        controlwords = self.controlword, self.written_controlword
         self.clear()
-        self.controlword = controlword
+        self.controlword, self.written_controlword = controlwords
 
     def clear(self) -> None:
         """Nothing is asked for."""
@@ -83,6 +86,9 @@ class Axis:
         velocity_demand: [rad/s].
         position_demand: [increments], counted without end.
         goal: where profile position is on its way to [increments], None where it is not.
+        home, home_position: the count of the encoder that is position 0, and the home position as 6064h shows it.
+        position_sign, velocity_sign: 607Eh; the objects are by these factors what the motor does. Everything here but
+            `points` is the motor's own.
         limited: torque, speed or position is not what was asked for.
         count, read_at: last reading of the encoder [increments], and its instant [s].
     """
@@ -101,13 +107,25 @@ class Axis:
         self.goal: float | None = None
         self.limited = False
         self.home = 0
+        self.home_position = 0
+        self.position_sign = self.velocity_sign = 1
         self._integral = 0.0
 
     def reset(self) -> None:
         """Power-on: nothing asked for, the encoder's own zero."""
         self.points.clear()
-        self.home = 0
+        self.home = self.home_position = 0
+        self.turn_round()
         self.release()
+
+    def turn_round(self) -> None:
+        """Take over 607Eh."""
+        self.position_sign, self.velocity_sign = self.parameters.position_sign, self.parameters.velocity_sign
+
+    def go_home(self, count: int) -> None:
+        """The home position is at this count of the encoder: 6064h is 607Ch there."""
+        self.home_position = int(self.parameters.home_offset)
+        self.home = wrap(count - self.position_sign * self.home_position)
 
     def release(self) -> None:
         """No demand: the power is off."""
@@ -119,13 +137,30 @@ class Axis:
         self._integral = 0.0
 
     def position(self) -> int:
-        """6064h [increments]."""
+        """Of the shaft [increments]."""
         self.count, self.read_at = self.hardware.position(), self._timers.now
         return (self.count - self.home + _HALF) % _SPAN - _HALF
 
+    def shown_position(self) -> int:
+        """6064h [increments]."""
+        self.count, self.read_at = self.hardware.position(), self._timers.now
+        return (self.position_sign * (self.count - self.home) + _HALF) % _SPAN - _HALF
+
     def target(self) -> int:
         """607Ah [increments]; it follows the position until the master has written one."""
-        return self.points.target_position if self.points.position_writes else self.position()
+        return self.points.target_position if self.points.position_writes else self.shown_position()
+
+    def within_limits(self, position: float) -> float:
+        """A position of the objects within 607Dh, which counts from the home position [increments]."""
+        low, high = self.parameters.lowest_position, self.parameters.highest_position
+        if low >= high:
+            return position
+        return min(max(position, low + self.home_position), high + self.home_position)
+
+    def asked_velocity(self) -> float:
+        """60FFh + 60B1h, in the sense of the motor [rad/s]."""
+        points = self.points
+        return self.velocity_sign * (points.target_velocity + points.velocity_offset) / self.increments
 
     def velocity(self) -> float:
         """Of the shaft [rad/s]."""

@@ -6,7 +6,7 @@ import math
 from enum import Enum, auto
 from typing import Final
 
-from emulator.firmware.drive.axis import TICK, Axis, approach, wrap
+from emulator.firmware.drive.axis import TICK, Axis, approach
 from emulator.firmware.drive.modes import HOMING_ATTAINED, TARGET_REACHED, Steady
 
 _START: Final = 1 << 4
@@ -15,7 +15,7 @@ _START: Final = 1 << 4
 NEGATIVE_INDEX, POSITIVE_INDEX = 33, 34
 PRESENT_POSITION: Final = (35, 37)
 METHODS: Final = (0, NEGATIVE_INDEX, POSITIVE_INDEX, *PRESENT_POSITION)
-"""Values of 6098h: none; index pulse in negative or positive direction; where the shaft is now."""
+"""Values of 6098h: none; index pulse in negative or positive direction, whatever 607Eh says; where the shaft is now."""
 
 
 class _Phase(Enum):
@@ -49,10 +49,10 @@ class Homing:
         self._rest = Steady()
 
     def start(self) -> None:
-        """Stand and wait for bit 4."""
+        """Stand and wait for bit 4 to rise: one that is high already has started, or zeroed, what it was meant for."""
         self._axis.take_over()
         self._phase = _Phase.IDLE
-        self._started = False
+        self._started = bool(self._axis.points.controlword & _START)
 
     def take(self) -> None:
         """Start, or interrupt, on bit 4 of the controlword."""
@@ -69,7 +69,7 @@ class Homing:
         if self._phase is _Phase.SEARCHING and self._revolution() != self._turn:
             # The pulse is where a revolution begins: the new one going up, the one just left going down.
             index = self._revolution() if parameters.homing_method == POSITIVE_INDEX else self._turn
-            self._found(index * axis.hardware.counts_per_revolution)
+            axis.go_home(index * axis.hardware.counts_per_revolution)
             self._phase = _Phase.STOPPING
         target = 0.0
         if self._phase is _Phase.SEARCHING:
@@ -91,7 +91,7 @@ class Homing:
     def _begin(self) -> None:
         method = self._axis.parameters.homing_method
         if method in PRESENT_POSITION:
-            self._found(self._axis.hardware.position())
+            self._axis.go_home(self._axis.hardware.position())
             self._phase = _Phase.DONE
         elif method:
             self._turn = self._revolution()
@@ -99,6 +99,3 @@ class Homing:
 
     def _revolution(self) -> int:
         return self._axis.hardware.position() // self._axis.hardware.counts_per_revolution
-
-    def _found(self, count: int) -> None:
-        self._axis.home = wrap(count - int(self._axis.parameters.home_offset))

@@ -136,14 +136,19 @@ class ProfileTorque:
         """The ramp looks at the target by itself."""
 
     def tick(self) -> None:
-        """One step along the slope."""
-        axis = self._axis
-        self._demand = approach(self._demand, axis.points.target_torque, axis.parameters.torque_slope * TICK)
+        """One step along the slope, which does not climb beyond the limits: it would have to come back first."""
+        axis, parameters = self._axis, self._axis.parameters
+        target = axis.points.target_torque
+        allowed = min(max(target, parameters.lowest_torque), parameters.highest_torque)
+        self._demand = approach(self._demand, allowed, parameters.torque_slope * TICK)
         axis.control_torque(self._demand)
+        axis.limited = axis.limited or target != allowed
 
     def status(self) -> int:
-        """Bit 10: the demand has come to the target."""
-        return TARGET_REACHED if self._demand == self._axis.points.target_torque else 0
+        """Bit 10: the torque that is asked of the motor has come to the target; a limit may keep it away."""
+        axis = self._axis
+        reached = self._demand == axis.points.target_torque and not axis.limited
+        return TARGET_REACHED if reached else 0
 
 
 class ProfileVelocity:
@@ -169,7 +174,7 @@ class ProfileVelocity:
     def tick(self) -> None:
         """One step along the ramp, and of the velocity loop."""
         axis, parameters = self._axis, self._axis.parameters
-        asked = axis.points.target_velocity / axis.increments
+        asked = axis.velocity_sign * axis.points.target_velocity / axis.increments
         target = min(max(asked, -parameters.profile_speed), parameters.profile_speed)
         last = axis.velocity_demand
         slows = abs(target) < abs(last) or target * last < 0.0
@@ -234,7 +239,7 @@ class CyclicVelocity:
         """One step along the line, and of the velocity loop."""
         axis = self._axis
         points, speed = axis.points, axis.parameters.max_motor_speed
-        asked = (points.target_velocity + points.velocity_offset) / axis.increments
+        asked = axis.asked_velocity()
         target = min(max(asked, -speed), speed)
         axis.velocity_demand += self._line.step(target - axis.velocity_demand)
         axis.control_velocity(0.0, points.torque_offset * axis.permille)

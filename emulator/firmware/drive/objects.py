@@ -9,6 +9,8 @@ from emulator.firmware.dictionary import AbortCode, AbortError, Dictionary
 from emulator.firmware.drive.axis import Setpoints, wrap
 from emulator.firmware.drive.homing import METHODS
 from emulator.firmware.drive.modes import Mode
+from emulator.firmware.drive.parameters import POLARITY_BITS
+from emulator.firmware.drive.positioning import RelativeTo
 
 if TYPE_CHECKING:
     from emulator.firmware.drive.application import DriveApplication
@@ -32,6 +34,9 @@ def bind(drive: DriveApplication, objects: Dictionary) -> None:
     _bind_demands(drive, objects)
     _bind_setpoints(drive, objects)
     objects.on_write(0x6098, 0, _check_method)
+    objects.on_write(0x607E, 0, lambda value: _check_polarity(drive, value))
+    objects.on_change(0x607E, 0, lambda _value: drive.axis.turn_round())
+    objects.on_write(0x60F2, 0, _check_positioning_options)
 
 
 def _bind_measurements(drive: DriveApplication, objects: Dictionary) -> None:
@@ -46,8 +51,8 @@ def _bind_measurements(drive: DriveApplication, objects: Dictionary) -> None:
         (0x603F, 0): lambda: drive.error_code,
         (0x6041, 0): lambda: drive.statusword,
         (0x6061, 0): lambda: drive.mode,
-        (0x6064, 0): axis.position,
-        (0x606C, 0): lambda: _clamp(round(hardware.velocity() * increments), _I32),
+        (0x6064, 0): axis.shown_position,
+        (0x606C, 0): lambda: _clamp(round(axis.velocity_sign * hardware.velocity() * increments), _I32),
         (0x6075, 0): lambda: rated_current,
         (0x6076, 0): lambda: rated_torque,
         (0x6077, 0): torque,
@@ -62,10 +67,10 @@ def _bind_measurements(drive: DriveApplication, objects: Dictionary) -> None:
 def _bind_demands(drive: DriveApplication, objects: Dictionary) -> None:
     axis = drive.axis
     reads: dict[tuple[int, int], Callable[[], int]] = {
-        (0x6062, 0): lambda: wrap(round(axis.position_demand)),
-        (0x606B, 0): lambda: _clamp(round(axis.velocity_demand * axis.increments), _I32),
+        (0x6062, 0): lambda: wrap(round(axis.position_sign * axis.position_demand)),
+        (0x606B, 0): lambda: _clamp(round(axis.velocity_sign * axis.velocity_demand * axis.increments), _I32),
         (0x6074, 0): lambda: axis.torque_demand,
-        (0x60F4, 0): lambda: _clamp(round(axis.following_error()), _I32),
+        (0x60F4, 0): lambda: _clamp(round(axis.position_sign * axis.following_error()), _I32),
     }
     _on_read(objects, reads)
 
@@ -74,13 +79,16 @@ def _bind_setpoints(drive: DriveApplication, objects: Dictionary) -> None:
     points: Setpoints = drive.axis.points
 
     def control(value: int) -> None:
-        points.controlword = value
-        drive.rpdo_applied()
+        points.written_controlword = value
+        # "If the bit remote is reset, then the drive ... will not execute the command message" (6041h, bit 9).
+        if drive.remote:
+            points.controlword = value
+            drive.rpdo_applied()
 
     def latch_control(value: int) -> None:
-        points.controlword = value
+        points.controlword = points.written_controlword = value
 
-    objects.on_read(0x6040, 0, lambda: points.controlword)
+    objects.on_read(0x6040, 0, lambda: points.written_controlword)
     objects.on_write(0x6040, 0, control)
     objects.on_pdo_write(0x6040, 0, latch_control)
     objects.on_read(0x6060, 0, lambda: drive.mode)
@@ -122,6 +130,18 @@ def _mode(value: int) -> Mode:
 
 def _check_method(value: int) -> None:
     if value not in METHODS:
+        raise AbortError(AbortCode.VALUE_RANGE_EXCEEDED)
+
+
+def _check_polarity(drive: DriveApplication, value: int) -> None:
+    if value & ~POLARITY_BITS:
+        raise AbortError(AbortCode.VALUE_RANGE_EXCEEDED)
+    if drive.moving:
+        raise AbortError(AbortCode.DEVICE_STATE)
+
+
+def _check_positioning_options(value: int) -> None:
+    if value not in tuple(RelativeTo):
         raise AbortError(AbortCode.VALUE_RANGE_EXCEEDED)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Final
 
 from emulator.firmware.dictionary import Dictionary
@@ -47,6 +48,20 @@ def _of_objects(counts: float) -> Mapping[str, tuple[int, int, _Scale]]:
     }
 
 
+_OPTIONAL: Final[Mapping[str, tuple[int, int, int]]] = {
+    "lowest_position": (0x607D, 1, -(2**31)),
+    "highest_position": (0x607D, 2, 2**31 - 1),
+    "polarity": (0x607E, 0, 0),
+    "positioning_options": (0x60F2, 0, 0),
+}
+"""Attribute -> index, sub-index, and what holds where the EDS does not have the object."""
+
+_POSITION_REVERSED: Final = 1 << 7
+_VELOCITY_REVERSED: Final = 1 << 6
+
+POLARITY_BITS: Final = _POSITION_REVERSED | _VELOCITY_REVERSED
+"""The bits of 607Eh that there are."""
+
 _TORQUE_LIMITS: Final = (0x6072, 0x6073, 0x60E0, 0x60E1)
 """In per mille of rated torque or current, which are proportional."""
 
@@ -61,6 +76,9 @@ class Parameters:
         position_window: 6067h [increments].
         torque_slope: 6087h [per mille / s].
         home_offset: 607Ch [increments].
+        lowest_position, highest_position: 607Dh [increments], counted from the home position.
+        polarity: 607Eh.
+        positioning_options: 60F2h.
         highest_torque, lowest_torque: what 6072h, 6073h, 60E0h and 60E1h leave [per mille].
 
     Args:
@@ -95,6 +113,10 @@ class Parameters:
     velocity_integration_time: float
     load_inertia: float
     position_gain: float
+    lowest_position: int
+    highest_position: int
+    polarity: int
+    positioning_options: int
 
     def __init__(self, dictionary: Dictionary, counts: int) -> None:
         self._dictionary = dictionary
@@ -102,17 +124,31 @@ class Parameters:
         self._limits = dict.fromkeys(_TORQUE_LIMITS, 0)
         self.highest_torque = self.lowest_torque = 0
         for name, (index, subindex, scale) in self._objects.items():
-            dictionary.on_write(index, subindex, self._setter(name, scale))
+            dictionary.on_change(index, subindex, self._setter(name, scale))
+        for name, (index, subindex, _) in _OPTIONAL.items():
+            dictionary.on_change(index, subindex, partial(setattr, self, name))
         for index in _TORQUE_LIMITS:
-            dictionary.on_write(index, 0, self._limiter(index))
+            dictionary.on_change(index, 0, self._limiter(index))
         self.load()
 
     def load(self) -> None:
         """Take all values from the dictionary, as after a reset."""
         for name, (index, subindex, scale) in self._objects.items():
             setattr(self, name, scale(self._dictionary.value(index, subindex)))
+        for name, (index, subindex, otherwise) in _OPTIONAL.items():
+            setattr(self, name, self._dictionary.value(index, subindex, default=otherwise))
         for index in _TORQUE_LIMITS:
             self._limiter(index)(self._dictionary.value(index))
+
+    @property
+    def position_sign(self) -> int:
+        """What positions of the objects have to be multiplied with to be those of the motor (607Eh, bit 7)."""
+        return -1 if self.polarity & _POSITION_REVERSED else 1
+
+    @property
+    def velocity_sign(self) -> int:
+        """The same of velocities (607Eh, bit 6)."""
+        return -1 if self.polarity & _VELOCITY_REVERSED else 1
 
     @property
     def interpolation_time(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 from typing import Final
 
 from emulator.firmware.drive.axis import TICK, Axis, approach, shorter_way
@@ -13,6 +14,17 @@ _NEW_SETPOINT: Final = 1 << 4
 _IMMEDIATELY: Final = 1 << 5
 _RELATIVE: Final = 1 << 6
 _ACKNOWLEDGE: Final = 1 << 12
+
+
+class RelativeTo(IntEnum):
+    """Values of 60F2h: what a relative target (bit 6) of profile position counts from."""
+
+    PRECEDING_TARGET = 0
+    """The target before it, or the demand where there was none."""
+    DEMAND = 1
+    """6062h."""
+    POSITION = 2
+    """6064h."""
 
 
 class PositionLoop:
@@ -66,7 +78,8 @@ class CyclicPosition:
         self._loop = PositionLoop(axis)
         self._tracking = Tracking()
         self._writes = 0
-        self._goal: int | None = None
+        self._goal: float | None = None
+        self._beyond = False
 
     @property
     def failed(self) -> bool:
@@ -87,7 +100,7 @@ class CyclicPosition:
         self._tracking.begin(period)
         if points.position_writes != self._writes:
             self._writes = points.position_writes
-            goal, last = points.target_position + points.position_offset, self._goal
+            goal, last = self._asked(), self._goal
             self._tracking.set_point(None if last is None else shorter_way(goal - last), period)
             self._goal = goal
 
@@ -97,19 +110,28 @@ class CyclicPosition:
             self._loop.step(self._tracking.rest(self._limits()))
             return
         axis, points = self._axis, self._axis.points
-        distance = shorter_way(points.target_position + points.position_offset - axis.position_demand)
+        distance = shorter_way(self._asked() - axis.position_demand)
         slope, as_asked = self._tracking.step(distance, self._limits())
-        self._loop.step(slope, offset=points.velocity_offset, extra=points.torque_offset * axis.permille)
-        axis.limited = axis.limited or not as_asked
+        offset = axis.velocity_sign * points.velocity_offset
+        self._loop.step(slope, offset=offset, extra=points.torque_offset * axis.permille)
+        axis.limited = axis.limited or self._beyond or not as_asked
 
     def status(self) -> int:
         """Bits 12, and 13 where the following error has lasted too long (6065h, 6066h)."""
         return FOLLOWS_COMMAND | (POSITION_ERROR if self.failed else 0)
 
+    def _asked(self) -> float:
+        """607Ah + 60B0h within 607Dh, in the sense of the motor [increments]."""
+        axis = self._axis
+        asked = axis.points.target_position + axis.points.position_offset
+        allowed = axis.within_limits(asked)
+        self._beyond = allowed != asked
+        return axis.position_sign * allowed
+
     def _limits(self) -> Limits:
         parameters, scale = self._axis.parameters, self._axis.increments
         return Limits(
-            parameters.max_motor_speed * scale,
+            parameters.profile_speed * scale,
             parameters.max_acceleration * scale,
             parameters.max_deceleration * scale,
             parameters.interpolation_time,
@@ -133,6 +155,7 @@ class ProfilePosition:
         self._waiting: float | None = None
         self._acknowledged = False
         self._reached = True
+        self._beyond = False
 
     @property
     def failed(self) -> bool:
@@ -147,6 +170,7 @@ class ProfilePosition:
         self._waiting = None
         self._acknowledged = False
         self._reached = self._axis.goal is None
+        self._beyond = self._beyond and not self._reached
 
     def take(self) -> None:
         """Follow bits 4 to 6 of the controlword."""
@@ -170,6 +194,7 @@ class ProfilePosition:
         else:
             slope = self._speed * axis.increments
         self._loop.step(slope, acceleration=(self._speed - last) / TICK)
+        axis.limited = axis.limited or self._beyond
         if axis.goal is not None:
             self._look(axis.goal, arrives or (distance == 0.0 and self._speed == 0.0))
 
@@ -183,16 +208,26 @@ class ProfilePosition:
 
     def _accept(self, controlword: int) -> None:
         axis = self._axis
-        target = float(axis.target())
+        asked = float(axis.target())
         if controlword & _RELATIVE:
-            before = self._waiting if self._waiting is not None else axis.goal
             way = axis.points.target_position if axis.points.position_writes else 0
-            target = way + (axis.position_demand if before is None else before)
+            asked = axis.position_sign * self._start_of_way() + way
+        allowed = axis.within_limits(asked)
+        self._beyond = allowed != asked
+        target = axis.position_sign * allowed
         self._acknowledged = True
         if self._reached or controlword & _IMMEDIATELY:
             self._go(target)
         else:
             self._waiting = target
+
+    def _start_of_way(self) -> float:
+        """What a relative target counts from, in the sense of the motor [increments]."""
+        axis, option = self._axis, self._axis.parameters.positioning_options
+        before = self._waiting if self._waiting is not None else axis.goal
+        if option == RelativeTo.POSITION:
+            return float(axis.position())
+        return axis.position_demand if option == RelativeTo.DEMAND or before is None else before
 
     def _go(self, target: float) -> None:
         self._axis.goal = target

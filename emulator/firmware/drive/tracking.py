@@ -14,7 +14,7 @@ class Limits:
     """What a demand may do.
 
     Attributes:
-        speed: 6080h [increments / s].
+        speed: the lower one of 607Fh and 6080h [increments / s].
         acceleration, deceleration: 60C5h, 60C6h [increments / s^2].
         period: 60C2h [s].
     """

@@ -6,6 +6,7 @@
  */
 #define _GNU_SOURCE
 #include "broadcast.h"
+#include "sockets.h"
 
 #include <errno.h>
 #include <linux/can.h>
@@ -13,7 +14,6 @@
 #include <pthread.h>
 #include <stdint.h>
 #include <string.h>
-#include <sys/socket.h>
 #include <time.h>
 
 #define TASKS 256
@@ -59,8 +59,7 @@ static struct task *add(int fd, canid_t can_id) {
 }
 
 static void transmit(struct task *task) {
-    /* sendto goes to the bus, where send would come back here. */
-    (void)!sendto(task->fd, &task->frames[task->next], sizeof(struct can_frame), MSG_NOSIGNAL, NULL, 0);
+    (void)!transmit_packet(task->fd, &task->frames[task->next], sizeof(struct can_frame));
     task->next = (task->next + 1) % task->nframes;
 }
 
@@ -119,6 +118,8 @@ static int start_thread(void) {
 static int set_up(int fd, const struct bcm_msg_head *head, const struct can_frame *frames) {
     struct task *task = find(fd, head->can_id);
     if (head->nframes < 1 || head->nframes > FRAMES) return EINVAL;
+    for (unsigned k = 0; k < head->nframes; k++)
+        if (frames[k].can_dlc > CAN_MAX_DLEN) return EINVAL;
     if (!task) task = add(fd, head->can_id);
     if (!task) return ENOMEM;
     task->nframes = head->nframes;
@@ -149,8 +150,8 @@ static int carry_out(int fd, const struct bcm_msg_head *head, const struct can_f
     switch (head->opcode) {
     case TX_SETUP: return head->nframes == count ? set_up(fd, head, frames) : EINVAL;
     case TX_SEND:
-        if (head->nframes != 1 || count != 1) return EINVAL;
-        return sendto(fd, frames, sizeof *frames, MSG_NOSIGNAL, NULL, 0) < 0 ? errno : 0;
+        if (head->nframes != 1 || count != 1 || frames->can_dlc > CAN_MAX_DLEN) return EINVAL;
+        return transmit_packet(fd, frames, sizeof *frames) < 0 ? errno : 0;
     case TX_READ: return task ? 0 : EINVAL;
     case TX_DELETE:
         if (!task) return EINVAL;
@@ -182,5 +183,12 @@ void broadcast_close(int fd) {
     pthread_mutex_lock(&lock);
     for (int k = 0; k < TASKS; k++)
         if (tasks[k].fd == fd) tasks[k].used = 0;
+    pthread_mutex_unlock(&lock);
+}
+
+void broadcast_move(int fd, int other) {
+    pthread_mutex_lock(&lock);
+    for (int k = 0; k < TASKS; k++)
+        if (tasks[k].fd == fd) tasks[k].fd = other;
     pthread_mutex_unlock(&lock);
 }

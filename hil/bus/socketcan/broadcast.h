@@ -11,4 +11,7 @@ ssize_t broadcast_command(int fd, const void *message, size_t size);
 /* Forgets all that a socket has set up. */
 void broadcast_close(int fd);
 
+/* A descriptor is closed, and another one of the same socket stays. */
+void broadcast_move(int fd, int other);
+
 #endif

@@ -18,10 +18,14 @@ from platformdirs import user_cache_path
 
 from ident.errors import BusError
 
-SOURCES: Final = tuple(Path(__file__).with_name(name) for name in ("preload.c", "broadcast.c"))
-"""The library's sources; their header stands beside them."""
+_UNITS: Final = ("preload", "interfaces", "sending", "descriptors", "broadcast")
+_HEADERS: Final = ("real", "interfaces", "sockets", "broadcast")
 
-_HEADER: Final = Path(__file__).with_name("broadcast.h")
+SOURCES: Final = tuple(Path(__file__).with_name(f"{name}.c") for name in _UNITS)
+"""The library's sources; their headers stand beside them."""
+
+HEADERS: Final = tuple(Path(__file__).with_name(f"{name}.h") for name in _HEADERS)
+"""The headers of the library's sources."""
 _OPTIONS: Final = ("-std=gnu11", "-O2", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror")
 _LONGEST_NAME: Final = 15
 _SYSTEM_COMPILERS: Final = ("cc", "gcc", "clang")
@@ -47,7 +51,7 @@ def build_library(cache: Path | None = None, compiler: list[str] | None = None) 
     """
     if sys.platform != "linux":
         raise BusError("SocketCAN programs exist on Linux only.", "Use python-can's own interfaces instead.")
-    content = b"".join(path.read_bytes() for path in (*SOURCES, _HEADER))
+    content = b"".join(path.read_bytes() for path in (*SOURCES, *HEADERS))
     digest = hashlib.sha256(content).hexdigest()[:16]
     target = (cache or user_cache_path("quasiomni")) / f"socketcan-{digest}.so"
     if not target.is_file():

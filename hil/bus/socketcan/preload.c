@@ -9,19 +9,20 @@
  * A socket with SO_RXQ_OVFL gets packets of a frame and, once frames were dropped, their number, which recvmsg passes
  * on as the system does for a socket of its own. Its plain reads must ask for no more than a frame.
  *
- * The sending half of CAN_BCM is in broadcast.c: there, send and write are commands.
+ * In other files: which interfaces there are (interfaces.c), what is sent (sending.c), descriptors that come and go
+ * (descriptors.c), the sending half of CAN_BCM (broadcast.c).
  *
  * Not here: CAN FD, CAN_ISOTP, netlink. "any" (interface index 0) is the first interface.
  */
 #define _GNU_SOURCE
-#include "broadcast.h"
+#include "interfaces.h"
+#include "real.h"
+#include "sockets.h"
 
-#include <dlfcn.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
-#include <net/if.h>
-#include <net/if_arp.h>
 #include <poll.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -34,8 +35,6 @@
 #include <unistd.h>
 
 #define SOCKETS 4096
-#define INTERFACES 16
-#define FIRST_INDEX 1001
 #define HELLO_MAGIC 0x4e414351u /* "QCAN" */
 #define OWN_FRAMES 1u
 #define JOIN_FILTERS 2u
@@ -44,67 +43,30 @@
 #define ACKNOWLEDGE_TIMEOUT_MS 20000
 #define OWN_MARK 1
 
-struct interface {
-    char name[IFNAMSIZ];
-    char path[sizeof(((struct sockaddr_un *)0)->sun_path)];
-};
-
-/* What a client tells the hub, when it connects and whenever it changes; the filters follow. 12 + 8 n bytes. */
-struct hello {
-    uint32_t magic;
-    uint32_t error_mask;
-    uint32_t flags;
-    struct can_filter filters[CAN_RAW_FILTER_MAX];
-};
-
-struct can_socket {
-    int broadcast; /* CAN_BCM instead of CAN_RAW */
-    int connected;
-    int interface;
-    unsigned count;
-    struct hello hello;
-};
-
-static struct interface interfaces[INTERFACES];
-static int interface_count;
 static struct can_socket *sockets[SOCKETS];
 
-static void *next_symbol(const char *name) { return dlsym(RTLD_NEXT, name); }
+struct can_socket *socket_remembered(int fd) { return fd >= 0 && fd < SOCKETS ? sockets[fd] : NULL; }
 
-#define REAL(type, name) ((type)next_symbol(name))
-
-__attribute__((constructor)) static void read_interfaces(void) {
-    const char *text = getenv("QUASIOMNI_CAN");
-    while (text && *text && interface_count < INTERFACES) {
-        const char *equals = strchr(text, '='), *end = strchr(text, ',');
-        struct interface *found = &interfaces[interface_count];
-        size_t whole = end ? (size_t)(end - text) : strlen(text);
-        if (equals && equals < text + whole) {
-            size_t name = (size_t)(equals - text), path = whole - name - 1;
-            if (name > 0 && name < sizeof found->name && path > 0 && path < sizeof found->path) {
-                memcpy(found->name, text, name);
-                memcpy(found->path, equals + 1, path);
-                interface_count++;
-            }
-        }
-        text += whole + (end ? 1 : 0);
-    }
+void socket_share(int from, int to) {
+    if (to >= SOCKETS) return;
+    sockets[to] = sockets[from];
+    sockets[to]->references++;
 }
 
-static int interface_of_name(const char *name) {
-    for (int k = 0; k < interface_count; k++)
-        if (strncmp(interfaces[k].name, name, IFNAMSIZ) == 0) return k;
+int socket_release(int fd) {
+    struct can_socket *entry = sockets[fd];
+    sockets[fd] = NULL;
+    if (--entry->references == 0) {
+        free(entry);
+        return -1;
+    }
+    for (int other = 0; other < SOCKETS; other++)
+        if (sockets[other] == entry) return other;
     return -1;
 }
 
-static int interface_of_index(int index) {
-    int k = index - FIRST_INDEX;
-    return k >= 0 && k < interface_count ? k : -1;
-}
-
-/* The entry of a descriptor that is still the socket it was made for. */
-static struct can_socket *find(int fd) {
-    if (fd < 0 || fd >= SOCKETS || !sockets[fd]) return NULL;
+struct can_socket *socket_of(int fd) {
+    if (!socket_remembered(fd)) return NULL;
     int domain = 0, type = 0;
     socklen_t size = sizeof domain;
     typedef int (*getsockopt_t)(int, int, int, void *, socklen_t *);
@@ -113,15 +75,18 @@ static struct can_socket *find(int fd) {
         size = sizeof type;
         if (real(fd, SOL_SOCKET, SO_TYPE, &type, &size) == 0 && type == SOCK_SEQPACKET) return sockets[fd];
     }
-    free(sockets[fd]);
-    sockets[fd] = NULL;
+    socket_release(fd);
     return NULL;
+}
+
+ssize_t transmit_packet(int fd, const void *data, size_t size) {
+    typedef ssize_t (*sendto_t)(int, const void *, size_t, int, const struct sockaddr *, socklen_t);
+    return REAL(sendto_t, "sendto")(fd, data, size, MSG_NOSIGNAL, NULL, 0);
 }
 
 static int tell(int fd, struct can_socket *entry) {
     size_t size = offsetof(struct hello, filters) + entry->count * sizeof(struct can_filter);
-    /* sendto, which is not mapped: send may be a command to the broadcast manager. */
-    return sendto(fd, &entry->hello, size, MSG_NOSIGNAL, NULL, 0) < 0 ? -1 : 0;
+    return transmit_packet(fd, &entry->hello, size) < 0 ? -1 : 0;
 }
 
 int socket(int domain, int type, int protocol) {
@@ -130,7 +95,11 @@ int socket(int domain, int type, int protocol) {
     int flags = type & (SOCK_CLOEXEC | SOCK_NONBLOCK);
     int raw = (type & ~flags) == SOCK_RAW && protocol == CAN_RAW;
     int broadcast = (type & ~flags) == SOCK_DGRAM && protocol == CAN_BCM;
-    if (domain != PF_CAN || !(raw || broadcast) || interface_count == 0) return real(domain, type, protocol);
+    if (domain != PF_CAN || interfaces_known() == 0) return real(domain, type, protocol);
+    if (!raw && !broadcast) {
+        errno = EPROTONOSUPPORT; /* As a kernel without the module: CAN_ISOTP and CAN_J1939 are state machines in it. */
+        return -1;
+    }
     int fd = real(AF_UNIX, SOCK_SEQPACKET | flags, 0);
     if (fd < 0) return fd;
     struct can_socket *entry = fd < SOCKETS ? calloc(1, sizeof *entry) : NULL;
@@ -139,7 +108,8 @@ int socket(int domain, int type, int protocol) {
         errno = fd < SOCKETS ? ENOMEM : EMFILE;
         return -1;
     }
-    free(sockets[fd]);
+    if (sockets[fd]) socket_release(fd);
+    entry->references = 1;
     entry->broadcast = broadcast;
     entry->count = raw ? 1 : 0; /* One filter of zeros: everything, as the kernel has it. */
     entry->hello.magic = HELLO_MAGIC;
@@ -156,20 +126,23 @@ static int await_acknowledgement(int fd) {
     return -1;
 }
 
-/* Connects a socket to the hub of the interface in an address. */
-static int join(int fd, struct can_socket *entry, const struct sockaddr_can *wanted) {
+int socket_reach(int fd, int interface) {
     typedef int (*connect_t)(int, const struct sockaddr *, socklen_t);
-    int chosen = wanted->can_ifindex ? interface_of_index(wanted->can_ifindex) : 0;
-    if (chosen < 0) {
+    struct sockaddr_un hub = {.sun_family = AF_UNIX};
+    if (interface < 0) {
         errno = ENODEV;
         return -1;
     }
-    struct sockaddr_un hub = {.sun_family = AF_UNIX};
-    memcpy(hub.sun_path, interfaces[chosen].path, sizeof hub.sun_path);
-    if (REAL(connect_t, "connect")(fd, (struct sockaddr *)&hub, sizeof hub) < 0) {
-        errno = ENETDOWN;
-        return -1;
-    }
+    strncpy(hub.sun_path, interface_path(interface), sizeof hub.sun_path - 1);
+    if (REAL(connect_t, "connect")(fd, (struct sockaddr *)&hub, sizeof hub) == 0) return 0;
+    errno = ENETDOWN;
+    return -1;
+}
+
+/* Connects a socket to the hub of the interface in an address. */
+static int join(int fd, struct can_socket *entry, const struct sockaddr_can *wanted) {
+    int chosen = wanted->can_ifindex ? interface_of_index(wanted->can_ifindex) : 0;
+    if (socket_reach(fd, chosen) < 0) return -1;
     entry->interface = chosen;
     entry->connected = 1;
     entry->hello.flags |= ACKNOWLEDGE;
@@ -180,42 +153,20 @@ static int join(int fd, struct can_socket *entry, const struct sockaddr_can *wan
 
 int bind(int fd, const struct sockaddr *address, socklen_t length) {
     typedef int (*bind_t)(int, const struct sockaddr *, socklen_t);
-    struct can_socket *entry = find(fd);
+    struct can_socket *entry = socket_of(fd);
     if (!entry || address->sa_family != AF_CAN) return REAL(bind_t, "bind")(fd, address, length);
     return join(fd, entry, (const struct sockaddr_can *)address);
 }
 
 int connect(int fd, const struct sockaddr *address, socklen_t length) {
     typedef int (*connect_t)(int, const struct sockaddr *, socklen_t);
-    struct can_socket *entry = address && address->sa_family == AF_CAN ? find(fd) : NULL;
+    struct can_socket *entry = address && address->sa_family == AF_CAN ? socket_of(fd) : NULL;
     if (!entry) return REAL(connect_t, "connect")(fd, address, length);
     return join(fd, entry, (const struct sockaddr_can *)address);
 }
 
-static int is_broadcast(int fd) { return fd >= 0 && fd < SOCKETS && sockets[fd] && sockets[fd]->broadcast && find(fd); }
-
-ssize_t send(int fd, const void *data, size_t size, int flags) {
-    typedef ssize_t (*send_t)(int, const void *, size_t, int);
-    return is_broadcast(fd) ? broadcast_command(fd, data, size) : REAL(send_t, "send")(fd, data, size, flags);
-}
-
-ssize_t write(int fd, const void *data, size_t size) {
-    typedef ssize_t (*write_t)(int, const void *, size_t);
-    return is_broadcast(fd) ? broadcast_command(fd, data, size) : REAL(write_t, "write")(fd, data, size);
-}
-
-int close(int fd) {
-    typedef int (*close_t)(int);
-    if (is_broadcast(fd)) broadcast_close(fd);
-    if (fd >= 0 && fd < SOCKETS && sockets[fd]) {
-        free(sockets[fd]);
-        sockets[fd] = NULL;
-    }
-    return REAL(close_t, "close")(fd);
-}
-
 static void write_address(const struct can_socket *entry, void *address, socklen_t *length) {
-    struct sockaddr_can sender = {.can_family = AF_CAN, .can_ifindex = FIRST_INDEX + entry->interface};
+    struct sockaddr_can sender = {.can_family = AF_CAN, .can_ifindex = interface_index(entry->interface)};
     if (!address || !length) return;
     memcpy(address, &sender, *length < sizeof sender ? *length : sizeof sender);
     *length = sizeof sender;
@@ -223,7 +174,7 @@ static void write_address(const struct can_socket *entry, void *address, socklen
 
 int getsockname(int fd, struct sockaddr *address, socklen_t *length) {
     typedef int (*getsockname_t)(int, struct sockaddr *, socklen_t *);
-    struct can_socket *entry = find(fd);
+    struct can_socket *entry = socket_of(fd);
     if (!entry) return REAL(getsockname_t, "getsockname")(fd, address, length);
     write_address(entry, address, length);
     return 0;
@@ -262,7 +213,7 @@ static int set_option(struct can_socket *entry, int name, const void *value, soc
 int setsockopt(int fd, int level, int name, const void *value, socklen_t size) {
     typedef int (*setsockopt_t)(int, int, int, const void *, socklen_t);
     int drops = level == SOL_SOCKET && name == SO_RXQ_OVFL;
-    struct can_socket *entry = level == SOL_CAN_RAW || drops ? find(fd) : NULL;
+    struct can_socket *entry = level == SOL_CAN_RAW || drops ? socket_of(fd) : NULL;
     if (!entry) return REAL(setsockopt_t, "setsockopt")(fd, level, name, value, size);
     int error = drops ? set_flag(entry, DROPS, value, size) : set_option(entry, name, value, size);
     if (error) {
@@ -284,10 +235,11 @@ static int copy_out(void *value, socklen_t *size, const void *from, size_t lengt
 
 int getsockopt(int fd, int level, int name, void *value, socklen_t *size) {
     typedef int (*getsockopt_t)(int, int, int, void *, socklen_t *);
-    struct can_socket *entry = level == SOL_CAN_RAW || level == SOL_SOCKET ? find(fd) : NULL;
+    struct can_socket *entry = level == SOL_CAN_RAW || level == SOL_SOCKET ? socket_of(fd) : NULL;
     int answer = 0;
     if (entry && level == SOL_SOCKET && (name == SO_DOMAIN || name == SO_TYPE || name == SO_PROTOCOL)) {
-        answer = name == SO_DOMAIN ? AF_CAN : name == SO_TYPE ? SOCK_RAW : CAN_RAW;
+        int type = entry->broadcast ? SOCK_DGRAM : SOCK_RAW, protocol = entry->broadcast ? CAN_BCM : CAN_RAW;
+        answer = name == SO_DOMAIN ? AF_CAN : name == SO_TYPE ? type : protocol;
         return copy_out(value, size, &answer, sizeof answer);
     }
     if (entry && level == SOL_SOCKET && name == SO_RXQ_OVFL) {
@@ -319,7 +271,7 @@ static int take_mark(void *data, ssize_t received) {
 ssize_t recvfrom(int fd, void *data, size_t size, int flags, struct sockaddr *address, socklen_t *length) {
     typedef ssize_t (*recvfrom_t)(int, void *, size_t, int, struct sockaddr *, socklen_t *);
     recvfrom_t real = REAL(recvfrom_t, "recvfrom");
-    struct can_socket *entry = find(fd);
+    struct can_socket *entry = socket_of(fd);
     if (!entry) return real(fd, data, size, flags, address, length);
     ssize_t received = real(fd, data, size, flags, NULL, NULL);
     if (received >= 0) write_address(entry, address, length);
@@ -375,7 +327,7 @@ static int wants_drops(const struct can_socket *entry, const struct msghdr *mess
 ssize_t recvmsg(int fd, struct msghdr *message, int flags) {
     typedef ssize_t (*recvmsg_t)(int, struct msghdr *, int);
     recvmsg_t real = REAL(recvmsg_t, "recvmsg");
-    struct can_socket *entry = find(fd);
+    struct can_socket *entry = socket_of(fd);
     if (!entry) return real(fd, message, flags);
     void *address = message->msg_name;
     socklen_t length = message->msg_namelen;
@@ -395,40 +347,12 @@ ssize_t recvmsg(int fd, struct msghdr *message, int flags) {
     return received;
 }
 
-/* Answers what programs ask about an interface; -1 where it is not one of ours. */
-static int ask_interface(unsigned long request, struct ifreq *asked) {
-    int k = request == SIOCGIFNAME ? interface_of_index(asked->ifr_ifindex) : interface_of_name(asked->ifr_name);
-    if (k < 0) return -1;
-    switch (request) {
-    case SIOCGIFNAME: memcpy(asked->ifr_name, interfaces[k].name, IFNAMSIZ); return 0;
-    case SIOCGIFINDEX: asked->ifr_ifindex = FIRST_INDEX + k; return 0;
-    case SIOCGIFFLAGS: asked->ifr_flags = IFF_UP | IFF_RUNNING | IFF_NOARP; return 0;
-    case SIOCGIFMTU: asked->ifr_mtu = CAN_MTU; return 0;
-    case SIOCGIFHWADDR: asked->ifr_hwaddr.sa_family = ARPHRD_CAN; return 0;
-    default: return -1;
-    }
-}
-
 int ioctl(int fd, unsigned long request, ...) {
     typedef int (*ioctl_t)(int, unsigned long, void *);
     va_list arguments;
     va_start(arguments, request);
     void *argument = va_arg(arguments, void *);
     va_end(arguments);
-    int about_interface = request == SIOCGIFNAME || request == SIOCGIFINDEX || request == SIOCGIFFLAGS ||
-                          request == SIOCGIFMTU || request == SIOCGIFHWADDR;
-    if (about_interface && argument && ask_interface(request, argument) == 0) return 0;
-    return REAL(ioctl_t, "ioctl")(fd, request, argument);
-}
-
-unsigned if_nametoindex(const char *name) {
-    typedef unsigned (*if_nametoindex_t)(const char *);
-    int k = interface_of_name(name);
-    return k >= 0 ? (unsigned)(FIRST_INDEX + k) : REAL(if_nametoindex_t, "if_nametoindex")(name);
-}
-
-char *if_indextoname(unsigned index, char name[IFNAMSIZ]) {
-    typedef char *(*if_indextoname_t)(unsigned, char *);
-    int k = interface_of_index((int)index);
-    return k >= 0 ? memcpy(name, interfaces[k].name, IFNAMSIZ) : REAL(if_indextoname_t, "if_indextoname")(index, name);
+    int answer = interface_ioctl(request, argument);
+    return answer <= 0 ? answer : REAL(ioctl_t, "ioctl")(fd, request, argument);
 }

@@ -16,8 +16,8 @@ NETWORK_FILE = Path(__file__).parents[3] / "hil" / "data" / "network.toml"
 class Wire:
     """The devices with nothing but frames and time between them and the test."""
 
-    def __init__(self, memory: Memory | None = None) -> None:
-        self.vehicle = Flywheels()
+    def __init__(self, memory: Memory | None = None, vehicle: Flywheels | None = None) -> None:
+        self.vehicle = Flywheels() if vehicle is None else vehicle
         self.sent: list[tuple[int, bytes]] = []
         self.devices = DeviceNetwork(
             self.vehicle,

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 SERVICES = (0x000, 0x080, 0x100, 0x180, 0x200, 0x300, 0x400, 0x500, 0x580, 0x600, 0x700, 0x7E0)
 SDO_COMMANDS = (0x00, 0x01, 0x10, 0x20, 0x21, 0x23, 0x2B, 0x2F, 0x40, 0x60, 0x70, 0x80, 0x81, 0xA0, 0xA1, 0xA2, 0xA3)
 SDO_COMMANDS += (0xA4, 0xC0, 0xC1, 0xC2, 0xC6, 0xE0)
+LSS_COMMANDS = (0x04, 0x04, 0x11, 0x11, 0x13, 0x17, *range(0x40, 0x44), *range(0x46, 0x4D), 0x51, *range(0x5A, 0x5F))
+IDENTITIES = (bytes(6), b"\x00\xff\x7f\x00\x00\x00", b"\x00\x26\x20\x80\x00\x00", b"\xff\xff\xff\x1f\x00\x01")
 OBJECTS = (0x1003, 0x1005, 0x1006, 0x1008, 0x100C, 0x100D, 0x1010, 0x1011, 0x1014, 0x1015, 0x1016, 0x1017, 0x1019)
 OBJECTS += (0x1021, 0x1029, 0x1400, 0x1401, 0x1600, 0x1800, 0x1801, 0x1A00, 0x1A01, 0x2000, 0x6007, 0x6040, 0x6060)
 OBJECTS += (0x6071, 0x607A, 0x60FF, 0x6001, 0x6003, 0x6200)
@@ -44,6 +46,8 @@ def sensible(rng: random.Random) -> tuple[int, bytes]:
         return 0x200 + rng.randint(1, 6), struct.pack("<Hh", rng.choice((0x06, 0x07, 0x0F, 0x80, 0x02)), 100)
     if kind < 0.35:
         return 0x700 + rng.choice((1, 5, 0x7F)), b"\x05"
+    if kind < 0.38:
+        return 0x7E5, bytes((rng.choice(LSS_COMMANDS), rng.choice((0, 0, 1, 5, 77, 0xFF)))) + rng.choice(IDENTITIES)
     head = struct.pack("<BHB", rng.choice(SDO_COMMANDS), rng.choice(OBJECTS), rng.choice((0, 0, 1, 2, 5, 6)))
     return 0x600 + rng.randint(1, 6), head + rng.choice(VALUES)
 
@@ -88,8 +92,23 @@ def objects_alive() -> int:
     return len(gc.get_objects())
 
 
+def give_back_its_node_id(wire, node_id: int, product: int) -> None:
+    """LSS may have made every device another node; it is still found by its identity."""
+    wire.send(0x7E5, b"\x04" + bytes(7))
+    for command, number in enumerate((0x7FFF0001, product, 0x00010000, 0x20260000 + node_id), 0x40):
+        wire.send(0x7E5, struct.pack("<BI3x", command, number))
+    for command in (0x11, 0x17):
+        frames = wire.send(0x7E5, bytes((command, node_id)) + bytes(6))
+        assert (0x7E4, bytes((command,)) + bytes(7)) in frames
+    wire.send(0x7E5, b"\x04" + bytes(7))
+    wire.devices.power_off(node_id)
+    wire.devices.power_on(node_id)
+
+
 def everything_works(wire) -> None:
     """After new supply, and without what may have been stored, every node boots, answers, and the drives run."""
+    for node_id, product in ((1, 0x402), (2, 0x402), (3, 0x402), (4, 0x402), (5, 0x406), (6, 0x406)):
+        give_back_its_node_id(wire, node_id, product)
     for node_id in range(1, 7):
         wire.nmt(0x80)
         wire.send(0x600 + node_id, b"\x80" + bytes(7))

@@ -140,9 +140,9 @@ def expected_mode_bits(before: str, state: str, mode: Mode, controlword: int) ->
         return 0
     if not controlword & 0x10:
         return MODE_BITS[mode]
-    # Bit 4 starts homing whenever it is high; a new set-point needs its edge while operation is enabled.
+    # Homing and new set-points need the rising edge of bit 4 while operation is enabled.
     edge = before == "OPERATION_ENABLED"
-    return {Mode.HOMING: 0x1400, Mode.PROFILE_POSITION: 0x1400 if edge else 0x0400}.get(mode, MODE_BITS[mode])
+    return 0x1400 if edge and mode in (Mode.HOMING, Mode.PROFILE_POSITION) else MODE_BITS[mode]
 
 
 HALTS = {

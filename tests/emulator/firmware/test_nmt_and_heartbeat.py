@@ -101,6 +101,7 @@ def test_a_drive_keeps_the_error_until_its_fault_is_reset(wire) -> None:
     assert emergencies(wire.wait(1.1), 4) == [0x8130]
     assert emergencies(wire.send(0x747, b"\x05"), 4) == []
     assert wire.read(4, 0x1001) & 0x01
+    wire.nmt(0x01, 4)
     wire.write(4, 0x6040, 0, b"\x00\x00")
     frames = wire.send(0x604, b"\x2b\x40\x60\x00\x80\x00\x00\x00")
     assert emergencies(frames, 4) == [0x0000]

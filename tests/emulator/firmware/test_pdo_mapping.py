@@ -77,7 +77,9 @@ REFUSED = {
     "an object that is not there": (entry(0x5555, 0, 16), 0x06020000),
     "an object that must not be mapped": (entry(0x1018, 1, 32), 0x06040041),
     "a length that is not the object's": (entry(0x6041, 0, 8), 0x06040042),
-    "a dummy in a TPDO": (entry(0x0005, 0, 8), 0x06020000),
+    "a sub-index that is not there": (entry(0x6041, 1, 16), 0x06090011),
+    "a dummy in a TPDO": (entry(0x0005, 0, 8), 0x06040041),
+    "a process output in a TPDO": (entry(0x6071, 0, 16), 0x06040041),
 }
 
 
@@ -188,6 +190,8 @@ def test_transmission_type_0_sends_at_the_sync_after_an_event(wire) -> None:
 def test_an_event_driven_tpdo_goes_out_when_the_state_changes(wire) -> None:
     wire.write(1, 0x1400, 2, b"\xff")
     wire.nmt(0x01, 1)
+    # The TPDO that says "operational" begins the inhibit time, 10 ms as delivered.
+    wire.wait(0.011)
     frames = wire.send(0x201, struct.pack("<Hh", 0x06, 0))
     assert [data[:2] for can_id, data in frames if can_id == 0x181] == [b"\x21\x02"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -88,10 +89,40 @@ def test_a_client_that_reads_again_is_told_how_many_frames_it_has_lost(hub: Unix
         for number in range(5000):
             hub.send(numbered(number))
         read = numbers(bus, hub)
-        assert bus.dropped == 0
+        assert bus.dropped == 5000 - len(read) > 0
         hub.send(numbered(5000))
         assert numbers(bus, hub) == [5000]
+        assert bus.dropped == 5000 - len(read)
+
+
+def test_a_client_that_has_caught_up_is_told_even_when_nothing_comes_any_more(
+    hub: UnixHub, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with join(hub, tmp_path) as bus:
+        for number in range(5000):
+            hub.send(numbered(number))
+        read = numbers(bus, hub)
+        assert numbers(bus, hub) == []
         assert bus.dropped == 5000 - len(read) > 0
+        assert f"{bus.dropped} frames are lost" in caplog.text
+        for number in range(3):
+            hub.send(numbered(number))
+        assert numbers(bus, hub) == [0, 1, 2]
+        assert caplog.text.count("lost") == 1
+
+
+def test_who_has_lost_frames_and_left_is_remembered(hub: UnixHub, tmp_path: Path) -> None:
+    sleeper, reader = join(hub, tmp_path), join(hub, tmp_path)
+    for number in range(5000):
+        hub.send(numbered(number))
+        assert reader.recv(1.0) is not None
+    lost = hub.listeners[0]
+    sleeper.shutdown()
+    reader.shutdown()
+    while hub.listeners:
+        hub.recv(0.01)
+    assert [(one.pid, one.dropped, one.gone) for one in hub.departed] == [(os.getpid(), lost.dropped, True)]
+    assert lost.program == Path("/proc/self/comm").read_text().strip()
 
 
 def test_a_second_of_a_full_bus_waits_for_a_client_that_pauses(tmp_path: Path) -> None:

@@ -107,11 +107,11 @@ def test_defaults_lie_within_the_limits(name: str) -> None:
 @pytest.mark.parametrize("name", ["drive.eds", "encoder.eds"])
 def test_default_mappings_are_mappable(name: str) -> None:
     dictionary = Dictionary(DATA / name, 5)
-    for base in (0x1600, 0x1A00):
+    for base, mappable in ((0x1600, dictionary.receivable), (0x1A00, dictionary.transmittable)):
         for index in range(base, base + 4):
             if index in dictionary:
                 entries = [dictionary.value(index, k) for k in range(1, dictionary.value(index, 0) + 1)]
-                assert {(entry >> 16, entry >> 8 & 0xFF) for entry in entries} <= dictionary.mappable
+                assert {(entry >> 16, entry >> 8 & 0xFF) for entry in entries} <= mappable
 
 
 def test_a_folder_has_the_eds_of_every_device_and_the_dcf_of_every_node(described: Network, tmp_path: Path) -> None:

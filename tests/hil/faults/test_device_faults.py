@@ -106,6 +106,20 @@ def test_a_drive_trips_with_the_code_that_was_asked_for(sight) -> None:
     assert sight.read(4, 0x6041) & 0x4F == 0x08
 
 
+def test_a_trip_in_fault_is_told_and_one_without_supply_is_found_at_boot(sight) -> None:
+    sight.bench.faults.add("trip@drive_rr:code=0x3210")
+    sight.frames.clear()
+    sight.bench.faults.add("trip@drive_rr:code=0x2310")
+    assert [data[:2] for data in sight.seen(0x084)] == [b"\x10\x23"]
+    sight.frames.clear()
+    sight.bench.faults.add("power@drive_fl:to=0.2s")
+    sight.bench.faults.add("trip@drive_fl:code=0x7305")
+    assert sight.seen(0x081) == []
+    sight.wait(0.3)
+    assert [data[:2] for data in sight.seen(0x081)] == [b"\x05\x73"]
+    assert sight.read(1, 0x6041) & 0x4F == 0x08
+
+
 def test_a_stuck_encoder_stays_and_then_shows_where_the_shaft_has_got_to(sight) -> None:
     drive = sight.bench.vehicle.drives[0]
     drive.speed, drive.friction = 2 * math.pi, 1e-12

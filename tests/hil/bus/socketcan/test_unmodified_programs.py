@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+import pty
 import re
+import select
 import shutil
 import signal
+import struct
 import subprocess
 import sys
+import termios
 import threading
 import time
 from collections.abc import Iterator
@@ -49,12 +54,19 @@ class Served:
 
     def __init__(self, path: Path, library: Path) -> None:
         self.path = path
-        self.environ = environment(os.environ, library, {"can0": path})
+        self.library = library
+        self.interfaces = {"can0": path}
+        self.environ = environment(os.environ, library, self.interfaces)
         self.hub = UnixHub(path)
         self.server = VehicleServer(Flywheels(), self.hub, WallClock())
         self._done = threading.Event()
         self._thread = threading.Thread(target=self.server.serve, args=(self._done.is_set,))
         self._thread.start()
+
+    def add(self, name: str, path: Path) -> None:
+        """Another interface for the programs to come."""
+        self.interfaces[name] = path
+        self.environ = environment(os.environ, self.library, self.interfaces)
 
     def run(self, *command: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(command, env=self.environ, capture_output=True, text=True, timeout=PATIENCE, check=False)
@@ -349,6 +361,307 @@ def test_a_master_written_in_c_runs_as_it_was_compiled(served: Served, tmp_path:
     subprocess.run(["gcc", str(source), "-o", str(program)], check=True)
     done = served.run(str(program))
     assert (done.returncode, done.stdout) == (0, "582 8 9201\n")
+
+
+EVERY_CALL = """
+#define _GNU_SOURCE
+#include <errno.h>
+#include <fcntl.h>
+#include <ifaddrs.h>
+#include <linux/can.h>
+#include <linux/can/raw.h>
+#include <linux/if_packet.h>
+#include <linux/sockios.h>
+#include <net/if.h>
+#include <net/if_arp.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <sys/uio.h>
+#include <unistd.h>
+static struct can_frame frame = {.can_id = 0x555, .can_dlc = 1};
+static void said(const char *what, long result) {
+    printf("%s %ld %s\\n", what, result, result < 0 ? strerrorname_np(errno) : "");
+}
+static int bound(const char *name) {
+    int s = socket(PF_CAN, SOCK_RAW, CAN_RAW);
+    struct sockaddr_can address = {.can_family = AF_CAN, .can_ifindex = if_nametoindex(name)};
+    return bind(s, (struct sockaddr *)&address, sizeof address) ? -1 : s;
+}
+static void sizes(void) {
+    int s = bound("can0");
+    struct can_frame long_frame = {.can_id = 0x555, .can_dlc = 9};
+    struct canfd_frame fd_frame = {.can_id = 0x555, .len = 12};
+    struct iovec parts[2] = {{&frame, 8}, {(char *)&frame + 8, 8}};
+    struct msghdr message = {.msg_iov = parts, .msg_iovlen = 2};
+    said("frame", write(s, &frame, sizeof frame));
+    said("short", write(s, &frame, 15));
+    said("nothing", send(s, &frame, 0, 0));
+    said("dlc 9", write(s, &long_frame, sizeof long_frame));
+    said("fd frame", send(s, &fd_frame, sizeof fd_frame, 0));
+    said("in parts", writev(s, parts, 2));
+    said("one part", writev(s, parts, 1));
+    said("message", sendmsg(s, &message, 0));
+    close(s);
+    said("unbound", write(socket(PF_CAN, SOCK_RAW, CAN_RAW), &frame, sizeof frame));
+}
+static void addresses(void) {
+    int s = bound("can0"), free_one = socket(PF_CAN, SOCK_RAW, CAN_RAW);
+    struct sockaddr_can other = {.can_family = AF_CAN, .can_ifindex = if_nametoindex("can1")}, nobody = other;
+    nobody.can_ifindex = 4711;
+    frame.can_id = 0x556;
+    said("to another", sendto(s, &frame, sizeof frame, 0, (struct sockaddr *)&other, sizeof other));
+    said("from unbound", sendto(free_one, &frame, sizeof frame, 0, (struct sockaddr *)&other, sizeof other));
+    said("to nobody", sendto(s, &frame, sizeof frame, 0, (struct sockaddr *)&nobody, sizeof nobody));
+}
+static void duplicates(void) {
+    int s = bound("can0"), copies[3] = {dup(s), dup2(s, 77), fcntl(s, F_DUPFD_CLOEXEC, 90)};
+    struct can_filter filter = {.can_id = 0x123, .can_mask = 0x7FF};
+    struct sockaddr_can name = {0};
+    socklen_t size = sizeof name;
+    close(s);
+    for (int k = 0; k < 3; k++) {
+        said("option", setsockopt(copies[k], SOL_CAN_RAW, CAN_RAW_FILTER, &filter, sizeof filter));
+        said("name", getsockname(copies[k], (struct sockaddr *)&name, &size) ? -1 : name.can_family == AF_CAN);
+        said("length", write(copies[k], &frame, 3));
+        close(copies[k]);
+    }
+    said("closed", setsockopt(copies[0], SOL_CAN_RAW, CAN_RAW_FILTER, &filter, sizeof filter));
+    int pipes[2];
+    said("pipe", pipe(pipes));
+    said("other", write(pipes[1], "abc", 3));
+}
+static void interfaces(void) {
+    struct ifaddrs *list, *second;
+    struct if_nameindex *names = if_nameindex();
+    if (getifaddrs(&list) || getifaddrs(&second)) return;
+    for (struct ifaddrs *one = list; one; one = one->ifa_next)
+        if (strncmp(one->ifa_name, "can", 3) == 0) {
+            struct sockaddr_ll *link = (struct sockaddr_ll *)one->ifa_addr;
+            printf("%s %d %d\\n", one->ifa_name, link->sll_hatype == ARPHRD_CAN, (one->ifa_flags & IFF_UP) != 0);
+        }
+    freeifaddrs(list);
+    freeifaddrs(second);
+    for (struct if_nameindex *one = names; one->if_name; one++)
+        if (strncmp(one->if_name, "can", 3) == 0 || strcmp(one->if_name, "lo") == 0) printf("%s\\n", one->if_name);
+    if_freenameindex(names);
+    struct ifreq asked = {.ifr_name = "can1"};
+    said("ethtool", ioctl(socket(AF_INET, SOCK_DGRAM, 0), SIOCETHTOOL, &asked));
+}
+static void until_down(void) {
+    int s = bound("can1"), pipes[2];
+    frame.can_id = 0x557;
+    while (write(s, &frame, sizeof frame) > 0) usleep(10000);
+    said("down", -1);
+    said("send", send(s, &frame, sizeof frame, 0));
+    syscall(SYS_close, s);
+    /* The number is given out again behind the library's back. */
+    said("again", pipe(pipes) == 0 && pipes[0] == s ? 1 : 0);
+    dup2(pipes[1], 50);
+    said("frame in a pipe", write(pipes[1], &frame, sizeof frame));
+    said("text in a pipe", write(pipes[1], "abc", 3));
+}
+int main(int count, char **words) {
+    void (*parts[])(void) = {sizes, addresses, duplicates, interfaces, until_down};
+    parts[count > 1 ? words[1][0] - '0' : 0]();
+    return 0;
+}
+"""
+
+FRAME_SIZE = 16
+
+
+@pytest.fixture(scope="session")
+def every_call(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    needs("gcc")
+    folder = tmp_path_factory.mktemp("program")
+    (folder / "calls.c").write_text(EVERY_CALL)
+    subprocess.run(["gcc", str(folder / "calls.c"), "-o", str(folder / "calls")], check=True)
+    return folder / "calls"
+
+
+def said(served: Served, program: Path, part: int) -> list[str]:
+    done = served.run(str(program), str(part))
+    assert done.returncode == 0, done.stderr
+    return [line.strip() for line in done.stdout.splitlines()]
+
+
+def test_frames_are_looked_at_as_the_kernel_does(served: Served, every_call: Path) -> None:
+    """net/can/raw.c: EINVAL for another size and for more than eight bytes, ENXIO for a socket without an interface."""
+    with UnixBus(served.path) as bus:
+        assert said(served, every_call, 0) == [
+            f"frame {FRAME_SIZE}",
+            "short -1 EINVAL",
+            "nothing -1 EINVAL",
+            "dlc 9 -1 EINVAL",
+            "fd frame -1 EINVAL",
+            f"in parts {FRAME_SIZE}",
+            "one part -1 EINVAL",
+            f"message {FRAME_SIZE}",
+            "unbound -1 ENXIO",
+        ]
+        heard = [message for _ in range(3) if (message := bus.recv(PATIENCE)) is not None]
+        assert [(one.arbitration_id, one.dlc) for one in heard] == [(0x555, 1)] * 3
+        assert bus.recv(0.2) is None
+
+
+def test_an_address_names_the_interface(served: Served, every_call: Path, tmp_path: Path) -> None:
+    with UnixHub(tmp_path / "can1") as other:
+        served.add("can1", tmp_path / "can1")
+        assert said(served, every_call, 1) == [
+            f"to another {FRAME_SIZE}",
+            f"from unbound {FRAME_SIZE}",
+            "to nobody -1 ENXIO",
+        ]
+        heard = [message for _ in range(4) if (message := other.recv(1.0)) is not None]
+        assert [one.arbitration_id for one in heard] == [0x556, 0x556]
+
+
+def test_a_duplicate_is_the_same_socket_and_a_number_given_out_again_is_not(served: Served, every_call: Path) -> None:
+    assert said(served, every_call, 2) == ["option 0", "name 1", "length -1 EINVAL"] * 3 + [
+        "closed -1 EBADF",
+        "pipe 0",
+        "other 3",
+    ]
+
+
+def test_interfaces_are_in_every_list(served: Served, every_call: Path, tmp_path: Path) -> None:
+    served.add("can1", tmp_path / "can1")
+    assert said(served, every_call, 3) == ["can0 1 1", "can1 1 1", "lo", "can0", "can1", "ethtool -1 EOPNOTSUPP"]
+
+
+def test_a_hub_that_goes_is_a_network_that_is_down_and_no_signal(
+    served: Served, every_call: Path, tmp_path: Path
+) -> None:
+    served.add("can1", tmp_path / "can1")
+    with UnixHub(tmp_path / "can1") as other:
+        running = served.start(str(every_call), "4")
+        while (message := other.recv(0.1)) is None or message.arbitration_id != 0x557:
+            assert running.poll() is None
+    written = running.communicate(timeout=PATIENCE)[0].splitlines()
+    assert [line.strip() for line in written] == [
+        "down -1 ENETDOWN",
+        "send -1 ENETDOWN",
+        "again 1",
+        f"frame in a pipe {FRAME_SIZE}",
+        "text in a pipe 3",
+    ]
+
+
+INTERFACES = """
+import pathlib, socket
+print([name for _, name in socket.if_nameindex() if name.startswith("can")])
+print([line.split(":")[0].strip() for line in pathlib.Path("/proc/net/dev").read_text().splitlines() if "can" in line])
+bus = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+bus.bind(("can1",))
+copy = bus.dup()
+bus.close()
+copy.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, 1)
+copy.send(bytes.fromhex("5505000001000000") + bytes(8))
+print(copy.recv(16)[:4].hex(), copy.getsockname())
+"""
+
+
+def test_python_finds_the_interfaces_and_a_duplicate_takes_options(served: Served, tmp_path: Path) -> None:
+    done = threading.Event()
+    with UnixHub(tmp_path / "can1") as other:
+        served.add("can1", tmp_path / "can1")
+
+        def serve() -> None:
+            while not done.is_set():
+                other.recv(0.01)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        try:
+            answer = served.run(sys.executable, "-c", INTERFACES)
+        finally:
+            done.set()
+            thread.join()
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout.splitlines() == ["['can0', 'can1']", "['can0', 'can1']", "55050000 ('can1',)"]
+
+
+PSUTIL = """
+import psutil
+found = psutil.net_if_stats()["can0"]
+print(found.isup, found.mtu)
+"""
+
+
+def test_psutil_sees_an_interface_that_is_up(served: Served) -> None:
+    """canopen-monitor waits until psutil.net_if_stats() has its interface, and is up."""
+    pytest.importorskip("psutil")
+    answer = served.run(sys.executable, "-c", PSUTIL)
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout.split() == ["True", "16"]
+
+
+def on_a_terminal(command: list[str], environ: dict[str, str], until: str) -> str:
+    """What a program writes to a terminal of 120 columns, until some text is there."""
+    process, terminal = pty.fork()
+    if process == 0:
+        os.execvpe(command[0], command, {**environ, "TERM": "xterm"})
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 120, 0, 0))
+    written, deadline = b"", time.monotonic() + PATIENCE
+    try:
+        while until not in written.decode(errors="replace") and time.monotonic() < deadline:
+            if select.select([terminal], [], [], 0.1)[0]:
+                written += os.read(terminal, 65536)
+    except OSError:
+        # It has ended, and its terminal with it.
+        pass
+    finally:
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+        os.close(terminal)
+    return written.decode(errors="replace")
+
+
+def test_canopen_monitor_shows_who_is_alive(served: Served) -> None:
+    """It asks psutil whether its interface is up, and draws on a terminal (pip install canopen-monitor)."""
+    if shutil.which("canopen-monitor") is None:
+        pytest.skip("canopen-monitor is not installed")
+    assert served.run("cansend", "can0", "602#2B171000F4010000").returncode == 0
+    shown = on_a_terminal(["canopen-monitor", "-i", "can0"], served.environ, "Pre-operational")
+    assert "0x2" in shown
+    assert "Pre-operational" in shown
+
+
+def test_two_buses_are_two_interfaces_of_one_program(served: Served, tmp_path: Path) -> None:
+    second = Served(tmp_path / "second", served.library)
+    try:
+        served.add("can1", second.path)
+        second.server.faults.add("power@drive_fl")
+        dump = listening(served, "-n", "1", "-L", "can0,580:780")
+        other = second.hub.clients
+        silent = served.start("candump", "-T", "1500", "-L", "can1,580:780")
+        while second.hub.clients == other:
+            time.sleep(0.01)
+        for interface in ("can0", "can1"):
+            assert served.run("cansend", interface, "601#4000100000000000").returncode == 0
+        assert "can0 581#" in dump.communicate(timeout=PATIENCE)[0]
+        assert silent.communicate(timeout=PATIENCE)[0] == ""
+    finally:
+        second.close()
+
+
+def test_isotp_says_that_it_is_not_there(served: Served) -> None:
+    """A state machine with timers in the kernel, which no client of a hub can have."""
+    needs("isotpsend")
+    done = subprocess.run(
+        ["isotpsend", "-s", "601", "-d", "581", "can0"],
+        env=served.environ,
+        input="01 02",
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert "Protocol not supported" in done.stderr
 
 
 def test_other_sockets_of_the_program_stay_what_they_are(served: Served) -> None:
