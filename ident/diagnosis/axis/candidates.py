@@ -37,7 +37,8 @@ HELD_FORCE: Final = 1 / 24
 """Of T²/M, the compliance that an effort seems to have that is held over the sample interval: its spectrum is that of
 the effort times a sinc, 1 - (ωT)²/24."""
 SAMPLED: Final = 1 / 8
-"""Of T²/M, the compliance up to which sampling may be what it is: three times that of an effort that is held."""
+"""Of T²/M, the compliance up to which sampling may be what it is: three times that of an effort that is held. Errors of
+the position make negative ones, up to all of it."""
 BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
 """Tried first, over the range of the position."""
 GRID: Final = 0.3
@@ -149,7 +150,7 @@ def _elasticity(axis: AxisModel) -> Candidate:
     tried = [share * axis.bandwidth for share in RESONANCES]
     price = math.log(len(tried))
     candidate = shaped_by(axis, EffectName.ELASTICITY, parameters, series, tried, price=price, scale=heavier)
-    return replace(candidate, negligible=(SAMPLED * sampling, SAMPLED * sampling), spread=(HELD_FORCE * sampling, 0.0))
+    return replace(candidate, negligible=(sampling, SAMPLED * sampling), spread=(HELD_FORCE * sampling, 0.0))
 
 
 def _backlash(axis: AxisModel) -> Candidate:

@@ -20,7 +20,6 @@ from ident.diagnosis.axis.reference import (
     axis_signals,
     own_columns,
     refuse_other_axes,
-    turning,
 )
 from ident.diagnosis.delays import HELD
 from ident.diagnosis.law.dependence import Dependence, across
@@ -40,8 +39,6 @@ LOW_SPEED = 0.15
 STEP = "motion"
 LAG = "lag"
 """Parameter of the baseline: of a motion behind its effort, by sampling."""
-TURN = "turn"
-"""Parameter of the baseline: of dry friction behind the direction of the velocity, which filters and sticking make."""
 SURELY = 2.0
 """Standard deviations by which a lag must exceed what sampling explains."""
 
@@ -50,7 +47,7 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
     """Rows M a + Fv v + Fc sign(v) + offset = effort of every axis of the records, and what might be missing in them.
 
     With several axes, the acceleration of each stands in the rows of all: inertia couples them, and that is no gap.
-    So do, in its own rows, a lag of each axis that sampling can explain, and one of its dry friction.
+    So does, in its own rows, a lag of each axis that sampling can explain.
 
     Raises:
         RecordError: the records do not have the same axes, or not those of the reference.
@@ -68,7 +65,7 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
 
 def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]], list[Dependence]]:
     period = with_repeats(signals.record)
-    scales, width = reference.scales, len(PARAMETERS) + len(reference.scales)
+    scales, width = reference.scales, len(PARAMETERS) + len(reference.scales) - 1
     first = np.cumsum([0, *(width + (scale.hold is not None) for scale in scales)]).tolist()
     models = [_model(signals, index, scale, first[index]) for index, scale in enumerate(scales)]
     baselines = _baselines(models, signals, reference.scales)
@@ -151,7 +148,6 @@ def _baseline_names(axes: Sequence[AxisSignals], scales: Sequence[Scale]) -> lis
         named += [(axis.named(name), PARAMETER_UNITS[axis.kind][name]) for name in PARAMETERS]
         named += [(f"M_{axis.name}_{other.name}", inertia) for other in axes if other is not axis]
         named += [(axis.named(LAG), "samples")] if scale.hold is not None else []
-        named += [(axis.named(TURN), "samples")]
     return named
 
 
@@ -162,7 +158,7 @@ def _baselines(models: Sequence[AxisModel], signals: Signals, scales: Sequence[S
         dt = model.sample_time
         late = [dt * differentiate(model.effort, dt, SEVEN)] if scale.hold is not None else []
         columns = own_columns(signals.motions, index)
-        own.append(np.column_stack([columns, *late, turning(model.motion, scale.values)]))
+        own.append(np.column_stack([columns, *late]))
     return [
         np.hstack([columns if place == index else np.zeros_like(columns) for place, columns in enumerate(own)])
         for index in range(len(own))

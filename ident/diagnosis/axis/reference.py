@@ -50,6 +50,7 @@ class Scale:
         reach: range of its position [m or rad].
         hold: sample intervals by which its motion follows its effort as recorded, if sampling can be why: an effort
             that is held over the interval acts half of one late. None: longer, and a cause of its own.
+        lag: the same as a time, a first estimate [s].
     """
 
     values: Array
@@ -57,6 +58,7 @@ class Scale:
     slowest: float
     reach: float
     hold: float | None
+    lag: float
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,7 @@ class Signals:
         cutoff: of the position filter [rad/s].
         bandwidth: of the filter of the rows [rad/s].
         frictions: dry friction of the axes, of a first estimate; zero: not known [N or Nm].
+        lags: samples by which their motions follow their efforts, likewise.
     """
 
     record: AxisRecord
@@ -91,6 +94,7 @@ class Signals:
     cutoff: float
     bandwidth: float
     frictions: tuple[float, ...]
+    lags: tuple[int, ...]
 
     def filtered(self, values: Array) -> Array:
         """The filter of the positions and that of the rows, on everything alike."""
@@ -101,8 +105,10 @@ class Signals:
     def _untold(self) -> list[Untold]:
         memory, dt = 1 / (self.bandwidth * self.record.sample_time), self.record.sample_time
         found = []
-        for motion, friction in zip(self.motions, self.frictions, strict=True):
-            sticking = Sticking(motion.sticking, friction, sample_noise(motion.effort, dt), 1 / (self.cutoff * dt))
+        for motion, friction, lag in zip(self.motions, self.frictions, self.lags, strict=True):
+            sticking = Sticking(
+                np.roll(motion.sticking, -lag), friction, sample_noise(motion.effort, dt), 1 / (self.cutoff * dt)
+            )
             found.append(untold_while_sticking(sticking, motion.moving, self.filtered, memory))
         return found
 
@@ -189,8 +195,9 @@ def axis_signals(record: AxisRecord, cutoff: float, bandwidth: float, scales: Se
     if scales:
         axes = [_on_time(axis, scale, record.sample_time) for axis, scale in zip(record.axes, scales, strict=True)]
         record = replace(record, axes=tuple(axes))
+    lags = tuple(0 if one.hold is not None else round(one.lag / record.sample_time) for one in scales)
     motions = [axis_motion(record, axis, cutoff, bandwidth) for axis in record.axes]
-    return Signals(record, motions, cutoff, bandwidth, frictions)
+    return Signals(record, motions, cutoff, bandwidth, frictions, lags or (0,) * len(record.axes))
 
 
 def _on_time(axis: AxisSignals, scale: Scale, sample_time: float) -> AxisSignals:
@@ -226,24 +233,19 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
         )
     values = np.linalg.lstsq(left, right, rcond=None)[0]
     bend = np.concatenate([_lagging(one, index, values)[one.motions[index].moving] for one in signals])
-    turn = np.concatenate(
-        [
-            one.rows_of(index, turning(motion, values))[motion.moving]
-            for one, motion in zip(signals, motions, strict=True)
-        ]
-    )
-    *refined, lag, _ = np.linalg.lstsq(np.column_stack([left, bend, turn]), right, rcond=None)[0]
+    *refined, lag = np.linalg.lstsq(np.column_stack([left, bend]), right, rcond=None)[0]
     speed = max(float(np.percentile(np.abs(motion.velocity), 95)) for motion in motions)
     slowest = float(np.quantile(np.concatenate([np.abs(one.velocity[one.moving]) for one in motions]), NEAREST))
     reach = float(np.ptp(np.concatenate([motion.position for motion in motions])))
     sampled = abs(lag) <= LARGEST_HOLD
-    return Scale(np.array(refined) if sampled else values, speed, slowest, reach, float(lag) if sampled else None)
-
-
-def turning(motion: AxisMotion, values: Array) -> Array:
-    """What dry friction (N,) of a first estimate is more when it turns a sample later [N or Nm]."""
-    direction = np.sign(motion.velocity)
-    return np.asarray(values[PARAMETERS.index("Fc")] * np.diff(direction, prepend=direction[:1]) * -1.0)
+    return Scale(
+        np.array(refined) if sampled else values,
+        speed,
+        slowest,
+        reach,
+        float(lag) if sampled else None,
+        lag * record.sample_time,
+    )
 
 
 def _lagging(signals: Signals, index: int, values: Array) -> Array:

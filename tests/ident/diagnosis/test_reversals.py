@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from hil.exam.sources.machine import Machine
 from ident.diagnosis.axis.diagnose import diagnose_axis
-from ident.diagnosis.axis.reference import axis_reference, axis_signals, own_columns, turning
+from ident.diagnosis.axis.reference import axis_reference, axis_signals, own_columns
 from ident.diagnosis.axis.reversals import Sticking, Untold, untold_while_sticking
 from ident.diagnosis.delays import sprung
 from ident.diagnosis.names import EffectName
@@ -84,9 +84,8 @@ def seeming_spring(record: AxisRecord, cutoff: float, bandwidth: float) -> float
     motion, mass = signals.motions[0], float(np.linalg.lstsq(columns, effort, rcond=None)[0][0])
     spring = sprung(motion.linear[:, 0], 20 * bandwidth, record.sample_time)
     slope = signals.rows_of(0, np.gradient(own_columns(signals.motions, 0)[:, 0]))[motion.moving]
-    turn = signals.rows_of(0, turning(motion, np.array([mass, 0.0, 1.0, 0.0])))[motion.moving]
     row = signals.rows_of(0, mass * mass * spring)[motion.moving]
-    found = np.linalg.lstsq(np.column_stack([columns, slope, turn, row]), effort, rcond=None)[0]
+    found = np.linalg.lstsq(np.column_stack([columns, slope, row]), effort, rcond=None)[0]
     return float(found[-1] * mass / record.sample_time**2)
 
 
