@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hil.bench import control
-from hil.bus.listener import ListenerReport
+from hil.bus.report import ListenerReport
 from hil.bus.socketcan import build_library, environment, is_served
 from ident.errors import BusError
 from quasiomni.application import app, console, tell

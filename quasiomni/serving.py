@@ -16,7 +16,7 @@ from rich.text import Text
 
 from hil.bench.control import ControlServer, Injection, control_path
 from hil.bus.clock import WallClock
-from hil.bus.listener import ListenerReport
+from hil.bus.report import ListenerReport
 from hil.bus.unix import UnixHub
 from hil.campaign.folder import network_file_of
 from hil.network import load_network

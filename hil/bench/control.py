@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Protocol
 
-from hil.bus.listener import ListenerReport
+from hil.bus.report import ListenerReport
 from hil.bus.unix_paths import listen
 from ident.errors import BusError, UserError
 

@@ -6,11 +6,11 @@ import contextlib
 import socket
 import struct
 from collections import deque
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from hil.bus.packets import DROPS, FRAME_SIZE, Hello
+from hil.bus.report import ListenerReport
 
 ROOM: Final = 8192
 """Frames that the hub keeps for a client beside those in its socket: about a second of a full bus at 1 Mbit/s."""
@@ -20,25 +20,6 @@ _FLUSHED: Final = 64
 
 _BUFFER: Final = 1 << 20
 _CREDENTIALS: Final = struct.Struct("=iII")
-
-
-@dataclass(frozen=True)
-class ListenerReport:
-    """What became of the frames for one client.
-
-    Attributes:
-        pid: its process; 0 where the system does not say.
-        program: name of the process, empty where the system does not say.
-        waiting: frames that wait in the hub because its socket is full.
-        dropped: frames that it has lost because it did not read.
-        gone: it has left the bus.
-    """
-
-    pid: int
-    program: str
-    waiting: int
-    dropped: int
-    gone: bool = False
 
 
 class Listener:

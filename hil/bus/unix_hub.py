@@ -13,7 +13,7 @@ from typing import Final
 
 import can
 
-from hil.bus.listener import ROOM, Listener, ListenerReport
+from hil.bus.listener import ROOM, Listener
 from hil.bus.pacing import TURN, Pacing
 from hil.bus.packets import (
     ACKNOWLEDGEMENT,
@@ -25,6 +25,7 @@ from hil.bus.packets import (
     unpack_frame,
     unpack_hello,
 )
+from hil.bus.report import ListenerReport
 from hil.bus.unix_paths import BoundSocket, listen
 
 BURST: Final = 64
