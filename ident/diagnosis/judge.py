@@ -13,7 +13,7 @@ from ident.diagnosis.findings import Findings
 from ident.diagnosis.judgement import Judgement
 from ident.diagnosis.law.drift import repeats, time_law, without_drift, without_time
 from ident.diagnosis.law.learning import Designs
-from ident.diagnosis.law.stage import Law, next_law, with_law
+from ident.diagnosis.law.stage import Law, is_of_its_kind, next_law, with_law
 from ident.diagnosis.limits import Limits
 from ident.diagnosis.orders import with_orders
 from ident.diagnosis.problem import Problem
@@ -121,18 +121,25 @@ def _with_laws(
     laws: tuple[Law, ...] = ()
     for _ in range(MOST_LAWS):
         law = next_law(found.problems, found.regression, designs, found.taken)
-        if law is None:
+        # What a name of the same kind leaves is no law: without that name the law is all of it.
+        if law is None or _of_its_kind(law, found):
             break
         laws = (*laws, law)
         problems, regression, variant = with_law(found.problems, found.regression, law)
-        if any(problems[0].candidates[regression.owners[one]].excluded for one in found.taken):
-            # What a name of the same kind leaves: without that name the law is all of it.
-            break
         found = most_symmetric(search(problems, regression, (*found.taken, variant)))
+        if any(found.regression.owners[one] == law.number for one in found.taken):
+            others = _of_its_kind(law, found)
+            found = replace(found, taken=tuple(one for one in found.taken if one not in others))
         judgement = judged(found, laws)
         if not judgement.incomplete():
             break
     return judgement
+
+
+def _of_its_kind(law: Law, found: Shaped) -> list[int]:
+    """Variants taken that are names for functions of what a law is one of."""
+    candidates, owners = found.problems[0].candidates, found.regression.owners
+    return [one for one in found.taken if is_of_its_kind(candidates[owners[one]], law)]
 
 
 def _without(problem: Problem, refuted: Collection[str]) -> Problem:

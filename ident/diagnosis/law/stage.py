@@ -98,10 +98,7 @@ def next_law(problems: Sequence[Problem], regression: Regression, designs: Desig
 def with_law(
     problems: Sequence[Problem], regression: Regression, law: Law
 ) -> tuple[tuple[Problem, ...], Regression, int]:
-    """The problems and their rows with the law as one more candidate, and the number of its variant.
-
-    Names that are functions of the same at the same place are none beside it: it may be what they are.
-    """
+    """The problems and their rows with the law as one more candidate, and the number of its variant."""
     changed: list[Problem] = []
     series: list[Array | None] = []
     for problem in problems:
@@ -110,8 +107,7 @@ def with_law(
         series += columns
         variants = (Variant(columns),)
         candidate = Candidate(law.dependence.effect, law.dependence.where, (SCALE,), variants, least=0.0, learnt=True)
-        others = (replace(one, excluded=one.excluded or _is_another(one, law.dependence)) for one in problem.candidates)
-        changed.append(replace(problem, candidates=(*others, candidate)))
+        changed.append(replace(problem, candidates=(*problem.candidates, candidate)))
     rows = regression.rows
     end = rows.columns.shape[1]
     column = Column(law.number, 0, slice(end, end + 1), 0.0, (0.0, 0.0))
@@ -119,10 +115,10 @@ def with_law(
     return tuple(changed), Regression(changed[0], wider, regression.settings, regression.seed), len(rows.layout)
 
 
-def _is_another(candidate: Candidate, dependence: Dependence) -> bool:
-    """Whether a candidate is a function of what a law is one of."""
-    there = candidate.where == dependence.where
-    return there and function_of(candidate.effect) == (dependence.variable, dependence.partner)
+def is_of_its_kind(candidate: Candidate, law: Law) -> bool:
+    """Whether a named candidate is a function of what a law is one of: it may stand in its place, but not beside it."""
+    there = candidate.where == law.dependence.where
+    return there and function_of(candidate.effect) == (law.dependence.variable, law.dependence.partner)
 
 
 def _tried(learner: Learner, designs: Designs, index: int) -> Learnt | None:
