@@ -224,7 +224,7 @@ def _left_out(sources: Mapping[str, LeftOut]) -> list[str]:
     """Calibration of every world by the others."""
     if not sources:
         return []
-    titles = ("statements", "error", "as stated", "log score", "as stated", "base rate", "shift", "slope")
+    titles = ("statements", "error", "as stated", "log score", "as stated", "base rate", "a", "b")
     lines = ["## Calibrated on the other worlds", "", f"| | {' | '.join(titles)} |", "|---" * (1 + len(titles)) + "|"]
     for world, one in sources.items():
         errors, scores = (one.error, one.stated_error), (one.log_score, one.stated_log_score, one.base_log_score)

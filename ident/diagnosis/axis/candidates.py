@@ -36,7 +36,7 @@ rows hold the resonance itself, in a valley that is a tenth wide: from beside it
 HELD_FORCE: Final = 1 / 24
 """Of T²/M, the compliance that an effort seems to have that is held over the sample interval: its spectrum is that of
 the effort times a sinc, 1 - (ωT)²/24."""
-SAMPLED: Final = 1 / 8
+SAMPLED: Final = 3 * HELD_FORCE
 """Of T²/M, the compliance up to which sampling may be what it is: three times that of an effort that is held. Errors of
 the position make negative ones, up to all of it."""
 BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
@@ -45,6 +45,9 @@ GRID: Final = 0.3
 """Part of a gap by which it may lie between those tried."""
 LEAST_SHARE: Final = 0.1
 """Of the effort that must lie behind a play for it to be one."""
+
+LATE: Final = (EffectName.TIME_DELAY, AxisEffect.TORQUE_FILTER)
+"""What makes a motion follow its effort later than sampling does."""
 
 
 def axis_candidates(axis: AxisModel) -> list[Candidate]:

@@ -6,13 +6,12 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
-from ident.diagnosis.axis.model import AxisEffect
+from ident.diagnosis.axis.candidates import LATE
 from ident.diagnosis.axis.problem import axis_problem, delayed_axes
 from ident.diagnosis.axis.reference import Reference, Scale, axis_reference, refuse_other_axes
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judge import judge
 from ident.diagnosis.limits import Limits
-from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.split import split_problem
 from ident.records.axis_record import AxisRecord, AxisSignals
@@ -21,9 +20,6 @@ from ident.stages import Stage, untold
 LIMITS: Final = Limits(named=0.6, nearly=0.6, humble=True)
 """Of an axis. Its effort has little noise, beside which cogging and errors of its pitch always repeat, without a name:
 what they leave does not take the name from a cause that closes one and a half times as much, but makes it less sure."""
-
-LATE: Final = (EffectName.TIME_DELAY, AxisEffect.TORQUE_FILTER)
-"""What makes a motion follow its effort later than sampling does."""
 
 
 def diagnose_axis(

@@ -69,10 +69,7 @@ def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], lis
     first = np.cumsum([0, *(width + (scale.hold is not None) for scale in scales)]).tolist()
     models = [_model(signals, index, scale, first[index]) for index, scale in enumerate(scales)]
     baselines = _baselines(models, signals, reference.scales)
-    blocks = [
-        _block(signals.record, model, columns, period, _features(signals.motions))
-        for model, columns in zip(models, baselines, strict=True)
-    ]
+    blocks = [_block(signals, model, columns, period) for model, columns in zip(models, baselines, strict=True)]
     candidates = [_candidates(model, scale) for model, scale in zip(models, reference.scales, strict=True)]
     return blocks, candidates, [one for model in models for one in axis_dependences(model)]
 
@@ -122,21 +119,21 @@ def _model(signals: Signals, index: int, scale: Scale, first: int) -> AxisModel:
     )
 
 
-def _block(record: AxisRecord, model: AxisModel, baseline: Array, period: NDArray[np.int64], features: Array) -> Block:
+def _block(signals: Signals, model: AxisModel, baseline: Array, period: NDArray[np.int64]) -> Block:
     return Block(
-        record=record.source,
+        record=signals.record.source,
         channel=Channel.DYNAMIC,
         step=STEP,
         coordinate=model.place,
         unit=model.kind.effort_unit,
-        sample_time=record.sample_time,
-        bandwidth=model.bandwidth,
+        sample_time=signals.record.sample_time,
+        bandwidth=signals.bandwidth,
         target=model.filtered(model.motion.effort),
         baseline=model.filtered(baseline),
         moving=model.motion.moving,
         period=period,
         regions=_regions(model.motion, model.speed),
-        features=features,
+        features=_features(signals.motions),
     )
 
 
@@ -153,12 +150,11 @@ def _baseline_names(axes: Sequence[AxisSignals], scales: Sequence[Scale]) -> lis
 
 def _baselines(models: Sequence[AxisModel], signals: Signals, scales: Sequence[Scale]) -> list[Array]:
     """Columns (N, p) of the baseline in the rows of each axis, unfiltered, zero where they are not its own."""
-    own = []
+    own = [own_columns(signals.motions, index) for index in range(len(models))]
     for index, (model, scale) in enumerate(zip(models, scales, strict=True)):
-        dt = model.sample_time
-        late = [dt * differentiate(model.effort, dt, SEVEN)] if scale.hold is not None else []
-        columns = own_columns(signals.motions, index)
-        own.append(np.column_stack([columns, *late]))
+        if scale.hold is not None:
+            change = model.sample_time * differentiate(model.effort, model.sample_time, SEVEN)
+            own[index] = np.column_stack([own[index], change])
     return [
         np.hstack([columns if place == index else np.zeros_like(columns) for place, columns in enumerate(own)])
         for index in range(len(own))

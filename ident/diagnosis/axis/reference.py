@@ -85,16 +85,14 @@ class Signals:
         motions: of its axes.
         cutoff: of the position filter [rad/s].
         bandwidth: of the filter of the rows [rad/s].
-        frictions: dry friction of the axes, of a first estimate; zero: not known [N or Nm].
-        lags: samples by which their motions follow their efforts, likewise.
+        scales: of the axes, whose friction turns where they reverse; empty: not known yet.
     """
 
     record: AxisRecord
     motions: list[AxisMotion]
     cutoff: float
     bandwidth: float
-    frictions: tuple[float, ...]
-    lags: tuple[int, ...]
+    scales: Sequence[Scale] = ()
 
     def filtered(self, values: Array) -> Array:
         """The filter of the positions and that of the rows, on everything alike."""
@@ -103,18 +101,24 @@ class Signals:
 
     @cached_property
     def _untold(self) -> list[Untold]:
-        memory, dt = 1 / (self.bandwidth * self.record.sample_time), self.record.sample_time
+        dt = self.record.sample_time
         found = []
-        for motion, friction, lag in zip(self.motions, self.frictions, self.lags, strict=True):
+        for motion, scale in zip(self.motions, self.scales, strict=True):
+            # Efforts that are on time turn with the motion; those that are not lead it.
+            lead = 0 if scale.hold is not None else round(scale.lag / dt)
             sticking = Sticking(
-                np.roll(motion.sticking, -lag), friction, sample_noise(motion.effort, dt), 1 / (self.cutoff * dt)
+                where=np.roll(motion.sticking, -lead),
+                friction=float(scale.values[PARAMETERS.index("Fc")]),
+                noise=sample_noise(motion.effort, dt),
+                blur=1 / (self.cutoff * dt),
             )
-            found.append(untold_while_sticking(sticking, motion.moving, self.filtered, memory))
+            found.append(untold_while_sticking(sticking, motion.moving, self.filtered, 1 / (self.bandwidth * dt)))
         return found
 
     def rows_of(self, index: int, values: Array) -> Array:
         """Values (N,) or (N, m) as rows of an axis: filtered, without what is likely to happen while it may stick."""
-        return self._untold[index].without(self.filtered(values))
+        filtered = self.filtered(values)
+        return self._untold[index].without(filtered) if self.scales else filtered
 
     def equations(self, index: int) -> tuple[Array, Array]:
         """Own columns (n, p) of an axis in its moving rows, and its effort (n,) there."""
@@ -191,13 +195,11 @@ def axis_signals(record: AxisRecord, cutoff: float, bandwidth: float, scales: Se
     Raises:
         EstimationError: the record is too short, or an axis does not move.
     """
-    frictions = tuple(float(scale.values[PARAMETERS.index("Fc")]) for scale in scales) or (0.0,) * len(record.axes)
     if scales:
         axes = [_on_time(axis, scale, record.sample_time) for axis, scale in zip(record.axes, scales, strict=True)]
         record = replace(record, axes=tuple(axes))
-    lags = tuple(0 if one.hold is not None else round(one.lag / record.sample_time) for one in scales)
     motions = [axis_motion(record, axis, cutoff, bandwidth) for axis in record.axes]
-    return Signals(record, motions, cutoff, bandwidth, frictions, lags or (0,) * len(record.axes))
+    return Signals(record, motions, cutoff, bandwidth, scales)
 
 
 def _on_time(axis: AxisSignals, scale: Scale, sample_time: float) -> AxisSignals:

@@ -25,9 +25,6 @@ Mask = NDArray[np.bool_]
 MEMORY: Final = 25.0
 """Time constants of the rows' filter after which nothing is left of an impulse."""
 
-SEEN: Final = 1e-4
-"""Part of an impulse that the rows that are used must have of it, for it to be one that they know of."""
-
 
 @dataclass(frozen=True)
 class Untold:
@@ -85,11 +82,10 @@ def untold_while_sticking(
     for at, samples in _ends(sticking.where):
         first, last = max(at - reach, 0), min(at + reach + 1, len(moving))
         seen = np.where(moving[first:last], response[first - at + reach : last - at + reach], 0.0)
-        if np.linalg.norm(seen) > SEEN * np.linalg.norm(response):
-            # Uniform over the time that it may turn in, half of it at either end.
-            deviation = 2 * abs(sticking.friction) * (samples + sticking.blur) / math.sqrt(24)
-            found.append((np.arange(first, last), seen * deviation / sticking.noise))
-    if not found or not sticking.friction:
+        # Uniform over the time that it may turn in, half of it at either end.
+        deviation = 2 * abs(sticking.friction) * (samples + sticking.blur) / math.sqrt(24)
+        found.append((np.arange(first, last), seen * deviation / sticking.noise))
+    if not found:
         return Untold()
     rows = np.concatenate([places for places, _ in found])
     columns = np.repeat(np.arange(len(found)), [len(places) for places, _ in found])

@@ -7,6 +7,7 @@ import pytest
 from emulator.firmware.drive.modes import Mode
 from emulator.firmware.drive.states import State
 from emulator.power_stage import Trip
+from tests.emulator.firmware.coding_table import command_of
 
 HALT = 0x100
 
@@ -54,20 +55,6 @@ MODE_BITS = {
 }
 """Operation enabled at rest, targets zero: PP nothing to do, PV target reached and speed 0, TQ target reached,
 HM not started, cyclic modes following."""
-
-
-def command_of(controlword: int) -> str:
-    """The command coding table, bit by bit: 7 fault reset, 3 enable, 2 quick stop (low), 1 voltage, 0 switch on."""
-    fault_reset, enable, quick_stop, voltage, switch_on = (controlword >> bit & 1 for bit in (7, 3, 2, 1, 0))
-    if fault_reset:
-        return "fault reset"
-    if not voltage:
-        return "disable voltage"
-    if not quick_stop:
-        return "quick stop"
-    if not switch_on:
-        return "shutdown"
-    return "enable operation" if enable else "switch on"
 
 
 WAYS = {

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from emulator.firmware.flywheels import FlywheelDrive, Flywheels
 from emulator.power_stage import Trip
+from tests.emulator.firmware.coding_table import command_of
 
 NOT_READY, DISABLED, READY, SWITCHED_ON = 0x00, 0x40, 0x21, 0x23
 ENABLED, QUICK_STOP, REACTION, FAULT = 0x27, 0x07, 0x0F, 0x08
@@ -48,20 +49,6 @@ WINDOW = 65535
 
 FAR = 5_000_000
 """A target that a shaft which stands never reaches [increments]."""
-
-
-def command_of(controlword: int) -> str:
-    """The command coding table; bit 7 is none of these."""
-    enable, quick_stop, voltage, switch_on = (controlword >> bit & 1 for bit in (3, 2, 1, 0))
-    if controlword & 0x80:
-        return "none"
-    if not voltage:
-        return "disable voltage"
-    if not quick_stop:
-        return "quick stop"
-    if not switch_on:
-        return "shutdown"
-    return "enable operation" if enable else "switch on"
 
 
 def clip(value: int, limit: int) -> int:
