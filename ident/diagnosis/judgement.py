@@ -112,11 +112,14 @@ class Judgement:
     def worthwhile(self) -> tuple[int, ...]:
         """The effects without one that widens the held-out gap, is of no size itself, or closes next to nothing.
 
-        None at all where nothing repeats and the gap is within what a record without repeats tells of its noise.
+        Where nothing repeats and the gap is within what such a record tells of its noise, only the rows that took no
+        part in the fit can speak for an effect, and must do so clearly.
         """
-        if not self._repeats.sizes and not self._measurable():
-            return ()
         closed = self.fitted.closed
+        if not self._repeats.sizes and not self._measurable():
+            weak = [index for index in range(self.fitted.count) if self._log_predictive(index) < self.limits.sure]
+            if weak:
+                return self.fitted.others(min(weak, key=self._log_predictive))
         widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
         refuted = [index for index in widened if self._measurable() or self._log_predictive(index) < self.limits.sure]
         laws = [index for index in range(self.fitted.count) if self._law(index)]
