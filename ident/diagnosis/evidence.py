@@ -57,6 +57,11 @@ class Evidence:
     confirming: Array
     significance: float
 
+    def explained(self, variant: int) -> Array:
+        """What a variant explains of the whitened rows (n,), beside the baseline."""
+        place = self.directions.places[variant]
+        return np.asarray(self.directions.basis[:, place] @ self.amplitudes[place])
+
 
 def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask) -> Evidence:
     """Evidence for every variant.

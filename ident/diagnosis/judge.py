@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judgement import Judgement
+from ident.diagnosis.late_orders import with_late_orders
 from ident.diagnosis.law.drift import repeats, time_law, without_drift, without_time
 from ident.diagnosis.law.learning import Designs
 from ident.diagnosis.law.stage import Law, is_of_its_kind, next_law, with_law
@@ -83,7 +84,7 @@ def _judged_once(
 ) -> Judgement:
     stage(f"searching {len(problems[0].candidates)} candidates")
     regression = Regression(problems[0], make_rows(*problems), settings, seed)
-    searched = most_symmetric(search(problems, regression))
+    searched = most_symmetric(with_late_orders(search(problems, regression)))
     stage(f"fitting {len(searched.taken)} causes")
 
     def concluded_from(found: Shaped, laws: tuple[Law, ...] = ()) -> Judgement:

@@ -16,6 +16,8 @@ from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.fitted import Fitted
 from ident.diagnosis.law.answer import LawAnswer, alternatives, law_answer, same_names
 from ident.diagnosis.law.drift import drift_cause
+from ident.diagnosis.law.free import best_free_function, free_functions, is_another_curve
+from ident.diagnosis.law.learning import Designs
 from ident.diagnosis.law.neighbours import channel_of, nearest_name
 from ident.diagnosis.law.reach import told_samples
 from ident.diagnosis.law.stage import Law
@@ -101,13 +103,17 @@ class Judgement:
         return round(50 * (math.log(above + self.limits.blur) / 2 + price)) / 50, self.fitted.count
 
     def refuted(self) -> frozenset[str]:
-        """Effects of no size of which another candidate is what comes along with them, and those that are none."""
+        """Effects that the records speak against.
+
+        Those of no size of which another candidate is what comes along with them, those that are none, and those whose
+        curve is surely another one than any of their family.
+        """
         keys = {candidate.key for candidate in self.problems[0].candidates if not candidate.excluded}
         sizeless = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._sizeless(index)]
         none = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._nothing(index)]
-        return frozenset(
-            [*(one.key for one in sizeless if f"{one.along}@{one.where}" in keys), *(one.key for one in none)]
-        )
+        bent = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._another_curve(index)]
+        along = [one for one in sizeless if f"{one.along}@{one.where}" in keys]
+        return frozenset(one.key for one in (*along, *none, *bent))
 
     def worthwhile(self) -> tuple[int, ...]:
         """The effects without one that widens the held-out gap, is of no size itself, or closes next to nothing.
@@ -141,6 +147,17 @@ class Judgement:
         if self.fitted.closed_where_it_acts(index) >= self.limits.improvement:
             return True
         return self.fitted.gain(index, self.limits.blur) >= self.limits.name
+
+    def _another_curve(self, index: int) -> bool:
+        """Whether a free function of its variable shows that a name is of another family than the curve."""
+        dependences = free_functions(self.problems[0], self.fitted.candidate(index))
+        others, variant = self.fitted.others(index), self.found.variants[index]
+        free = best_free_function(self.regression, self._designs, self.found.whitener, others, dependences)
+        return free is not None and is_another_curve(free, self.found.slots[index].evidence, variant)
+
+    @cached_property
+    def _designs(self) -> Designs:
+        return Designs(self.problems, self.rows)
 
     def _law(self, index: int) -> Law | None:
         """The law that a cause is, if it is one."""

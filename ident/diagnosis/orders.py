@@ -9,7 +9,7 @@ independent orders: their number is the price.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -41,12 +41,7 @@ FEWEST: Final = 2.0
 
 def with_orders(problems: Sequence[Problem]) -> tuple[Problem, ...]:
     """The problems with the variants of every periodic candidate at the orders that the first one shows."""
-    first = problems[0]
-    numbers = [number for number, one in enumerate(first.candidates) if one.periodic is not None]
-    if not numbers:
-        return tuple(problems)
-    residual = _left(first)
-    found = {number: _peaks(first, first.candidates[number], residual) for number in numbers}
+    found = shown_orders(problems[0], range(len(problems[0].candidates)), ())
     return tuple(
         replace(
             problem,
@@ -59,15 +54,40 @@ def with_orders(problems: Sequence[Problem]) -> tuple[Problem, ...]:
     )
 
 
-def _at(problem: Problem, candidate: Candidate, orders: Sequence[float], tried: float) -> Candidate:
-    """A periodic candidate with a variant for every order [1/unit of the angle]."""
-    if candidate.periodic is None or not orders:
-        return candidate
+def shown_orders(
+    problem: Problem, numbers: Iterable[int], taken: Sequence[Variant]
+) -> Mapping[int, tuple[list[float], float]]:
+    """Orders that the rows show, and how many were independent, of every periodic candidate.
+
+    Args:
+        problem: to fit.
+        numbers: of the candidates that are asked for.
+        taken: causes that are known, as their columns, which are fitted along with the parameters.
+    """
+    periodic = [number for number in numbers if problem.candidates[number].periodic is not None]
+    if not periodic:
+        return {}
+    residual = _left(problem, taken)
+    return {number: _peaks(problem, problem.candidates[number], residual) for number in periodic}
+
+
+def waves(problem: Problem, candidate: Candidate, orders: Sequence[float]) -> tuple[Variant, ...]:
+    """Of a periodic candidate, a variant for every order [1/unit of the angle]."""
+    assert candidate.periodic is not None
     dependence = _dependence(problem, candidate)
-    variants = tuple(
-        Variant(tuple(dependence.design(_wave(order))), candidate.periodic.start(order)) for order in orders
-    )
-    return replace(candidate, variants=variants, price=math.log(max(tried, 1.0)))
+    return tuple(Variant(tuple(dependence.design(_wave(order))), candidate.periodic.start(order)) for order in orders)
+
+
+def _at(problem: Problem, candidate: Candidate, orders: Sequence[float], tried: float) -> Candidate:
+    """A periodic candidate with its orders alone, if there are any."""
+    if not orders:
+        return candidate
+    return replace(candidate, variants=waves(problem, candidate, orders), price=price_of(tried))
+
+
+def price_of(tried: float) -> float:
+    """Log evidence that the choice among independent orders costs."""
+    return math.log(max(tried, 1.0))
 
 
 def _wave(order: float) -> Basis:
@@ -79,15 +99,31 @@ def _dependence(problem: Problem, candidate: Candidate) -> Dependence:
     return next(one for one in problem.dependences if one.key == candidate.periodic.dependence)
 
 
-def _left(problem: Problem) -> list[tuple[Array, float]]:
-    """What the parameters leave of the target of every block (N,), and its rms in the rows used."""
+def _left(problem: Problem, taken: Sequence[Variant]) -> list[tuple[Array, float]]:
+    """What the parameters, and causes taken, leave of the target of every block (N,), and its rms in the rows used."""
     kept = [kept_rows(block) for block in problem.blocks]
-    rows = [(one.mean(block.baseline), one.mean(block.target)) for block, one in zip(problem.blocks, kept, strict=True)]
-    scaled = [np.column_stack(pair) / unit_of(*pair) for pair in rows]
+    designs = [
+        np.hstack([block.baseline, *_columns(taken, place, len(block.target))])
+        for place, block in enumerate(problem.blocks)
+    ]
+    means = [one.mean(design) for design, one in zip(designs, kept, strict=True)]
+    targets = [one.mean(block.target) for block, one in zip(problem.blocks, kept, strict=True)]
+    units = [
+        unit_of(one.mean(block.baseline), target)
+        for block, one, target in zip(problem.blocks, kept, targets, strict=True)
+    ]
+    scaled = [np.column_stack(parts) / unit for *parts, unit in zip(means, targets, units, strict=True)]
     together = np.concatenate(scaled)
     parameters = least_squares(together[:, :-1], together[:, -1])
-    left = [block.target - block.baseline @ parameters for block in problem.blocks]
+    left = [block.target - design @ parameters for block, design in zip(problem.blocks, designs, strict=True)]
     return [(series, rms(series[one.samples])) for series, one in zip(left, kept, strict=True)]
+
+
+def _columns(taken: Sequence[Variant], place: int, length: int) -> list[Array]:
+    """Columns (length, k) of some variants in one block; zeros where they do not act."""
+    widths = [max((one.shape[1] for one in variant.columns if one is not None), default=0) for variant in taken]
+    there = [variant.columns[place] for variant in taken]
+    return [np.zeros((length, width)) if one is None else one for one, width in zip(there, widths, strict=True)]
 
 
 def _peaks(

@@ -90,7 +90,7 @@ def next_law(problems: Sequence[Problem], regression: Regression, designs: Desig
     seen_in_both = min(best_one.log_evidence, best_one.log_predictive) > SURELY
     if best_one.total(cost) < SURELY + math.log(len(dependences)) or not seen_in_both:
         return None
-    same = tuple(dependences[one.index].key for one in found if _cosine(one.shape, best_one.shape) > SAME)
+    same = tuple(dependences[one.index].key for one in found if cosine(one.shape, best_one.shape) > SAME)
     odds = {dependences[one.index].key: one.total(cost) for one in found}
     return Law(dependences[best_one.index], best_one, odds, same, len(problems[0].candidates))
 
@@ -126,6 +126,7 @@ def _tried(learner: Learner, designs: Designs, index: int) -> Learnt | None:
     return None if knots is None else learner.learn(index, designs.columns(index), knots)
 
 
-def _cosine(one: Array, other: Array) -> float:
+def cosine(one: Array, other: Array) -> float:
+    """Of the angle between two lines, without a sign; 0 where one has no direction."""
     lengths = float(np.linalg.norm(one) * np.linalg.norm(other))
     return abs(float(one @ other)) / lengths if lengths > 0 else 0.0
