@@ -195,6 +195,12 @@ class Answer:
         return all(len(_set(effect)) > 1 or effect["probability"] < CONFIDENT for effect in self.said.effects)
 
     @property
+    def near(self) -> bool:
+        """All that is named is at the joint of the case, and closes all but what a cosine of ALIKE leaves."""
+        there = [_corner(str(effect["where"])) == _corner(self.single.where) for effect in self.said.effects]
+        return bool(there) and all(there) and self.said.closed >= ALIKE**2
+
+    @property
     def fault_named(self) -> bool:
         """The fault of the records is the one named first, or what the record bears as well."""
         return bool(self.said.faults) and f"{self.single.name}@{self.single.where}" in self.said.faults[0]

@@ -49,6 +49,8 @@ SECONDS: Final = "processor time of a diagnosis, mean [s]"
 SECONDS_MOST: Final = "- longest [s]"
 WITHOUT_OPEN: Final = "true candidate removed: `unknown` or a set"
 WITHOUT_OPEN_LARGE: Final = "- `unknown` or a set at size 0.5 and above"
+WITHOUT_NEAR: Final = "- `unknown`, a set, or names there that close as much (cosine 0.98), size 0.5 and above"
+WITHOUT_FAR: Final = "- a confident name that closes less, size 0.5 and above"
 WITHOUT_MODEST: Final = "- no confident wrong name"
 WITHOUT_MODEST_ALL: Final = "- no confident wrong name, cases with an identical candidate left included"
 WITHOUT_UNKNOWN: Final = "- `unknown`"
@@ -76,6 +78,8 @@ ASKED: Final[Mapping[str, str]] = MappingProxyType(
         CLOSED_WRONG: "below 0.20",
         SECONDS: "below 10 for 200 s of record",
         WITHOUT_OPEN: "at least 0.80",
+        WITHOUT_NEAR: "at least 0.85",
+        WITHOUT_FAR: "at most 0.05",
     }
 )
 """Name of a number -> what is asked of it."""

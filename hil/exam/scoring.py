@@ -111,6 +111,8 @@ def removal_rates(answers: Sequence[Answer]) -> dict[str, Rate]:
     return {
         names.WITHOUT_OPEN: rate([answer.open for answer in alone]),
         names.WITHOUT_OPEN_LARGE: rate([answer.open for answer in _large(alone)]),
+        names.WITHOUT_NEAR: rate([answer.open or answer.near for answer in _large(alone)]),
+        names.WITHOUT_FAR: rate([not answer.modest and not answer.near for answer in _large(alone)]),
         names.WITHOUT_MODEST: rate([answer.modest for answer in alone]),
         names.WITHOUT_MODEST_ALL: rate([answer.modest for answer in answers]),
         names.WITHOUT_UNKNOWN: rate([answer.rejected for answer in alone]),

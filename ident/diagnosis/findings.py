@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.diagnosis import Diagnosis, Gap, NamedEffect, Share, Verdict
 from ident.diagnosis.generic import Generic
 from ident.diagnosis.law.answer import Alternative, LawAnswer
+from ident.diagnosis.law.free import Curve
 from ident.diagnosis.law.stage import Law
 from ident.diagnosis.probability import Ranked, calibration
 from ident.diagnosis.problem import Candidate, Problem
@@ -38,6 +39,7 @@ class Cause:
         needed: the same with everything else refitted without it.
         biased: how much each parameter of the model shifts when the effect is left out, by name, in standard
             deviations.
+        curve: whether it fits the curve of its variable as well as a free function does.
         sizeless: it may be of no size itself, and what comes along with it is the explanation.
         law: as it was learnt, of a law without a name.
         law_answer: as it is written down.
@@ -53,6 +55,7 @@ class Cause:
     closed: float
     needed: float
     biased: Mapping[str, float]
+    curve: Curve
     sizeless: bool
     law: Law | None = None
     law_answer: LawAnswer | None = None
@@ -133,6 +136,14 @@ class Findings:
         )
 
 
+def _ambiguity_set(cause: Cause, coverage: float) -> tuple[str, ...]:
+    """Names that the records do not tell apart, and a law among them where a free function does as well."""
+    if cause.law is not None:
+        return (LAW,)
+    names = cause.ranked.ambiguity_set(str(cause.candidate.effect), coverage)
+    return (*names, LAW) if cause.curve is Curve.UNDECIDED else names
+
+
 def _named(cause: Cause, coverage: float) -> NamedEffect:
     name = LAW if cause.law is not None else str(cause.candidate.effect)
     return NamedEffect(
@@ -140,7 +151,7 @@ def _named(cause: Cause, coverage: float) -> NamedEffect:
         where=cause.candidate.where,
         parameters=cause.quantities,
         probability=round(cause.probability, 2),
-        ambiguity_set=(LAW,) if cause.law is not None else cause.ranked.ambiguity_set(name, coverage),
+        ambiguity_set=_ambiguity_set(cause, coverage),
         gap_closed_held_out=cause.closed,
         alternatives=cause.alternatives,
         law=cause.law_answer,

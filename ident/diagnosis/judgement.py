@@ -16,8 +16,8 @@ from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.fitted import Fitted
 from ident.diagnosis.law.answer import LawAnswer, alternatives, law_answer, same_names
 from ident.diagnosis.law.drift import drift_cause
-from ident.diagnosis.law.free import best_free_function, free_functions, is_another_curve
-from ident.diagnosis.law.learning import Designs
+from ident.diagnosis.law.free import Curve, best_free_function, curve_of, free_functions
+from ident.diagnosis.law.learning import Designs, Learnt
 from ident.diagnosis.law.neighbours import channel_of, nearest_name
 from ident.diagnosis.law.reach import told_samples
 from ident.diagnosis.law.stage import Law
@@ -47,6 +47,7 @@ class Judgement:
     ) -> None:
         self.problems, self.regression, self.found, self.limits = problems, regression, found, limits
         self.laws = laws
+        self._kept: dict[int, Learnt | None] = {}
         self.rows = regression.rows
         self.fitted = Fitted(problems, regression, found, seed, told_samples(self.rows, problems, self._law_keys()))
 
@@ -76,9 +77,10 @@ class Judgement:
         )
 
     def incomplete(self) -> bool:
-        """Whether something is left beside the effects that a law may explain."""
+        """Whether something is left beside the effects that a law may explain, or one of them has another curve."""
         left = self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeats.by_no_accident
-        return left or self.fitted.exactly.after**2 > 1 + self.limits.measurable
+        bent = any(self._curve(index) is Curve.ANOTHER for index in range(self.fitted.count))
+        return left or bent or self.fitted.exactly.after**2 > 1 + self.limits.measurable
 
     def _law_keys(self) -> list[str]:
         owners = {self.regression.owners[variant] for variant in self.found.variants}
@@ -103,17 +105,12 @@ class Judgement:
         return round(50 * (math.log(above + self.limits.blur) / 2 + price)) / 50, self.fitted.count
 
     def refuted(self) -> frozenset[str]:
-        """Effects that the records speak against.
-
-        Those of no size of which another candidate is what comes along with them, those that are none, and those whose
-        curve is surely another one than any of their family.
-        """
+        """Effects of no size of which another candidate is what comes along with them, and those that are none."""
         keys = {candidate.key for candidate in self.problems[0].candidates if not candidate.excluded}
         sizeless = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._sizeless(index)]
         none = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._nothing(index)]
-        bent = [self.fitted.candidate(index) for index in range(self.fitted.count) if self._another_curve(index)]
         along = [one for one in sizeless if f"{one.along}@{one.where}" in keys]
-        return frozenset(one.key for one in (*along, *none, *bent))
+        return frozenset(one.key for one in (*along, *none))
 
     def worthwhile(self) -> tuple[int, ...]:
         """The effects without one that widens the held-out gap, is of no size itself, or closes next to nothing.
@@ -148,12 +145,18 @@ class Judgement:
             return True
         return self.fitted.gain(index, self.limits.blur) >= self.limits.name
 
-    def _another_curve(self, index: int) -> bool:
-        """Whether a free function of its variable shows that a name is of another family than the curve."""
-        dependences = free_functions(self.problems[0], self.fitted.candidate(index))
-        others, variant = self.fitted.others(index), self.found.variants[index]
-        free = best_free_function(self.regression, self._designs, self.found.whitener, others, dependences)
-        return free is not None and is_another_curve(free, self.found.slots[index].evidence, variant)
+    def _curve(self, index: int) -> Curve:
+        """Whether a name fits the curve of its variable as well as a free function does."""
+        free, variant = self._free(index), self.found.variants[index]
+        return Curve.ITS_OWN if free is None else curve_of(free, self.found.slots[index].evidence, variant)
+
+    def _free(self, index: int) -> Learnt | None:
+        """The best free function of its variable in the place of a name; None where it is no function of one."""
+        if index not in self._kept:
+            dependences = free_functions(self.problems[0], self.fitted.candidate(index))
+            others, whitener = self.fitted.others(index), self.found.whitener
+            self._kept[index] = best_free_function(self.regression, self._designs, whitener, others, dependences)
+        return self._kept[index]
 
     @cached_property
     def _designs(self) -> Designs:
@@ -309,6 +312,7 @@ class Judgement:
             needed=self.fitted.closed[index],
             biased=self.fitted.biased(index),
             sizeless=self._sizeless(index),
+            curve=self._curve(index),
             law=law,
             law_answer=None if law is None else self._law_answer(law, index, variant),
             alternatives=(same_names(ranked.alike) if law is None else alternatives(law, self.problems[0].dependences)),

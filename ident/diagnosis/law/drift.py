@@ -17,6 +17,7 @@ from ident.diagnosis.directions import VISIBLE
 from ident.diagnosis.findings import Cause
 from ident.diagnosis.law.answer import law_answer
 from ident.diagnosis.law.dependence import Basis, Dependence, Variable
+from ident.diagnosis.law.free import Curve
 from ident.diagnosis.law.learning import Designs
 from ident.diagnosis.law.stage import SCALE, Law, next_law
 from ident.diagnosis.linear import orthonormal
@@ -168,6 +169,7 @@ def drift_cause(law: Law, closed: float, calibration: Calibration) -> Cause:
         closed=closed,
         needed=closed,
         biased={},
+        curve=Curve.ITS_OWN,
         sizeless=False,
         law=law,
         law_answer=law_answer(law, "dynamic", None),

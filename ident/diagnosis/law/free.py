@@ -8,6 +8,7 @@ pays for its numbers, the function for its freedom.
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Sequence
 
 from ident.diagnosis.evidence import Evidence
@@ -17,6 +18,20 @@ from ident.diagnosis.law.stage import SAME, SURELY, cosine
 from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.whitening import Whitener
+
+
+class Curve(enum.Enum):
+    """What the records say of the curve that a name has.
+
+    Attributes:
+        ITS_OWN: it is of the name's family, or nearly the same in these rows; or the name is no function of a variable.
+        UNDECIDED: neither the family nor a free function is surely better.
+        ANOTHER: a free function is surely better, and not nearly the same.
+    """
+
+    ITS_OWN = enum.auto()
+    UNDECIDED = enum.auto()
+    ANOTHER = enum.auto()
 
 
 def free_functions(problem: Problem, candidate: Candidate) -> list[int]:
@@ -47,13 +62,17 @@ def best_free_function(
     return max((one for one in learnt if one is not None), key=lambda one: one.total(0.0), default=None)
 
 
-def is_another_curve(free: Learnt, evidence: Evidence, variant: int) -> bool:
-    """Whether a free function explains surely more than a name in its place, and is not nearly the same in these rows.
+def curve_of(free: Learnt, evidence: Evidence, variant: int) -> Curve:
+    """What a free function in the place of a name says of that name's family.
 
     Args:
         free: function.
         evidence: in that place.
         variant: of the name.
     """
-    surely = free.total(0.0) - float(evidence.log_evidence[variant]) > SURELY
-    return surely and cosine(free.shape, evidence.explained(variant)) < SAME
+    odds = free.total(0.0) - float(evidence.log_evidence[variant])
+    if abs(odds) <= SURELY:
+        return Curve.UNDECIDED
+    if odds < 0 or cosine(free.shape, evidence.explained(variant)) > SAME:
+        return Curve.ITS_OWN
+    return Curve.ANOTHER
