@@ -16,8 +16,7 @@ from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.fitted import Fitted
 from ident.diagnosis.law.answer import LawAnswer, alternatives, law_answer, same_names
 from ident.diagnosis.law.drift import drift_cause
-from ident.diagnosis.law.free import Curve, best_free_function, curve_of, free_functions
-from ident.diagnosis.law.learning import Designs, Learnt
+from ident.diagnosis.law.free import Curve, curves
 from ident.diagnosis.law.neighbours import channel_of, nearest_name
 from ident.diagnosis.law.reach import told_samples
 from ident.diagnosis.law.stage import Law
@@ -28,6 +27,7 @@ from ident.diagnosis.regression import Regression
 from ident.diagnosis.remainder import Told, repeated, shares
 from ident.diagnosis.repeating import Repeating
 from ident.diagnosis.search import Found
+from ident.diagnosis.sized import is_nothing, is_sizeless
 from ident.diagnosis.steady import log_unsteady
 
 Array = NDArray[np.float64]
@@ -47,7 +47,6 @@ class Judgement:
     ) -> None:
         self.problems, self.regression, self.found, self.limits = problems, regression, found, limits
         self.laws = laws
-        self._kept: dict[int, Learnt | None] = {}
         self.rows = regression.rows
         self.fitted = Fitted(problems, regression, found, seed, told_samples(self.rows, problems, self._law_keys()))
 
@@ -79,7 +78,7 @@ class Judgement:
     def incomplete(self) -> bool:
         """Whether something is left beside the effects that a law may explain, or one of them has another curve."""
         left = self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeats.by_no_accident
-        bent = any(self._curve(index) is Curve.ANOTHER for index in range(self.fitted.count))
+        bent = Curve.ANOTHER in self._curves
         return left or bent or self.fitted.exactly.after**2 > 1 + self.limits.measurable
 
     def _law_keys(self) -> list[str]:
@@ -146,22 +145,10 @@ class Judgement:
             return True
         return self.fitted.gain(index, self.limits.blur) >= self.limits.name
 
-    def _curve(self, index: int) -> Curve:
-        """Whether a name fits the curve of its variable as well as a free function does."""
-        free, variant = self._free(index), self.found.variants[index]
-        return Curve.ITS_OWN if free is None else curve_of(free, self.found.slots[index].evidence, variant)
-
-    def _free(self, index: int) -> Learnt | None:
-        """The best free function of its variable in the place of a name; None where it is no function of one."""
-        if index not in self._kept:
-            dependences = free_functions(self.problems[0], self.fitted.candidate(index))
-            others, whitener = self.fitted.others(index), self.found.whitener
-            self._kept[index] = best_free_function(self.regression, self._designs, whitener, others, dependences)
-        return self._kept[index]
-
     @cached_property
-    def _designs(self) -> Designs:
-        return Designs(self.problems, self.rows)
+    def _curves(self) -> tuple[Curve, ...]:
+        """Of every effect, whether its name fits the curve of its variable as well as a free function does."""
+        return curves(self.problems, self.regression, self.found)
 
     def _law(self, index: int) -> Law | None:
         """The law that a cause is, if it is one."""
@@ -242,26 +229,10 @@ class Judgement:
         return any(count >= self.limits.curve for curve, count in curves.items() if curve)
 
     def _sizeless(self, index: int) -> bool:
-        """Whether an effect may be of no size itself, and what comes along with it is the explanation."""
-        part, least = self.fitted.after.parts[index], self.fitted.candidate(index).least
-        along = slice(len(part.values), None)
-        accompanied = np.abs(part.numbers[along]) > self.limits.sure_of * part.scatter[along]
-        size = np.abs(part.values) if least is None else part.values - least
-        return bool(np.any(accompanied) and np.all(size < self.limits.sized * part.std))
+        return is_sizeless(self.fitted.candidate(index), self.fitted.after.parts[index], self.limits)
 
     def _nothing(self, index: int) -> bool:
-        """Whether the refit has made something else of an effect, or of a size that may be zero.
-
-        Something else has parameters that the effect does not have. Of linear ones any is a size, or else the first.
-        Beside what comes along, `_sizeless` says.
-        """
-        candidate, part = self.fitted.candidate(index), self.fitted.after.parts[index]
-        if candidate.lowest and bool(np.any(np.abs(part.values) < candidate.lowest)):
-            return True
-        sizes = slice(None) if candidate.contribution is None else slice(1)
-        alone = len(part.numbers) == len(part.values)
-        small = np.abs(part.values[sizes]) < self.limits.sure_of * part.scatter[: len(part.values)][sizes]
-        return alone and bool(np.all(small))
+        return is_nothing(self.fitted.candidate(index), self.fitted.after.parts[index], self.limits)
 
     @cached_property
     def _named(self) -> float:
@@ -313,7 +284,7 @@ class Judgement:
             needed=self.fitted.closed[index],
             biased=self.fitted.biased(index),
             sizeless=self._sizeless(index),
-            curve=self._curve(index),
+            curve=self._curves[index],
             law=law,
             law_answer=None if law is None else self._law_answer(law, index, variant),
             alternatives=(same_names(ranked.alike) if law is None else alternatives(law, self.problems[0].dependences)),

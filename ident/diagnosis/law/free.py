@@ -17,7 +17,7 @@ from ident.diagnosis.law.learning import Designs, Learner, Learnt
 from ident.diagnosis.law.stage import SAME, SURELY, cosine
 from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.regression import Regression
-from ident.diagnosis.whitening import Whitener
+from ident.diagnosis.search import Found, without
 
 
 class Curve(enum.Enum):
@@ -34,7 +34,20 @@ class Curve(enum.Enum):
     ANOTHER = enum.auto()
 
 
-def free_functions(problem: Problem, candidate: Candidate) -> list[int]:
+def curves(problems: Sequence[Problem], regression: Regression, found: Found) -> tuple[Curve, ...]:
+    """What the records say of the curve of every name that was found."""
+    designs = Designs(problems, regression.rows)
+    return tuple(_curve(problems[0], regression, designs, found, index) for index in range(len(found.variants)))
+
+
+def _curve(problem: Problem, regression: Regression, designs: Designs, found: Found, index: int) -> Curve:
+    variant, others = found.variants[index], without(found.variants, index)
+    dependences = _dependences(problem, problem.candidates[regression.owners[variant]])
+    free = _best(Learner(regression, found.whitener, others), designs, dependences) if dependences else None
+    return Curve.ITS_OWN if free is None else _beside(free, found.slots[index].evidence, variant)
+
+
+def _dependences(problem: Problem, candidate: Candidate) -> list[int]:
     """Numbers of the dependences of which a named candidate is a function; none where it is no function of one."""
     function = function_of(candidate.effect)
     return [
@@ -44,32 +57,15 @@ def free_functions(problem: Problem, candidate: Candidate) -> list[int]:
     ]
 
 
-def best_free_function(
-    regression: Regression, designs: Designs, whitener: Whitener, others: Sequence[int], dependences: Sequence[int]
-) -> Learnt | None:
-    """The best free function in the place of a name; None where there is none.
-
-    Args:
-        regression: of the rows.
-        designs: of the dependences in them.
-        whitener: with which the name was judged.
-        others: variants taken beside it.
-        dependences: of which it is a function.
-    """
-    learner = Learner(regression, whitener, others)
+def _best(learner: Learner, designs: Designs, dependences: Sequence[int]) -> Learnt | None:
+    """The free function that explains most in the place of a name; None where there is none."""
     knots = {index: designs.knots(index) for index in dependences}
     learnt = [learner.learn(index, designs.columns(index), one) for index, one in knots.items() if one is not None]
     return max((one for one in learnt if one is not None), key=lambda one: one.total(0.0), default=None)
 
 
-def curve_of(free: Learnt, evidence: Evidence, variant: int) -> Curve:
-    """What a free function in the place of a name says of that name's family.
-
-    Args:
-        free: function.
-        evidence: in that place.
-        variant: of the name.
-    """
+def _beside(free: Learnt, evidence: Evidence, variant: int) -> Curve:
+    """What a free function says of the family of the name in whose place it stands."""
     odds = free.total(0.0) - float(evidence.log_evidence[variant])
     if abs(odds) <= SURELY:
         return Curve.UNDECIDED

@@ -1,0 +1,31 @@
+"""Whether a cause that was refitted has a size of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ident.diagnosis.limits import Limits
+from ident.diagnosis.problem import Candidate
+from ident.diagnosis.refit import Part
+
+
+def is_sizeless(candidate: Candidate, part: Part, limits: Limits) -> bool:
+    """Whether an effect may be of no size itself, and what comes along with it is the explanation."""
+    along = slice(len(part.values), None)
+    accompanied = np.abs(part.numbers[along]) > limits.sure_of * part.scatter[along]
+    size = np.abs(part.values) if candidate.least is None else part.values - candidate.least
+    return bool(np.any(accompanied) and np.all(size < limits.sized * part.std))
+
+
+def is_nothing(candidate: Candidate, part: Part, limits: Limits) -> bool:
+    """Whether the refit has made something else of an effect, or of a size that may be zero.
+
+    Something else has parameters that the effect does not have. Of linear ones any is a size, or else the first.
+    Beside what comes along, `is_sizeless` says.
+    """
+    if candidate.lowest and bool(np.any(np.abs(part.values) < candidate.lowest)):
+        return True
+    sizes = slice(None) if candidate.contribution is None else slice(1)
+    alone = len(part.numbers) == len(part.values)
+    small = np.abs(part.values[sizes]) < limits.sure_of * part.scatter[: len(part.values)][sizes]
+    return alone and bool(np.all(small))
