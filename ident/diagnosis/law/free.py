@@ -25,8 +25,8 @@ class Curve(enum.Enum):
 
     Attributes:
         ITS_OWN: it is of the name's family, or nearly the same in these rows; or the name is no function of a variable.
-        UNDECIDED: neither the family nor a free function is surely better.
-        ANOTHER: a free function is surely better, and not nearly the same.
+        UNDECIDED: neither the family nor a free function that is not nearly the same is surely better.
+        ANOTHER: such a free function is surely better.
     """
 
     ITS_OWN = enum.auto()
@@ -67,8 +67,6 @@ def _best(learner: Learner, designs: Designs, dependences: Sequence[int]) -> Lea
 def _beside(free: Learnt, evidence: Evidence, variant: int) -> Curve:
     """What a free function says of the family of the name in whose place it stands."""
     odds = free.total(0.0) - float(evidence.log_evidence[variant])
-    if abs(odds) <= SURELY:
-        return Curve.UNDECIDED
-    if odds < 0 or cosine(free.shape, evidence.explained(variant)) > SAME:
+    if odds < -SURELY or cosine(free.shape, evidence.explained(variant)) > SAME:
         return Curve.ITS_OWN
-    return Curve.ANOTHER
+    return Curve.UNDECIDED if odds <= SURELY else Curve.ANOTHER
