@@ -119,8 +119,7 @@ class Judgement:
         """
         closed = self.fitted.closed
         if not self._repeats.sizes and not self._measurable():
-            clear = self.regression.settings.clear
-            weak = [index for index in range(self.fitted.count) if self._log_predictive(index) < clear]
+            weak = [index for index in range(self.fitted.count) if self._log_predictive(index) < self.limits.sure]
             if weak:
                 return self.fitted.others(min(weak, key=self._log_predictive))
         widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]

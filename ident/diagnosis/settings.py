@@ -18,8 +18,7 @@ class Settings:
         confirmation: smallest log Bayes factor of the confirming rows.
         part: of what a cause does, that the fitted rows must show, and the confirming ones.
         plain: likelihood ratio of such a part from which it counts however small it is beside the other one.
-        clear: log evidence from which what only one of the two shows is taken for an event, not for a cause in doubt;
-            and that confirming rows alone must have where the gap is within what a record tells of its noise.
+        clear: log evidence from which what only one of the two shows is taken for an event, not for a cause in doubt.
         stretch: rows of the stretches whose sign a surrogate flips, well beyond the memory of whitened rows.
         stretches: that there shall be at least; short records have shorter ones.
         surrogates: how many.

@@ -36,9 +36,10 @@ rows hold the resonance itself, in a valley that is a tenth wide: from beside it
 HELD_FORCE: Final = 1 / 24
 """Of T²/M, the compliance that an effort seems to have that is held over the sample interval: its spectrum is that of
 the effort times a sinc, 1 - (ωT)²/24."""
-SAMPLED: Final = 3 * HELD_FORCE
-"""Of T²/M, the compliance up to which sampling may be what it is: three times that of an effort that is held. Errors of
-the position make negative ones, up to all of it."""
+SAMPLED: Final = 1 / 2
+"""Of T²/M, the compliance up to which sampling may be what it is: when within a sample interval the effort acts and the
+position is read is not known, and a delay of T has (sT)²/2 in second order. Errors of the position make negative ones,
+up to all of it."""
 BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
 """Tried first, over the range of the position."""
 GRID: Final = 0.3
