@@ -11,7 +11,7 @@ from typing import Final
 from fmu.description import FmiVersion
 from fmu.variables import Block, VariableTable
 
-_WRITTEN: Final = ("instance.h", "instance.c", "values.c", "sensitivity.c", "stepping.c")
+_WRITTEN: Final = ("instance.h", "instance.c", "saved.c", "values.c", "sensitivity.c", "stepping.c")
 
 _ENTRY: Final = {FmiVersion.FMI2: "fmi2.c", FmiVersion.FMI3: "fmi3.c"}
 """The functions of the standard."""

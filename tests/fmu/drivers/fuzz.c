@@ -307,12 +307,23 @@ static void differentiate(void)
     }
 }
 
+/* The checksum of a serialized state after its bytes, as somebody who means harm would set it. */
+static void sum_up(unsigned char *bytes, size_t size)
+{
+    uint64_t sum = 14695981039346656037ULL;
+    size_t i;
+    for (i = 0; i + sizeof sum < size; i++) {
+        sum = (sum ^ bytes[i]) * 1099511628211ULL;
+    }
+    memcpy(bytes + size - sizeof sum, &sum, sizeof sum);
+}
+
 static void save_or_restore(void)
 {
     char *bytes;
     size_t size = 0;
     void *copy = NULL;
-    int status;
+    int status, damaged = 0;
     last_message[0] = '\0';
     switch (below(4)) {
     case 0:
@@ -349,11 +360,18 @@ static void save_or_restore(void)
     check(status);
     if (below(2)) {
         bytes[below((unsigned)size)] ^= (char)(1 << below(8));
+        damaged = below(2);
+        if (!damaged) {
+            sum_up((unsigned char *)bytes, size);
+        }
     }
     last_message[0] = '\0';
     status = now.is3 ? (int)fmi3DeserializeFMUState(now.instance, (fmi3Byte *)bytes, size, &copy)
                      : (int)fmi2DeSerializeFMUstate(now.instance, bytes, size, &copy);
     if (check(status) == 0) {
+        if (damaged) {
+            fail("a damaged state is taken");
+        }
         if (now.is3) {
             fmi3FreeFMUState(now.instance, &copy);
         } else {
