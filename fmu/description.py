@@ -58,7 +58,7 @@ def _write_fmi2(interface: Interface, token: str, sources: Sequence[str]) -> Ele
     indicators = str(len(interface.table.block(Block.INDICATOR)))
     root = Element("fmiModelDescription", _common(interface), fmiVersion="2.0", guid=token)
     root.set("numberOfEventIndicators", indicators)
-    for kind, flags in _KINDS_FMI2.items():
+    for kind, flags in (_SAMPLED_FMI2 if interface.sampled else _KINDS_FMI2).items():
         element = SubElement(root, kind, {"modelIdentifier": MODEL_IDENTIFIER, **flags})
         files = SubElement(element, "SourceFiles")
         for name in sources:
@@ -76,6 +76,8 @@ def _write_fmi2(interface: Interface, token: str, sources: Sequence[str]) -> Ele
         "InitialUnknowns": interface.initial_unknowns,
     }
     for name, rows in groups.items():
+        if not rows:
+            continue
         group = SubElement(structure, name)
         for row in rows:
             known = None if name == "InitialUnknowns" else interface.dependencies_of(row)
@@ -136,6 +138,18 @@ _KINDS_FMI2: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
         },
     }
 )
+
+_SAMPLED_FMI2: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
+    {
+        "CoSimulation": {
+            "canHandleVariableCommunicationStepSize": "true",
+            "canNotUseMemoryManagementFunctions": "true",
+            "canGetAndSetFMUstate": "true",
+            "canSerializeFMUstate": "true",
+        }
+    }
+)
+"""Of what acts at instants of its own."""
 
 _STATE_FMI3: Final = {
     "canGetAndSetFMUState": "true",

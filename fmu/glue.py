@@ -47,6 +47,7 @@ def _header(table: VariableTable, token: str) -> str:
 #define QO_TOKEN "{token}"
 #define QO_VARIABLES {len(table.variables)}
 #define QO_MARK_SIZE {len(_mark(token))}
+#define QO_MODEL_EXCHANGED {int(bool(table.block(Block.DERIVATIVE)))} /* whether there is a model to exchange */
 
 typedef enum {{
 {roles}

@@ -34,9 +34,9 @@ INDICATORS: Final = 4
 _TIME: Final = (1980, 1, 1, 0, 0, 0)
 """Of every file in the archive: the earliest that the format knows."""
 
-_COPYRIGHT: Final = "Whoever identified the vehicle; source code of quasiomni under the licence named"
+COPYRIGHT: Final = "Whoever identified the vehicle; source code of quasiomni under the licence named"
 
-_LICENSE: Final = """The source code of this FMU is part of quasiomni.
+LICENSE: Final = """The source code of this FMU is part of quasiomni.
 
 SPDX-License-Identifier: Apache-2.0
 
@@ -86,7 +86,7 @@ def build_fmu(
     """
     model = make_model(source, order.inputs, order.contacts, order.limited)
     interface = _interface(source, model, order)
-    token = _token(model, interface, order.version)
+    token = token_of(model, interface, order.version)
     sources = fmu_sources(model, interface, order.version, token)
     libraries = compile_libraries(sources, order.platforms, compiler, progress, cache)
     reference = reference_drive(model.table, with_neutral(source.effects), order.inputs)
@@ -95,13 +95,13 @@ def build_fmu(
     files = {
         "modelDescription.xml": description,
         **{f"sources/{name}": text for name, text in sources.items()},
-        **_binaries(libraries, order.version),
+        **binaries_of(libraries, order.version),
         "sources/CMakeLists.txt": (resources.files("fmu") / "data" / "CMakeLists.txt").read_bytes(),
         **{f"resources/{name}": content for name, content in reference.files().items()},
         **_documentation(source, interface, order, reference),
         **_VERSION_FILES[order.version](order.inputs, units),
     }
-    return _archive(files)
+    return archive_of(files)
 
 
 def fmu_sources(model: Model, interface: Interface, version: FmiVersion, token: str) -> dict[str, bytes]:
@@ -112,11 +112,11 @@ def fmu_sources(model: Model, interface: Interface, version: FmiVersion, token: 
 
 def _interface(source: ModelSource, model: Model, order: Order) -> Interface:
     return Interface(
-        name=f"quasiomni.{_identifier(source.vehicle.name)}",
+        name=f"quasiomni.{identifier_of(source.vehicle.name)}",
         description=f"Identified model of {source.vehicle.name}, {order.inputs} inputs, {order.contacts} contacts",
         version=version("quasiomni"),
         tool=f"quasiomni {version('quasiomni')}",
-        copyright=_COPYRIGHT,
+        copyright=COPYRIGHT,
         license="Apache-2.0",
         table=with_indicators(model.table, INDICATORS),
         dependencies=model.dependencies,
@@ -137,11 +137,12 @@ def _for_explicit_solvers(model: Model) -> Experiment:
 _EXPERIMENTS: Final = {Contacts.STIFF: _for_implicit_solvers, Contacts.SOFT: _for_explicit_solvers}
 
 
-def _identifier(name: str) -> str:
+def identifier_of(name: str) -> str:
+    """A name of letters, digits and underscores."""
     return "".join(letter if letter.isalnum() else "_" for letter in name)
 
 
-def _token(model: Model, interface: Interface, version: FmiVersion) -> str:
+def token_of(model: Model, interface: Interface, version: FmiVersion) -> str:
     """A UUID of all that the description and the C code are made from."""
     without = model_description(interface, version, "", [])
     digest = hashlib.sha256(without)
@@ -150,7 +151,7 @@ def _token(model: Model, interface: Interface, version: FmiVersion) -> str:
     return f"{{{uuid.UUID(bytes=digest.digest()[:16], version=5)}}}"
 
 
-def _binaries(libraries: Mapping[str, bytes], version: FmiVersion) -> dict[str, bytes]:
+def binaries_of(libraries: Mapping[str, bytes], version: FmiVersion) -> dict[str, bytes]:
     """FMI 2.0 has one folder for macOS, whose library is then for both processors."""
     if version is FmiVersion.FMI3:
         return {
@@ -169,7 +170,7 @@ def _documentation(source: ModelSource, interface: Interface, order: Order, refe
     python = ".".join(str(part) for part in sys.version_info[:3])
     versions = {"quasiomni": version("quasiomni"), "casadi": version("casadi"), "python": python}
     page = documentation_page(source, interface, order.inputs, reference, versions)
-    files = {"index.html": page.encode(), "licenses/license.txt": _LICENSE.encode(), **source.documents}
+    files = {"index.html": page.encode(), "licenses/license.txt": LICENSE.encode(), **source.documents}
     return {f"documentation/{name}": content for name, content in files.items()}
 
 
@@ -193,7 +194,8 @@ def _picture(name: str) -> bytes:
     return (resources.files("fmu") / "data" / name).read_bytes()
 
 
-def _archive(files: Mapping[str, bytes]) -> bytes:
+def archive_of(files: Mapping[str, bytes]) -> bytes:
+    """A zip archive of files by name; the same files give the same bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted(files):

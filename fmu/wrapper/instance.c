@@ -49,6 +49,11 @@ qo_instance *qo_new(qo_interface interface, const char *name, int logging, void 
     me->write = write;
     qo_set_logging(me, logging, 0, NULL);
     qo_reset(me);
+    if (interface == QO_MODEL_EXCHANGE && !QO_MODEL_EXCHANGED) {
+        qo_tell(me, QO_ANSWER_ERROR, "This FMU is for co-simulation alone.");
+        qo_free(me);
+        return NULL;
+    }
     return me;
 }
 
