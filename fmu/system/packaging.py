@@ -15,8 +15,8 @@ from fmu.interface import Experiment
 from fmu.packaging import Order, archive_of, build_fmu, identifier_of
 from fmu.platforms import Platform
 from fmu.source import ModelSource, with_neutral
-from fmu.system.parameter_sets import VEHICLE, ParameterSet, parameter_set_file
-from fmu.system.structure import CONTROLLER, RESOURCES, Structure, structure_file
+from fmu.system.parameter_sets import ParameterSet, parameter_set_file
+from fmu.system.structure import CONTROLLER, RESOURCES, VEHICLE, Structure, structure_file
 from fmu.table import variable_table
 from fmu.variables import Inputs
 

@@ -21,9 +21,6 @@ from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS
 
 Array = NDArray[np.float64]
 
-VEHICLE: Final = "vehicle"
-"""Name of the vehicle in the system: the first part of the names of its parameters."""
-
 NORMAL_95: Final = 1.959964
 """Half of a 95 % interval in standard deviations, where nothing better is known."""
 
@@ -143,13 +140,13 @@ def effect_ends(base: ParameterSet, model: ExtendedModel) -> Iterator[ParameterS
 
 
 def parameter_set_file(chosen: ParameterSet, vehicle: VehicleDescription, tool: str) -> bytes:
-    """The set as `.ssv` of SSP 1.0; names are those of the system, `vehicle.m_ch`."""
+    """The set as `.ssv` of SSP 1.0; names are those of the FMU of the vehicle."""
     root = Element("ssv:ParameterSet", _NAMESPACES, version="1.0", name=chosen.name)
     root.set("description", f"{vehicle.name}: {chosen.text}")
     root.set("generationTool", tool)
     rows = SubElement(root, "ssv:Parameters")
     for name, value in chosen.values.items():
-        row = SubElement(rows, "ssv:Parameter", name=f"{VEHICLE}.{name}")
+        row = SubElement(rows, "ssv:Parameter", name=name)
         SubElement(row, "ssv:Real", value=number(value), unit=chosen.units[name])
     add_units(SubElement(root, "ssv:Units"), dict.fromkeys(chosen.units[name] for name in chosen.values))
     return document(root)

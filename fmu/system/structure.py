@@ -1,4 +1,7 @@
-"""`SystemStructure.ssd` of SSP 1.0: what is in the system, and what is connected with what."""
+"""`SystemStructure.ssd` of SSP 1.0: what is in the system, and what is connected with what.
+
+Connectors and bindings are those of the components: importers that read those of a system as well are fewer.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,11 @@ from xml.etree.ElementTree import Element, SubElement
 
 from fmu.description import document
 from fmu.interface import Experiment, number
-from fmu.system.parameter_sets import VEHICLE, add_units
+from fmu.system.parameter_sets import add_units
 from fmu.variables import Causality, Variable, VariableTable
 from ident.vehicle.geometry import WHEELS
 
+VEHICLE: Final = "vehicle"
 CONTROLLER: Final = "controller"
 
 RESOURCES: Final = {VEHICLE: "resources/vehicle.fmu", CONTROLLER: "resources/controller.fmu"}
@@ -22,21 +26,18 @@ _NAMESPACES: Final = {
     "xmlns:ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
 }
 
-_SURROUNDINGS: Final = ("slope_x", "slope_y", "payload")
-"""Inputs of the vehicle that are inputs of the system."""
-
 _MOTION: Final = ("pose_x", "pose_y", "gamma", "x_dot", "y_dot", "gamma_dot")
-"""Outputs of the vehicle that are outputs of the system, beside those of the controller that tell how well it follows."""
+"""Outputs of the vehicle that are shown; of the controller it is all that it puts out."""
 
 
 @dataclass(frozen=True)
 class Connection:
-    """Of a connector of an element with that of another; an element without a name is the system."""
+    """From an output of an element to an input of another."""
 
     start: str
-    start_connector: str
+    output: str
     end: str
-    end_connector: str
+    input: str
 
 
 @dataclass(frozen=True)
@@ -60,26 +61,26 @@ class Structure:
 
     @property
     def connections(self) -> tuple[Connection, ...]:
-        """Torques one way, measured angles the other; floor and load in, motion and how it is followed out."""
+        """Torques one way; the other way angles, as the encoders report them where that is not what they are."""
         told = {row.name for row in self.vehicle.variables}
         torques = [(CONTROLLER, f"torque_{wheel}", VEHICLE, f"torque_{wheel}") for wheel in WHEELS]
         measured = [
             (VEHICLE, f"{name}_reported" if f"{name}_reported" in told else name, CONTROLLER, name)
             for name in (*(f"beta_{wheel}" for wheel in WHEELS), "alpha_l", "alpha_r")
         ]
-        inner = [Connection(*ends) for ends in (*torques, *measured)]
-        inwards = [Connection("", name, VEHICLE, name) for name in _SURROUNDINGS]
-        outwards = [Connection(VEHICLE, name, "", name) for name in _MOTION]
-        outwards += [Connection(CONTROLLER, name, "", name) for name in self._followed()]
-        return (*inner, *inwards, *outwards)
+        return tuple(Connection(*ends) for ends in (*torques, *measured))
 
-    def _followed(self) -> list[str]:
+    def connectors(self, element: str) -> list[tuple[Variable, str]]:
+        """Variables of a component that are connected or shown, each with its kind."""
+        table = {VEHICLE: self.vehicle, CONTROLLER: self.controller}[element]
+        inputs = [(one.input, "input") for one in self.connections if one.end == element]
+        outputs = [(one.output, "output") for one in self.connections if one.start == element]
+        shown = [(name, "output") for name in self._shown(element)]
+        return [(table[name], kind) for name, kind in dict.fromkeys((*inputs, *outputs, *shown))]
+
+    def _shown(self, element: str) -> tuple[str, ...]:
         outputs = (row for row in self.controller.variables if row.causality is Causality.OUTPUT)
-        return [row.name for row in outputs if row.name.startswith(("error_", "reference_", "path_"))]
-
-    def table_of(self, element: str) -> VariableTable:
-        """Variables of a component."""
-        return {VEHICLE: self.vehicle, CONTROLLER: self.controller}[element]
+        return _MOTION if element == VEHICLE else tuple(row.name for row in outputs if row.name != "mode")
 
 
 def structure_file(structure: Structure, binding: str) -> bytes:
@@ -87,44 +88,30 @@ def structure_file(structure: Structure, binding: str) -> bytes:
 
     Args:
         structure: to describe.
-        binding: set of parameters that the system has, in the archive.
+        binding: set of parameters that the vehicle has, in the archive.
     """
     root = Element("ssd:SystemStructureDescription", _NAMESPACES, version="1.0", name=structure.name)
     root.set("description", structure.description)
     root.set("generationTool", structure.tool)
     system = SubElement(root, "ssd:System", name="system", description=structure.description)
-    _connectors(system, [(one, kind) for one, kind in _outer(structure)])
-    bindings = SubElement(system, "ssd:ParameterBindings")
-    SubElement(bindings, "ssd:ParameterBinding", type="application/x-ssp-parameter-set", source=binding)
     elements = SubElement(system, "ssd:Elements")
     for name, source in RESOURCES.items():
         attributes = {"type": "application/x-fmu-sharedlibrary", "implementation": "CoSimulation"}
         component = SubElement(elements, "ssd:Component", attributes, name=name, source=source)
-        _connectors(component, _inner(structure, name))
+        _connectors(component, structure.connectors(name))
+        if name == VEHICLE:
+            bindings = SubElement(component, "ssd:ParameterBindings")
+            SubElement(bindings, "ssd:ParameterBinding", type="application/x-ssp-parameter-set", source=binding)
     lines = SubElement(system, "ssd:Connections")
-    for connection in structure.connections:
-        SubElement(lines, "ssd:Connection", _ends(connection))
-    rows = [row for row, _ in (*_outer(structure), *(pair for name in RESOURCES for pair in _inner(structure, name)))]
-    add_units(SubElement(root, "ssd:Units"), dict.fromkeys(row.unit for row in rows))
+    for one in structure.connections:
+        elements_of = {"startElement": one.start, "endElement": one.end}
+        SubElement(lines, "ssd:Connection", elements_of, startConnector=one.output, endConnector=one.input)
+    used = [row.unit for name in RESOURCES for row, _ in structure.connectors(name)]
+    add_units(SubElement(root, "ssd:Units"), dict.fromkeys(used))
     experiment = structure.experiment
     times = {"startTime": number(experiment.start_time), "stopTime": number(experiment.stop_time)}
     SubElement(root, "ssd:DefaultExperiment", times)
     return document(root)
-
-
-def _outer(structure: Structure) -> list[tuple[Variable, str]]:
-    found = [(structure.table_of(one.end)[one.end_connector], "input") for one in structure.connections if not one.start]
-    found += [
-        (structure.table_of(one.start)[one.start_connector], "output") for one in structure.connections if not one.end
-    ]
-    return found
-
-
-def _inner(structure: Structure, element: str) -> list[tuple[Variable, str]]:
-    table = structure.table_of(element)
-    inputs = [(one.end_connector, "input") for one in structure.connections if one.end == element]
-    outputs = [(one.start_connector, "output") for one in structure.connections if one.start == element]
-    return [(table[name], kind) for name, kind in dict.fromkeys((*inputs, *outputs))]
 
 
 def _connectors(parent: Element, rows: list[tuple[Variable, str]]) -> None:
@@ -132,9 +119,3 @@ def _connectors(parent: Element, rows: list[tuple[Variable, str]]) -> None:
     for row, kind in rows:
         connector = SubElement(group, "ssd:Connector", name=row.name, kind=kind, description=row.description)
         SubElement(connector, "ssc:Real", unit=row.unit)
-
-
-def _ends(connection: Connection) -> dict[str, str]:
-    named = {"startElement": connection.start, "endElement": connection.end}
-    ends = {"startConnector": connection.start_connector, "endConnector": connection.end_connector}
-    return {name: value for name, value in named.items() if value} | ends
