@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from fmu.arrays import with_arrays
 from fmu.attachments import build_description, terminals
 from fmu.compiling import Compiler, compile_libraries, universal_binary
 from fmu.description import FmiVersion, model_description
@@ -26,6 +27,7 @@ from fmu.platforms import PLATFORMS, Platform
 from fmu.reference import Reference, reference_drive
 from fmu.source import Model, ModelSource, make_model, with_neutral
 from fmu.variables import Inputs
+from ident.errors import UserError
 from ident.plant.contact import Contacts
 
 INDICATORS: Final = 4
@@ -56,6 +58,10 @@ class Order:
         platforms: to build for.
         contacts: stiff for solvers that are implicit, soft for others.
         limited: torque inputs are limited to what the motors can; speed loops always are.
+        arrays: of the four wheels beside scalars.
+
+    Raises:
+        UserError: arrays of a version that has none.
     """
 
     version: FmiVersion
@@ -63,6 +69,11 @@ class Order:
     platforms: tuple[Platform, ...]
     contacts: Contacts = Contacts.STIFF
     limited: bool = False
+    arrays: bool = False
+
+    def __post_init__(self) -> None:
+        if self.arrays and self.version is not FmiVersion.FMI3:
+            raise UserError("FMI 2.0 has no arrays.", "Ask for them in FMI 3.0 (--fmi 3), or do without.")
 
 
 def build_fmu(
@@ -111,6 +122,7 @@ def fmu_sources(model: Model, interface: Interface, version: FmiVersion, token: 
 
 
 def _interface(source: ModelSource, model: Model, order: Order) -> Interface:
+    table = with_indicators(model.table, INDICATORS)
     return Interface(
         name=f"quasiomni.{identifier_of(source.vehicle.name)}",
         description=f"Identified model of {source.vehicle.name}, {order.inputs} inputs, {order.contacts} contacts",
@@ -118,7 +130,7 @@ def _interface(source: ModelSource, model: Model, order: Order) -> Interface:
         tool=f"quasiomni {version('quasiomni')}",
         copyright=COPYRIGHT,
         license="Apache-2.0",
-        table=with_indicators(model.table, INDICATORS),
+        table=with_arrays(table) if order.arrays else table,
         dependencies=model.dependencies,
         experiment=_EXPERIMENTS[order.contacts](model),
     )

@@ -21,9 +21,7 @@ def build(
         Path | None,
         typer.Option(help="parameters.toml that `diagnose --extended` wrote: the vehicle has its effects."),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File to write. Default: system.ssp in RUN.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="File to write. Default: system.ssp in RUN.")] = None,
     platforms: Annotated[
         str, typer.Option(help="`all`, `host`, or names parted by commas, e.g. `x86_64-linux,x86_64-windows`.")
     ] = "all",

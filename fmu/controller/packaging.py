@@ -86,10 +86,10 @@ def _page(interface: Interface, provenance: Mapping[str, str]) -> str:
 <style>body {{ font: 15px/1.5 sans-serif; margin: 2em auto; max-width: 60em }}
 td, th {{ padding: .1em .8em .1em 0; text-align: left; vertical-align: top }}</style></head><body>
 <h1>{html.escape(interface.name)}</h1>
-<p>{html.escape(interface.description)}: feed-forward torques and one cascade a coordinate, P on position around PI on
-velocity. sample_time is {sample_time:g} s: a sample is due at every multiple of it, taken at the beginning of the
-communication step that reaches it, with the inputs of that moment. Torques hold between samples. Communication steps that
-are longer are refused. When the reference has ended, its last sample goes on.</p>
+<p>{html.escape(interface.description)}: feed-forward torques and one cascade a coordinate, P on position around PI
+on velocity. sample_time is {sample_time:g} s: a sample is due at every multiple of it, taken at the beginning of the
+communication step that reaches it, with the inputs of that moment. Torques hold between samples. Communication steps
+that are longer are refused. When the reference has ended, its last sample goes on.</p>
 <ul>{origin}</ul>
 <table><tr><th>variable</th><th>causality</th><th>unit</th><th>start</th><th>what</th></tr>
 {rows}

@@ -101,7 +101,12 @@ def inputs_of() -> Groups:
 
 
 _PER_LOOP: Final[tuple[tuple[str, str, Callable[[str], str], Callable[[ControllerSource, str], float]], ...]] = (
-    ("position_gain", "Rate asked for per position error of {}", lambda _: "1/s", lambda s, n: s.designs[n].position_gain),
+    (
+        "position_gain",
+        "Rate asked for per position error of {}",
+        lambda _: "1/s",
+        lambda s, n: s.designs[n].position_gain,
+    ),
     (
         "velocity_gain",
         "Generalized torque per error of the rate of {}",

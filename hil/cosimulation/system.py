@@ -27,7 +27,7 @@ from ident.plant.modes import Mode
 from ident.records.record import Step
 from ident.vehicle.parameters import PARAMETER_NAMES
 from ident.vehicle.quantities import read_toml
-from ident.writing import refuse_inputs, write_whole
+from ident.writing import refuse_folder, refuse_inputs, write_whole
 
 Array = NDArray[np.float64]
 
@@ -148,6 +148,7 @@ def export_system(
         UserError: the run is not identified, there is no compiler for a platform, or the file cannot be written or is
             one of the run.
     """
+    refuse_folder(out)
     refuse_inputs([out], [*sources_of(run), RunFolder(run).parameters, model])
     system, compiler = system_of_run(run, model, force=force), find_compiler()
     check_platforms(compiler, platforms)

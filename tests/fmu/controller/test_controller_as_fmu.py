@@ -106,7 +106,7 @@ def in_python(plan: Plan, reference: Reference) -> Controller:
 
 
 def measurements(reference: Reference, noise: float) -> Array:
-    """Angles (N, 6) of a vehicle that follows its reference, give or take some noise [rad], from where it stood before."""
+    """Angles (N, 6) of a vehicle that follows its reference, give or take some noise [rad], from anywhere."""
     rates = np.zeros((len(reference), 4))
     for track in reference.tracks.values():
         rates += track.wheels * track.velocity[:, None]

@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "arrays.h"
 #include "instance.h"
 
 #include "fmi2Functions.h"
@@ -188,6 +189,37 @@ static void set_one(void)
             fail("a refused call changes a variable");
         }
     }
+}
+
+/* An array of wheels: the same as its scalars, whoever is set; refused or taken whole. */
+static void set_or_get_array(void)
+{
+    const unsigned number = below((unsigned)qo_array_count), reference = QO_VARIABLES + number;
+    double values[QO_WHEELS], scalars[QO_WHEELS] = {0}, seed[QO_WHEELS], result[QO_WHEELS];
+    int i, taken_whole = 1;
+    if (!now.is3) {
+        return;
+    }
+    for (i = 0; i < QO_WHEELS; i++) {
+        values[i] = seed[i] = any_value(1.0);
+    }
+    last_message[0] = '\0';
+    if (below(2) && check(fmi3SetFloat64(now.instance, &reference, 1, values, QO_WHEELS)) == 0) {
+        for (i = 0; i < QO_WHEELS; i++) {
+            taken_whole &= isfinite(values[i]) != 0;
+        }
+        if (!taken_whole || qo_variables[qo_arrays[number].members[0]].role != QO_INPUT) {
+            fail("an array is taken that is not finite or no input");
+        }
+    }
+    last_message[0] = '\0';
+    if (check(fmi3GetFloat64(now.instance, &reference, 1, values, QO_WHEELS)) == 0 &&
+        (get(qo_arrays[number].members, QO_WHEELS, scalars) != 0 || memcmp(values, scalars, sizeof values) != 0)) {
+        fail("an array is not its scalars");
+    }
+    last_message[0] = '\0';
+    check(fmi3GetDirectionalDerivative(now.instance, &reference, 1, &qo_arrays[0].members[0], 1, seed, 1, result,
+                                       QO_WHEELS - (below(5) == 0)));
 }
 
 /* Between two internal steps: an input, or something that must not be set there. */
@@ -467,7 +499,7 @@ static void sequence(void)
     begin();
     for (call_now = 0; now.instance != NULL && call_now < CALLS; call_now++) {
         last_message[0] = '\0';
-        switch (below(12)) {
+        switch (below(13)) {
         case 0:
         case 1:
         case 2: change_mode(); break;
@@ -477,6 +509,7 @@ static void sequence(void)
         case 6: differentiate(); break;
         case 7: save_or_restore(); break;
         case 8: solver_call(); break;
+        case 9: set_or_get_array(); break;
         default: do_step();
         }
     }

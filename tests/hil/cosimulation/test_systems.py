@@ -1,4 +1,4 @@
-"""A run as a system of vehicle and controller: valid, the same in every importer, and its lane change that of the bench."""
+"""A run as a system of vehicle and controller: valid, the same in every importer, its lane change that of the bench."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def test_the_structures_differ_in_their_set_of_parameters_alone(unpacked: Path) 
 
 
 def follow(master: Master, reference: Reference, run: Run) -> tuple[Array, Array]:
-    """Steering angles (N, 2) and how far the wheels rolled (N, 4) [rad] in the lane change as the campaign drives it."""
+    """Steering angles (N, 2) and how far the wheels rolled (N, 4) [rad] in the lane change of a campaign."""
     vehicle = run.plan.vehicle
     limits = {"gear_ratio": vehicle.geometry.gear_ratio, "peak_torque": vehicle.limits.peak_torque}
     controller = Controller(reference, run.plan.designs, run.plan.limits, **limits)
@@ -208,9 +208,7 @@ def test_at_a_corner_the_vehicle_is_another_one_and_is_still_controlled(
     system: Path, driven: Any, reference: Reference, corner: str
 ) -> None:
     """One percent of standard deviation."""
-    found = simulate_ssp(
-        str(system), stop_time=reference.duration, step_size=STEP, parameter_set=named(system, corner)
-    )
+    found = simulate_ssp(str(system), stop_time=reference.duration, step_size=STEP, parameter_set=named(system, corner))
     assert np.abs(found["vehicle.torque_fl"] - driven["vehicle.torque_fl"]).max() > 1e-3
     assert found["vehicle.pose_y"][-1] == pytest.approx(1.2, abs=5e-3)
 
