@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from fmu.arrays import with_array_inputs, write_array, write_unknowns
 from fmu.interface import LOG_CATEGORIES, MODEL_IDENTIFIER, Interface, initial_of, number
 from fmu.units import DisplayUnit
 from fmu.variables import Block, Causality, Variable
@@ -58,7 +59,7 @@ def _write_fmi2(interface: Interface, token: str, sources: Sequence[str]) -> Ele
     indicators = str(len(interface.table.block(Block.INDICATOR)))
     root = Element("fmiModelDescription", _common(interface), fmiVersion="2.0", guid=token)
     root.set("numberOfEventIndicators", indicators)
-    for kind, flags in _KINDS_FMI2.items():
+    for kind, flags in (_SAMPLED_FMI2 if interface.sampled else _KINDS_FMI2).items():
         element = SubElement(root, kind, {"modelIdentifier": MODEL_IDENTIFIER, **flags})
         files = SubElement(element, "SourceFiles")
         for name in sources:
@@ -76,6 +77,8 @@ def _write_fmi2(interface: Interface, token: str, sources: Sequence[str]) -> Ele
         "InitialUnknowns": interface.initial_unknowns,
     }
     for name, rows in groups.items():
+        if not rows:
+            continue
         group = SubElement(structure, name)
         for row in rows:
             known = None if name == "InitialUnknowns" else interface.dependencies_of(row)
@@ -93,6 +96,8 @@ def _write_fmi3(interface: Interface, token: str, _sources: Sequence[str]) -> El
     variables = SubElement(root, "ModelVariables")
     for row in interface.table.variables:
         _variable_fmi3(variables, row, interface)
+    for array in interface.table.arrays:
+        write_array(variables, array, _attributes_fmi3(array.row))
     structure = SubElement(root, "ModelStructure")
     groups = {
         "Output": interface.outputs,
@@ -102,10 +107,17 @@ def _write_fmi3(interface: Interface, token: str, _sources: Sequence[str]) -> El
     }
     for name, rows in groups.items():
         for row in rows:
-            known = None if name == "InitialUnknown" else interface.dependencies_of(row)
+            known = None if name == "InitialUnknown" else _knowns_fmi3(interface, row)
             attributes = {"valueReference": str(row.value_reference), **_dependencies(known, first=0)}
             SubElement(structure, name, attributes)
+        if name in ("Output", "InitialUnknown"):
+            write_unknowns(structure, name, interface.table)
     return root
+
+
+def _knowns_fmi3(interface: Interface, row: Variable) -> tuple[Variable, ...] | None:
+    known = interface.dependencies_of(row)
+    return None if known is None else with_array_inputs(interface.table, known)
 
 
 def _dependencies(known: Sequence[Variable] | None, *, first: int) -> dict[str, str]:
@@ -136,6 +148,18 @@ _KINDS_FMI2: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
         },
     }
 )
+
+_SAMPLED_FMI2: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
+    {
+        "CoSimulation": {
+            "canHandleVariableCommunicationStepSize": "true",
+            "canNotUseMemoryManagementFunctions": "true",
+            "canGetAndSetFMUstate": "true",
+            "canSerializeFMUstate": "true",
+        }
+    }
+)
+"""Of what acts at instants of its own."""
 
 _STATE_FMI3: Final = {
     "canGetAndSetFMUState": "true",
@@ -235,9 +259,14 @@ def _variable_fmi3(parent: Element, row: Variable, interface: Interface) -> None
     if row.block is Block.MODE:
         SubElement(parent, "Int32", _head(row) | _bounds(row, lambda value: str(int(value))))
         return
-    values = _head(row) | _real(row)
+    values = _attributes_fmi3(row)
     if row.state:
         values["derivative"] = str(interface.table[row.state].value_reference)
+    SubElement(parent, "Float64", values)
+
+
+def _attributes_fmi3(row: Variable) -> dict[str, str]:
+    values = _head(row) | _real(row)
     if row.causality in (Causality.INPUT, Causality.OUTPUT):
         values["intermediateUpdate"] = "true"
-    SubElement(parent, "Float64", values)
+    return values

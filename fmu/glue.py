@@ -8,13 +8,14 @@ from importlib import resources
 from types import MappingProxyType
 from typing import Final
 
+from fmu.arrays import arrays_source
 from fmu.description import FmiVersion
 from fmu.variables import Block, VariableTable
 
-_WRITTEN: Final = ("instance.h", "instance.c", "values.c", "sensitivity.c", "stepping.c")
+_WRITTEN: Final = ("instance.h", "instance.c", "saved.c", "values.c", "sensitivity.c", "stepping.c")
 
-_ENTRY: Final = {FmiVersion.FMI2: "fmi2.c", FmiVersion.FMI3: "fmi3.c"}
-"""The functions of the standard."""
+_ENTRY: Final = {FmiVersion.FMI2: ("fmi2.c",), FmiVersion.FMI3: ("fmi3.c", "arrays.h", "arrays.c")}
+"""The functions of the standard, and what they need."""
 
 _ROLES: Final[Mapping[Block, str]] = MappingProxyType(
     {
@@ -33,8 +34,10 @@ _ROLES: Final[Mapping[Block, str]] = MappingProxyType(
 
 def wrapper_sources(table: VariableTable, version: FmiVersion, token: str) -> dict[str, bytes]:
     """C files of the wrapper: file name -> text. They compile together with those of the model."""
-    names = (*_WRITTEN, _ENTRY[version])
+    names = (*_WRITTEN, *_ENTRY[version])
     written = {name: (resources.files("fmu") / "wrapper" / name).read_bytes() for name in names}
+    if version is FmiVersion.FMI3:
+        written["arrays_of_wheels.c"] = arrays_source(table).encode()
     return {**written, "variables.h": _header(table, token).encode(), "variables.c": _rows(table, token).encode()}
 
 
@@ -47,6 +50,7 @@ def _header(table: VariableTable, token: str) -> str:
 #define QO_TOKEN "{token}"
 #define QO_VARIABLES {len(table.variables)}
 #define QO_MARK_SIZE {len(_mark(token))}
+#define QO_MODEL_EXCHANGED {int(bool(table.block(Block.DERIVATIVE)))} /* whether there is a model to exchange */
 
 typedef enum {{
 {roles}

@@ -45,6 +45,7 @@ class Interface:
         dependencies: names of the states and inputs that an output or derivative depends on; of what is not named,
             nothing is said.
         experiment: defaults of a simulation.
+        sampled: it acts at instants of its own, in co-simulation alone, and has nothing to differentiate.
     """
 
     name: str
@@ -56,6 +57,7 @@ class Interface:
     table: VariableTable
     dependencies: Mapping[str, tuple[str, ...]]
     experiment: Experiment = Experiment()
+    sampled: bool = False
 
     @property
     def outputs(self) -> tuple[Variable, ...]:
@@ -80,7 +82,7 @@ class Interface:
     def dependencies_of(self, row: Variable) -> tuple[Variable, ...] | None:
         """States and inputs that a variable depends on while the simulation runs; None where nothing is said."""
         if row.block is Block.STATE:
-            return (row,)
+            return (row,) if row.variability is Variability.CONTINUOUS else ()
         names = self.dependencies.get(row.name)
         return None if names is None else tuple(other for other in self.table.variables if other.name in names)
 

@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from fmu.arrays import with_arrays
 from fmu.attachments import build_description, terminals
 from fmu.compiling import Compiler, compile_libraries, universal_binary
 from fmu.description import FmiVersion, model_description
@@ -26,6 +27,7 @@ from fmu.platforms import PLATFORMS, Platform
 from fmu.reference import Reference, reference_drive
 from fmu.source import Model, ModelSource, make_model, with_neutral
 from fmu.variables import Inputs
+from ident.errors import UserError
 from ident.plant.contact import Contacts
 
 INDICATORS: Final = 4
@@ -34,9 +36,9 @@ INDICATORS: Final = 4
 _TIME: Final = (1980, 1, 1, 0, 0, 0)
 """Of every file in the archive: the earliest that the format knows."""
 
-_COPYRIGHT: Final = "Whoever identified the vehicle; source code of quasiomni under the licence named"
+COPYRIGHT: Final = "Whoever identified the vehicle; source code of quasiomni under the licence named"
 
-_LICENSE: Final = """The source code of this FMU is part of quasiomni.
+LICENSE: Final = """The source code of this FMU is part of quasiomni.
 
 SPDX-License-Identifier: Apache-2.0
 
@@ -56,6 +58,10 @@ class Order:
         platforms: to build for.
         contacts: stiff for solvers that are implicit, soft for others.
         limited: torque inputs are limited to what the motors can; speed loops always are.
+        arrays: of the four wheels beside scalars.
+
+    Raises:
+        UserError: arrays of a version that has none.
     """
 
     version: FmiVersion
@@ -63,6 +69,11 @@ class Order:
     platforms: tuple[Platform, ...]
     contacts: Contacts = Contacts.STIFF
     limited: bool = False
+    arrays: bool = False
+
+    def __post_init__(self) -> None:
+        if self.arrays and self.version is not FmiVersion.FMI3:
+            raise UserError("FMI 2.0 has no arrays.", "Ask for them in FMI 3.0 (--fmi 3), or do without.")
 
 
 def build_fmu(
@@ -86,7 +97,7 @@ def build_fmu(
     """
     model = make_model(source, order.inputs, order.contacts, order.limited)
     interface = _interface(source, model, order)
-    token = _token(model, interface, order.version)
+    token = token_of(model, interface, order.version)
     sources = fmu_sources(model, interface, order.version, token)
     libraries = compile_libraries(sources, order.platforms, compiler, progress, cache)
     reference = reference_drive(model.table, with_neutral(source.effects), order.inputs)
@@ -95,13 +106,13 @@ def build_fmu(
     files = {
         "modelDescription.xml": description,
         **{f"sources/{name}": text for name, text in sources.items()},
-        **_binaries(libraries, order.version),
+        **binaries_of(libraries, order.version),
         "sources/CMakeLists.txt": (resources.files("fmu") / "data" / "CMakeLists.txt").read_bytes(),
         **{f"resources/{name}": content for name, content in reference.files().items()},
         **_documentation(source, interface, order, reference),
         **_VERSION_FILES[order.version](order.inputs, units),
     }
-    return _archive(files)
+    return archive_of(files)
 
 
 def fmu_sources(model: Model, interface: Interface, version: FmiVersion, token: str) -> dict[str, bytes]:
@@ -111,14 +122,15 @@ def fmu_sources(model: Model, interface: Interface, version: FmiVersion, token: 
 
 
 def _interface(source: ModelSource, model: Model, order: Order) -> Interface:
+    table = with_indicators(model.table, INDICATORS)
     return Interface(
-        name=f"quasiomni.{_identifier(source.vehicle.name)}",
+        name=f"quasiomni.{identifier_of(source.vehicle.name)}",
         description=f"Identified model of {source.vehicle.name}, {order.inputs} inputs, {order.contacts} contacts",
         version=version("quasiomni"),
         tool=f"quasiomni {version('quasiomni')}",
-        copyright=_COPYRIGHT,
+        copyright=COPYRIGHT,
         license="Apache-2.0",
-        table=with_indicators(model.table, INDICATORS),
+        table=with_arrays(table) if order.arrays else table,
         dependencies=model.dependencies,
         experiment=_EXPERIMENTS[order.contacts](model),
     )
@@ -137,11 +149,12 @@ def _for_explicit_solvers(model: Model) -> Experiment:
 _EXPERIMENTS: Final = {Contacts.STIFF: _for_implicit_solvers, Contacts.SOFT: _for_explicit_solvers}
 
 
-def _identifier(name: str) -> str:
+def identifier_of(name: str) -> str:
+    """A name of letters, digits and underscores."""
     return "".join(letter if letter.isalnum() else "_" for letter in name)
 
 
-def _token(model: Model, interface: Interface, version: FmiVersion) -> str:
+def token_of(model: Model, interface: Interface, version: FmiVersion) -> str:
     """A UUID of all that the description and the C code are made from."""
     without = model_description(interface, version, "", [])
     digest = hashlib.sha256(without)
@@ -150,7 +163,7 @@ def _token(model: Model, interface: Interface, version: FmiVersion) -> str:
     return f"{{{uuid.UUID(bytes=digest.digest()[:16], version=5)}}}"
 
 
-def _binaries(libraries: Mapping[str, bytes], version: FmiVersion) -> dict[str, bytes]:
+def binaries_of(libraries: Mapping[str, bytes], version: FmiVersion) -> dict[str, bytes]:
     """FMI 2.0 has one folder for macOS, whose library is then for both processors."""
     if version is FmiVersion.FMI3:
         return {
@@ -169,7 +182,7 @@ def _documentation(source: ModelSource, interface: Interface, order: Order, refe
     python = ".".join(str(part) for part in sys.version_info[:3])
     versions = {"quasiomni": version("quasiomni"), "casadi": version("casadi"), "python": python}
     page = documentation_page(source, interface, order.inputs, reference, versions)
-    files = {"index.html": page.encode(), "licenses/license.txt": _LICENSE.encode(), **source.documents}
+    files = {"index.html": page.encode(), "licenses/license.txt": LICENSE.encode(), **source.documents}
     return {f"documentation/{name}": content for name, content in files.items()}
 
 
@@ -193,7 +206,8 @@ def _picture(name: str) -> bytes:
     return (resources.files("fmu") / "data" / name).read_bytes()
 
 
-def _archive(files: Mapping[str, bytes]) -> bytes:
+def archive_of(files: Mapping[str, bytes]) -> bytes:
+    """A zip archive of files by name; the same files give the same bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted(files):

@@ -89,10 +89,29 @@ class Variable:
 
 
 @dataclass(frozen=True)
+class WheelArray:
+    """Four scalars under one name.
+
+    Attributes:
+        row: as a variable; its value reference follows those of all scalars.
+        members: the scalars, fl, rl, fr, rr.
+    """
+
+    row: Variable
+    members: tuple[Variable, ...]
+
+
+@dataclass(frozen=True)
 class VariableTable:
-    """All variables by value reference: time, states, derivatives, inputs, parameters, outputs, mode, calculated."""
+    """All variables by value reference: time, states, derivatives, inputs, parameters, outputs, mode, calculated.
+
+    Attributes:
+        variables: scalars.
+        arrays: of wheels, beside them.
+    """
 
     variables: tuple[Variable, ...]
+    arrays: tuple[WheelArray, ...] = ()
 
     def __getitem__(self, name: str) -> Variable:
         """A variable by its name."""

@@ -89,6 +89,9 @@ COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
         "exchange.",
         "cosim": "Replay a record's torques through an FMU, and say how far its motion is from the recorded one.",
     },
+    "system": {
+        "ssp": "Package the vehicle and the controller of its lane change as a system (SSP), with sets of parameters.",
+    },
     "serving": {
         "emulate": "Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C.",
     },

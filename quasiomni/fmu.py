@@ -52,10 +52,13 @@ def build(
     limits: Annotated[
         bool, typer.Option("--limits", help="Torques beyond the motors' peak torque are limited to it.")
     ] = False,
+    arrays: Annotated[
+        bool, typer.Option("--arrays", help="FMI 3.0: arrays of the four wheels beside scalars, `torque` for one.")
+    ] = False,
     force: ForceOption = False,
 ) -> None:
     """Package the identified model, with its confirmed effects, as an FMU for co-simulation and model exchange."""
-    order = Order(fmi, inputs, parse_platforms(platforms), contacts, limits)
+    order = Order(fmi, inputs, parse_platforms(platforms), contacts, limits, arrays)
     with bars() as shown:
         task = shown.add_task("compiling", total=None)
 

@@ -77,7 +77,7 @@ def generate_core(table: VariableTable, effects: Sequence[Effect], inputs: Input
     written = {name: (resources.files("fmu.model") / name).read_text(encoding="utf-8") for name in _WRITTEN}
     generated = {
         "qo_sizes.h": _sizes(table, jacobian_size, model),
-        "qo_table.c": _table(table),
+        "qo_table.c": table_source(table),
         "qo_equations.h": _prototypes(routines),
         "qo_equations.c": _definitions(routines),
     }
@@ -174,10 +174,11 @@ def _signature(routine: _Routine) -> str:
 
 def _prototypes(routines: Sequence[_Routine]) -> str:
     lines = [f"{_signature(routine)};" for routine in routines]
-    return _guarded("QO_EQUATIONS_H", "The equations of the model.", lines)
+    return guarded("QO_EQUATIONS_H", "The equations of the model.", lines)
 
 
-def _guarded(guard: str, comment: str, lines: Sequence[str]) -> str:
+def guarded(guard: str, comment: str, lines: Sequence[str]) -> str:
+    """A generated header file of some lines, under a guard, with a comment."""
     return "\n".join(
         [f"/* {comment} Generated. */", f"#ifndef {guard}", f"#define {guard}", "", *lines, "", "#endif", ""]
     )
@@ -221,10 +222,11 @@ def _sizes(table: VariableTable, jacobian_size: int, model: Equations) -> str:
     }
     lines = [f"#define QO_{name} {size}" for name, size in sizes.items()]
     lines += [f"#define QO_TOLERANCE {TOLERANCE!r}", f"#define QO_FIRST_STEP {FIRST_STEP!r}"]
-    return _guarded("QO_SIZES_H", "Sizes of the model.", lines)
+    return guarded("QO_SIZES_H", "Sizes of the model.", lines)
 
 
-def _table(table: VariableTable) -> str:
+def table_source(table: VariableTable) -> str:
+    """`qo_table.c` of a table of variables."""
     lines = ["/* The table of variables. Generated. */", '#include "qo_internal.h"', ""]
     for name, size, block in _ROWS:
         lines += [f"const qo_row qo_{name}[QO_{size}] = {{", *map(_row, table.block(block)), "};", ""]

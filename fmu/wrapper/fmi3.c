@@ -1,6 +1,7 @@
 /* FMI 3.0.1 on one instance. */
 #include <string.h>
 
+#include "arrays.h"
 #include "fmi3Functions.h"
 #include "instance.h"
 
@@ -20,6 +21,12 @@
 #define GIVEN(pointer)                                                                                               \
     if ((pointer) == NULL) {                                                                                         \
         return (fmi3Status)qo_tell(me, QO_ANSWER_ERROR, "%s is a null pointer.", #pointer);                          \
+    }
+
+/* Scalars that value references stand for. */
+#define SCALARS(found, references, orders, n)                                                                        \
+    if (!qo_scalars_of(me, references, orders, n, &(found))) {                                                       \
+        return fmi3Error;                                                                                            \
     }
 
 #define SETTABLE (QO_INSTANTIATED | QO_INITIALIZATION | QO_RUNNING)
@@ -180,15 +187,28 @@ fmi3Status fmi3Reset(fmi3Instance instance)
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           fmi3Float64 values[], size_t nValues)
 {
+    qo_scalars of;
+    qo_answer answer;
     INSTANCE(fmi3GetFloat64, QO_READABLE)
-    return (fmi3Status)qo_get(me, valueReferences, nValueReferences, values, nValues);
+    SCALARS(of, valueReferences, NULL, nValueReferences)
+    answer = qo_get(me, of.references, of.n, values, nValues);
+    qo_scalars_free(&of);
+    return (fmi3Status)answer;
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           const fmi3Float64 values[], size_t nValues)
 {
+    qo_scalars of;
+    qo_answer answer;
     INSTANCE(fmi3SetFloat64, SETTABLE | QO_UPDATING)
-    return (fmi3Status)qo_set(me, valueReferences, nValueReferences, values, nValues);
+    if (!qo_settable_arrays(me, valueReferences, nValueReferences)) {
+        return fmi3Error;
+    }
+    SCALARS(of, valueReferences, NULL, nValueReferences)
+    answer = qo_set(me, of.references, of.n, values, nValues);
+    qo_scalars_free(&of);
+    return (fmi3Status)answer;
 }
 
 fmi3Status fmi3GetInt32(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
@@ -344,13 +364,34 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte seriali
     return (fmi3Status)qo_deserialize(me, (const char *)serializedState, size, FMUState);
 }
 
+typedef qo_answer (*derivative)(qo_instance *me, const unsigned unknowns[], size_t n_unknowns,
+                                const unsigned knowns[], size_t n_knowns, const double seed[], size_t n_seed,
+                                double result[], size_t n_result);
+
+/* Derivatives of one kind between variables that may be arrays. */
+static fmi3Status between(qo_instance *me, derivative function, const fmi3ValueReference unknowns[], size_t n_unknowns,
+                          const fmi3ValueReference knowns[], size_t n_knowns, const double seed[], size_t n_seed,
+                          double result[], size_t n_result)
+{
+    qo_scalars of, by;
+    qo_answer answer;
+    SCALARS(of, unknowns, NULL, n_unknowns)
+    if (!qo_scalars_of(me, knowns, NULL, n_knowns, &by)) {
+        qo_scalars_free(&of);
+        return fmi3Error;
+    }
+    answer = function(me, of.references, of.n, by.references, by.n, seed, n_seed, result, n_result);
+    qo_scalars_free(&of);
+    qo_scalars_free(&by);
+    return (fmi3Status)answer;
+}
+
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
                                         const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                         size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
     INSTANCE(fmi3GetDirectionalDerivative, QO_INITIALIZATION | QO_RUNNING | QO_UPDATING | QO_TERMINATED)
-    return (fmi3Status)qo_directional(me, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity,
-                                      nSensitivity);
+    return between(me, qo_directional, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity);
 }
 
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
@@ -358,7 +399,7 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
                                     size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
     INSTANCE(fmi3GetAdjointDerivative, QO_INITIALIZATION | QO_RUNNING | QO_UPDATING | QO_TERMINATED)
-    return (fmi3Status)qo_adjoint(me, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity);
+    return between(me, qo_adjoint, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity);
 }
 
 /* There are no structural parameters. */
@@ -482,8 +523,13 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueRefere
                                     size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[],
                                     size_t nValues)
 {
+    qo_scalars of;
+    qo_answer answer;
     INSTANCE_AS(fmi3GetOutputDerivatives, QO_CO_SIMULATION, QO_STEP | QO_UPDATING | QO_TERMINATED)
-    return (fmi3Status)qo_output_derivatives(me, valueReferences, nValueReferences, orders, values, nValues);
+    SCALARS(of, valueReferences, orders, nValueReferences)
+    answer = qo_output_derivatives(me, of.references, of.n, of.orders, values, nValues);
+    qo_scalars_free(&of);
+    return (fmi3Status)answer;
 }
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,

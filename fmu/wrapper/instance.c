@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -50,6 +49,11 @@ qo_instance *qo_new(qo_interface interface, const char *name, int logging, void 
     me->write = write;
     qo_set_logging(me, logging, 0, NULL);
     qo_reset(me);
+    if (interface == QO_MODEL_EXCHANGE && !QO_MODEL_EXCHANGED) {
+        qo_tell(me, QO_ANSWER_ERROR, "This FMU is for co-simulation alone.");
+        qo_free(me);
+        return NULL;
+    }
     return me;
 }
 
@@ -188,112 +192,5 @@ qo_answer qo_reset(qo_instance *me)
     qo_init(&me->now.model);
     me->now.stop_time = HUGE_VAL;
     me->now.mode = QO_INSTANTIATED;
-    return QO_ANSWER_OK;
-}
-
-/* A saved state is a snapshot behind a mark, so that what another model or version has saved is refused. */
-typedef struct {
-    char mark[QO_MARK_SIZE];
-    qo_snapshot snapshot;
-} saved;
-
-static int is_saved(const qo_instance *me, const saved *state)
-{
-    if (state == NULL || memcmp(state->mark, qo_mark, QO_MARK_SIZE) != 0) {
-        qo_tell(me, QO_ANSWER_ERROR, "That is no saved state of this model.");
-        return 0;
-    }
-    return 1;
-}
-
-qo_answer qo_save(qo_instance *me, void **state)
-{
-    saved *copy;
-    if (state == NULL || (*state != NULL && !is_saved(me, *state))) {
-        return qo_tell(me, QO_ANSWER_ERROR, "There is no place to save the state to.");
-    }
-    copy = *state == NULL ? malloc(sizeof *copy) : *state;
-    if (copy == NULL) {
-        return qo_tell(me, QO_ANSWER_ERROR, "There is no memory for a saved state.");
-    }
-    memcpy(copy->mark, qo_mark, QO_MARK_SIZE);
-    memcpy(&copy->snapshot, &me->now, sizeof copy->snapshot);
-    *state = copy;
-    return QO_ANSWER_OK;
-}
-
-qo_answer qo_restore(qo_instance *me, const void *state)
-{
-    const saved *copy = state;
-    const qo_mode foreign = me->interface == QO_CO_SIMULATION ? QO_CONTINUOUS_TIME : QO_STEP;
-    if (!is_saved(me, copy)) {
-        return QO_ANSWER_ERROR;
-    }
-    if (copy->snapshot.mode == (int)foreign) {
-        return qo_tell(me, QO_ANSWER_ERROR, "That state was saved in %s.",
-                       foreign == QO_STEP ? "co-simulation" : "model exchange");
-    }
-    memcpy(&me->now, &copy->snapshot, sizeof me->now);
-    return QO_ANSWER_OK;
-}
-
-qo_answer qo_forget(qo_instance *me, void **state)
-{
-    if (state == NULL || *state == NULL) {
-        return QO_ANSWER_OK;
-    }
-    if (!is_saved(me, *state)) {
-        return QO_ANSWER_ERROR;
-    }
-    free(*state);
-    *state = NULL;
-    return QO_ANSWER_OK;
-}
-
-size_t qo_serialized_size(void)
-{
-    return sizeof(saved);
-}
-
-qo_answer qo_serialize(qo_instance *me, const void *state, char bytes[], size_t size)
-{
-    if (!is_saved(me, state)) {
-        return QO_ANSWER_ERROR;
-    }
-    if (bytes == NULL || size < sizeof(saved)) {
-        return qo_tell(me, QO_ANSWER_ERROR, "A saved state takes %lu bytes.", (unsigned long)sizeof(saved));
-    }
-    memcpy(bytes, state, sizeof(saved));
-    return QO_ANSWER_OK;
-}
-
-/* Bytes may come from anywhere: a snapshot that no instance can have written is refused, and what it claims to have
- * computed is computed again. */
-static int is_sound(qo_snapshot *snapshot)
-{
-    const int mode = snapshot->mode, k = snapshot->model.mode;
-    const double tolerance = snapshot->model.tolerance;
-    snapshot->model.message[QO_MESSAGE_SIZE - 1] = '\0';
-    snapshot->known = 0;
-    return mode > 0 && (mode & QO_ANY_MODE) == mode && (mode & (mode - 1)) == 0 && is_finite(snapshot->time) &&
-           k >= 1 && k <= 4 && tolerance > 0.0 && tolerance < 1.0 && qo_check(&snapshot->model) == QO_OK;
-}
-
-qo_answer qo_deserialize(qo_instance *me, const char bytes[], size_t size, void **state)
-{
-    saved *copy;
-    if (state == NULL || bytes == NULL || size != sizeof(saved)) {
-        return qo_tell(me, QO_ANSWER_ERROR, "A saved state takes %lu bytes.", (unsigned long)sizeof(saved));
-    }
-    copy = malloc(sizeof *copy);
-    if (copy == NULL) {
-        return qo_tell(me, QO_ANSWER_ERROR, "There is no memory for a saved state.");
-    }
-    memcpy(copy, bytes, sizeof *copy);
-    if (!is_saved(me, copy) || !is_sound(&copy->snapshot)) {
-        free(copy);
-        return qo_tell(me, QO_ANSWER_ERROR, "These bytes are no saved state of this model.");
-    }
-    *state = copy;
     return QO_ANSWER_OK;
 }

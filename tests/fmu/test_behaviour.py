@@ -162,14 +162,45 @@ def test_a_description_of_another_fmu_is_refused(torque_fmu: Path) -> None:
         )
 
 
-def test_saved_bytes_that_were_changed_are_refused(torque_fmu: Path, opened: Open) -> None:
-    vehicle = opened(torque_fmu).begin()
+def _serialized(vehicle: Vehicle) -> bytes:
     instance = vehicle.instance
     state = (instance.getFMUState if vehicle.is_new else instance.getFMUstate)()
-    content = bytearray((instance.serializeFMUState if vehicle.is_new else instance.serializeFMUstate)(state))
-    content[0] ^= 1
-    restore = instance.deserializeFMUState if vehicle.is_new else instance.deSerializeFMUstate
-    assert "saved state" in vehicle.refused(lambda: restore(bytes(content)))
+    return bytes((instance.serializeFMUState if vehicle.is_new else instance.serializeFMUstate)(state))
+
+
+def _restored(vehicle: Vehicle, content: bytes) -> None:
+    instance = vehicle.instance
+    state = (instance.deserializeFMUState if vehicle.is_new else instance.deSerializeFMUstate)(content)
+    (instance.setFMUState if vehicle.is_new else instance.setFMUstate)(state)
+
+
+def _with_checksum(content: bytes) -> bytes:
+    """A saved state that somebody has changed and summed up again (FNV-1a)."""
+    total = 14695981039346656037
+    for byte in content[:-8]:
+        total = (total ^ byte) * 1099511628211 % 2**64
+    return content[:-8] + struct.pack("Q", total)
+
+
+def test_a_bit_that_flips_anywhere_in_a_saved_state_is_noticed(torque_fmu: Path, opened: Open) -> None:
+    vehicle = opened(torque_fmu).begin(x_dot=0.1)
+    vehicle.instance.doStep(0.0, STEP)
+    content, before = _serialized(vehicle), vehicle.read("x_dot", "beta_fl")
+    assert len(content) > 1000
+    for place in range(len(content)):
+        changed = bytearray(content)
+        changed[place] ^= 1 << place % 8
+        said = vehicle.refused(lambda changed=changed: _restored(vehicle, bytes(changed)))
+        assert ("another model" if place < 16 else "damaged") in said
+    _restored(vehicle, content)
+    assert vehicle.read("x_dot", "beta_fl") == before
+
+
+def test_the_saved_state_of_another_fmu_or_of_another_size_is_refused(build: Build, opened: Open) -> None:
+    vehicle, other = (opened(build(version, Inputs.TORQUE)).begin() for version in FmiVersion)
+    content = _serialized(other)
+    assert "another model" in vehicle.refused(lambda: _restored(vehicle, content))
+    assert f"{len(content)} bytes, these are 100" in other.refused(lambda: _restored(other, content[:100]))
 
 
 def test_saved_bytes_cannot_bring_in_results_that_are_not_finite(torque_fmu: Path, opened: Open) -> None:
@@ -177,14 +208,17 @@ def test_saved_bytes_cannot_bring_in_results_that_are_not_finite(torque_fmu: Pat
     vehicle = opened(torque_fmu).begin(x_dot=0.1)
     vehicle.instance.doStep(0.0, STEP)
     (output,) = vehicle.read("slip_long_fl")
-    instance = vehicle.instance
-    state = (instance.getFMUState if vehicle.is_new else instance.getFMUstate)()
-    content = bytes((instance.serializeFMUState if vehicle.is_new else instance.serializeFMUstate)(state))
+    content = _serialized(vehicle)
     assert struct.pack("d", output) in content
-    changed = content.replace(struct.pack("d", output), struct.pack("d", math.nan))
-    state = (instance.deserializeFMUState if vehicle.is_new else instance.deSerializeFMUstate)(changed)
-    (instance.setFMUState if vehicle.is_new else instance.setFMUstate)(state)
+    _restored(vehicle, _with_checksum(content.replace(struct.pack("d", output), struct.pack("d", math.nan))))
     assert vehicle.read("slip_long_fl") == [output]
+
+
+def test_saved_bytes_that_no_instance_can_have_written_are_refused(torque_fmu: Path, opened: Open) -> None:
+    vehicle = opened(torque_fmu).begin(x_dot=0.125)
+    content = _serialized(vehicle)
+    broken = _with_checksum(content.replace(struct.pack("d", 0.125), struct.pack("d", math.inf)))
+    assert "can have had" in vehicle.refused(lambda: _restored(vehicle, broken))
 
 
 def test_a_state_saved_in_co_simulation_is_refused_in_model_exchange(torque_fmu: Path, opened: Open) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from fmu.arrays import with_arrays
 from fmu.compiling import HEADERS
 from fmu.description import FmiVersion
 from fmu.glue import wrapper_sources
@@ -35,7 +36,8 @@ def fuzz(
     folder = tmp_path_factory.mktemp("fuzz")
     model = make_model(source, request.param)
     for version in FmiVersion:
-        for name, text in wrapper_sources(with_indicators(model.table, INDICATORS), version, "token").items():
+        table = with_arrays(with_indicators(model.table, INDICATORS))
+        for name, text in wrapper_sources(table, version, "token").items():
             (folder / name).write_bytes(text)
     for name, text in model.files.items():
         (folder / name).write_text(text)

@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "arrays.h"
 #include "instance.h"
 
 #include "fmi2Functions.h"
@@ -190,6 +191,37 @@ static void set_one(void)
     }
 }
 
+/* An array of wheels: the same as its scalars, whoever is set; refused or taken whole. */
+static void set_or_get_array(void)
+{
+    const unsigned number = below((unsigned)qo_array_count), reference = QO_VARIABLES + number;
+    double values[QO_WHEELS], scalars[QO_WHEELS] = {0}, seed[QO_WHEELS], result[QO_WHEELS];
+    int i, taken_whole = 1;
+    if (!now.is3) {
+        return;
+    }
+    for (i = 0; i < QO_WHEELS; i++) {
+        values[i] = seed[i] = any_value(1.0);
+    }
+    last_message[0] = '\0';
+    if (below(2) && check(fmi3SetFloat64(now.instance, &reference, 1, values, QO_WHEELS)) == 0) {
+        for (i = 0; i < QO_WHEELS; i++) {
+            taken_whole &= isfinite(values[i]) != 0;
+        }
+        if (!taken_whole || qo_variables[qo_arrays[number].members[0]].role != QO_INPUT) {
+            fail("an array is taken that is not finite or no input");
+        }
+    }
+    last_message[0] = '\0';
+    if (check(fmi3GetFloat64(now.instance, &reference, 1, values, QO_WHEELS)) == 0 &&
+        (get(qo_arrays[number].members, QO_WHEELS, scalars) != 0 || memcmp(values, scalars, sizeof values) != 0)) {
+        fail("an array is not its scalars");
+    }
+    last_message[0] = '\0';
+    check(fmi3GetDirectionalDerivative(now.instance, &reference, 1, &qo_arrays[0].members[0], 1, seed, 1, result,
+                                       QO_WHEELS - (below(5) == 0)));
+}
+
 /* Between two internal steps: an input, or something that must not be set there. */
 static void between3(fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Boolean set_requested,
                      fmi3Boolean get_allowed, fmi3Boolean finished, fmi3Boolean may_return, fmi3Boolean *requested,
@@ -307,12 +339,23 @@ static void differentiate(void)
     }
 }
 
+/* The checksum of a serialized state after its bytes, as somebody who means harm would set it. */
+static void sum_up(unsigned char *bytes, size_t size)
+{
+    uint64_t sum = 14695981039346656037ULL;
+    size_t i;
+    for (i = 0; i + sizeof sum < size; i++) {
+        sum = (sum ^ bytes[i]) * 1099511628211ULL;
+    }
+    memcpy(bytes + size - sizeof sum, &sum, sizeof sum);
+}
+
 static void save_or_restore(void)
 {
     char *bytes;
     size_t size = 0;
     void *copy = NULL;
-    int status;
+    int status, damaged = 0;
     last_message[0] = '\0';
     switch (below(4)) {
     case 0:
@@ -349,11 +392,18 @@ static void save_or_restore(void)
     check(status);
     if (below(2)) {
         bytes[below((unsigned)size)] ^= (char)(1 << below(8));
+        damaged = below(2);
+        if (!damaged) {
+            sum_up((unsigned char *)bytes, size);
+        }
     }
     last_message[0] = '\0';
     status = now.is3 ? (int)fmi3DeserializeFMUState(now.instance, (fmi3Byte *)bytes, size, &copy)
                      : (int)fmi2DeSerializeFMUstate(now.instance, bytes, size, &copy);
     if (check(status) == 0) {
+        if (damaged) {
+            fail("a damaged state is taken");
+        }
         if (now.is3) {
             fmi3FreeFMUState(now.instance, &copy);
         } else {
@@ -449,7 +499,7 @@ static void sequence(void)
     begin();
     for (call_now = 0; now.instance != NULL && call_now < CALLS; call_now++) {
         last_message[0] = '\0';
-        switch (below(12)) {
+        switch (below(13)) {
         case 0:
         case 1:
         case 2: change_mode(); break;
@@ -459,6 +509,7 @@ static void sequence(void)
         case 6: differentiate(); break;
         case 7: save_or_restore(); break;
         case 8: solver_call(); break;
+        case 9: set_or_get_array(); break;
         default: do_step();
         }
     }
