@@ -49,13 +49,16 @@ static void start_values(double *values, const qo_row *rows, int count) {
 }
 
 void qo_init(qo_model *model) {
-    int changed;
+    int changed, index;
     memset(model, 0, sizeof *model);
     start_values(model->x, qo_states, QO_NX);
     start_values(model->u, qo_inputs, QO_NU);
     start_values(model->p, qo_parameters, QO_NP);
     model->tolerance = QO_TOLERANCE;
-    model->step = model->after_jump = QO_FIRST_STEP;
+    model->step = QO_FIRST_STEP;
+    for (index = 0; index < QO_AFTER_JUMP; ++index) {
+        model->after_jump[index] = QO_FIRST_STEP;
+    }
     memcpy(model->last_u, model->u, sizeof model->u);
     model->mode = 1;
     qo_update_discrete(model, &changed);

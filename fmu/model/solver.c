@@ -240,29 +240,53 @@ static qo_status give_up(qo_model *model, int worst) {
                    " is not accurate.");
 }
 
+/* What inputs that jump excite decays: the steps after it grow from one to the next, and alike after every jump. So each
+   of the first has a length of its own, from the last time. */
+static double first_guess(qo_model *model)
+{
+    if (memcmp(model->u, model->last_u, sizeof model->u) != 0) {
+        model->since_jump = 0;
+    }
+    return model->since_jump < QO_AFTER_JUMP ? model->after_jump[model->since_jump] : model->step;
+}
+
+/* A step that was cut short by the end of the communication step says nothing against a longer one. */
+static double learned(double before, double tried, double proposed)
+{
+    return fmin(tried < before ? fmax(proposed, before) : proposed, LONGEST_STEP);
+}
+
+static void learn(qo_model *model, double tried, double proposed)
+{
+    model->step = learned(model->step, tried, proposed);
+    if (model->since_jump < QO_AFTER_JUMP) {
+        double *own = &model->after_jump[model->since_jump];
+        *own = fmin(learned(*own, tried, proposed), BOLDER * fmax(tried, *own));
+        model->since_jump += 1;
+    }
+}
+
 /* One step of at most h that the tolerance accepts; y stays. */
 static qo_status integrate(qo_model *model, double h, double *taken) {
     linear_system system;
     const departure from = depart(model, &system);
-    const int jumped = memcmp(model->u, model->last_u, sizeof model->u) != 0;
     double next[QO_NX];
-    double tried = fmin(fmax(jumped ? fmin(model->step, model->after_jump) : model->step, SHORTEST_STEP), h);
+    double tried = fmin(fmax(first_guess(model), SHORTEST_STEP), h);
     int worst = 0, rejected = 0;
     for (;;) {
         double ratio = attempt(model, &system, &from, tried, next, &worst);
         double proposed = tried * (ratio <= 1.0 && rejected ? fmin(1.0, growth(ratio)) : growth(ratio));
         if (ratio <= 1.0) {
-            /* A step cut short by the end of the communication step says nothing against a longer one. */
-            model->step = fmin(tried < model->step ? fmax(proposed, model->step) : proposed, LONGEST_STEP);
-            if (jumped) {
-                model->after_jump = fmin(model->step, BOLDER * tried);
-            }
+            learn(model, tried, proposed);
             *taken = tried;
             flush(next);
             memcpy(model->x, next, sizeof next);
             inputs_after(model, tried, model->u);
             memcpy(model->last_u, model->u, sizeof model->u);
             return QO_OK;
+        }
+        if (!rejected && model->since_jump < QO_AFTER_JUMP) {
+            model->after_jump[model->since_jump] = proposed;
         }
         rejected = 1;
         model->step = tried = proposed;
