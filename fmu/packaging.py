@@ -24,7 +24,9 @@ from fmu.glue import wrapper_sources
 from fmu.interface import MODEL_IDENTIFIER, Experiment, Interface, with_indicators
 from fmu.platforms import PLATFORMS, Platform
 from fmu.reference import Reference, reference_drive
+from fmu.scene import scene
 from fmu.source import Model, ModelSource, make_model, with_neutral
+from fmu.table import Carried
 from fmu.variables import Inputs
 from ident.plant.contact import Contacts
 
@@ -56,6 +58,7 @@ class Order:
         platforms: to build for.
         contacts: stiff for solvers that are implicit, soft for others.
         limited: torque inputs are limited to what the motors can; speed loops always are.
+        carried: effects beside the confirmed ones, of size zero.
     """
 
     version: FmiVersion
@@ -63,6 +66,7 @@ class Order:
     platforms: tuple[Platform, ...]
     contacts: Contacts = Contacts.STIFF
     limited: bool = False
+    carried: Carried = Carried.STATELESS
 
 
 def build_fmu(
@@ -84,12 +88,12 @@ def build_fmu(
     Raises:
         UserError: a compiler is missing or fails.
     """
-    model = make_model(source, order.inputs, order.contacts, order.limited)
+    model = make_model(source, order.inputs, order.contacts, order.limited, order.carried)
     interface = _interface(source, model, order)
     token = _token(model, interface, order.version)
     sources = fmu_sources(model, interface, order.version, token)
     libraries = compile_libraries(sources, order.platforms, compiler, progress, cache)
-    reference = reference_drive(model.table, with_neutral(source.effects), order.inputs)
+    reference = reference_drive(model.table, with_neutral(source.effects, order.carried), order.inputs)
     units = [name for name in sorted(sources) if name.endswith(".c")]
     description = model_description(interface, order.version, token, units)
     files = {
@@ -98,6 +102,7 @@ def build_fmu(
         **_binaries(libraries, order.version),
         "sources/CMakeLists.txt": (resources.files("fmu") / "data" / "CMakeLists.txt").read_bytes(),
         **{f"resources/{name}": content for name, content in reference.files().items()},
+        "resources/vehicle.glb": scene(source.vehicle.geometry, reference, f"quasiomni {version('quasiomni')}"),
         **_documentation(source, interface, order, reference),
         **_VERSION_FILES[order.version](order.inputs, units),
     }

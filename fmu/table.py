@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -21,6 +22,14 @@ from ident.plant.places import GROUPS
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.geometry import WHEELS
 from ident.vehicle.parameters import Parameters
+
+
+class Carried(enum.StrEnum):
+    """Which effects a model has beside the confirmed ones, with size zero."""
+
+    STATELESS = "stateless"
+    ALL = "all"
+
 
 _SIDES: Final = {"l": "left", "r": "right"}
 _PER_SECOND: Final = {
@@ -243,12 +252,16 @@ def _inputs(vehicle: VehicleDescription, parameters: Parameters, inputs: Inputs)
     return [*wheels, slope, across, load]
 
 
-def neutral_effects() -> tuple[Effect, ...]:
-    """Every effect that a model always has, at each single place, of size zero."""
+def neutral_effects(carried: Carried = Carried.STATELESS) -> tuple[Effect, ...]:
+    """Effects that a model has for users to set, at each single place, of size zero.
+
+    Args:
+        carried: which. What takes the place of a parameter that the vehicle has anyway, as `slip` does, is that parameter.
+    """
     return tuple(
         make_effect(kind.name, where, kind.neutral())
         for kind in EFFECTS.values()
-        if kind.always
+        if kind.always or (carried is Carried.ALL and not kind.stands_for)
         for where in kind.places
         if where not in GROUPS
     )

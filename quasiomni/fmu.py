@@ -13,6 +13,7 @@ from rich.table import Table
 from fmu.description import FmiVersion
 from fmu.packaging import Order
 from fmu.platforms import parse_platforms
+from fmu.table import Carried
 from fmu.variables import Inputs
 from hil.campaign.folder import sources_of
 from hil.campaign.reading import read_as
@@ -52,10 +53,17 @@ def build(
     limits: Annotated[
         bool, typer.Option("--limits", help="Torques beyond the motors' peak torque are limited to it.")
     ] = False,
+    effects: Annotated[
+        Carried,
+        typer.Option(
+            help="Of size zero, as parameters to set: those without states of their own, or `all`, delays, play and "
+            "compliance too."
+        ),
+    ] = Carried.STATELESS,
     force: ForceOption = False,
 ) -> None:
     """Package the identified model, with its confirmed effects, as an FMU for co-simulation and model exchange."""
-    order = Order(fmi, inputs, parse_platforms(platforms), contacts, limits)
+    order = Order(fmi, inputs, parse_platforms(platforms), contacts, limits, effects)
     with bars() as shown:
         task = shown.add_task("compiling", total=None)
 
