@@ -104,8 +104,8 @@ def compile_libraries(
 
     The cross compiler keeps objects and the C libraries of its targets. It knows an object by the place and content of
     its source, so each source lies in a folder named by its content: the equations are compiled once for all vehicles.
-    The first build for a platform compiles its C library. For Windows that takes two minutes a processor, so there the C
-    runtime that comes with Windows is used alone.
+    The first build for a platform compiles its C library. For Windows that takes two minutes a processor, so there
+    the C runtime that comes with Windows is used alone.
 
     Args:
         sources: file name -> text, `.c` files and the headers that they include.

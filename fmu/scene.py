@@ -60,12 +60,10 @@ def _solid(name: str, solid: Solid, size: Vector, centre: Vector, colour: Vector
 def _chassis(geometry: Geometry) -> Node:
     radius, length, width = geometry.wheel_radius, geometry.wheelbase, geometry.track_width
     body_width = max(width - 3.2 * radius, width / 4)
-    middle = 1.6 * radius
+    middle, stripe = 1.6 * radius, (0.06 * length, 1.01 * body_width, 1.02 * radius)
     parts = (
         _solid("body", Solid.BOX, (1.1 * length, body_width, radius), (0.0, 0.0, middle), _BODY),
-        _solid(
-            "front", Solid.BOX, (0.06 * length, 1.01 * body_width, 1.02 * radius), (0.47 * length, 0, middle), _FRONT
-        ),
+        _solid("front", Solid.BOX, stripe, (0.47 * length, 0, middle), _FRONT),
         *(
             _solid(f"beam_{name}", Solid.BOX, (radius / 2, width, radius / 3), (end * length / 2, 0.0, middle), _BEAM)
             for name, end in (("front", 1), ("rear", -1))
@@ -82,11 +80,10 @@ def _unit(geometry: Geometry, place: int) -> Node:
     """A steering unit, turned about its axis, with its wheel."""
     name, (front, side) = WHEELS[place], CORNERS[place]
     radius, aside = geometry.wheel_radius, side * geometry.wheel_offset
+    pointer = (1.2 * radius, radius / 3, radius / 5)
     parts = (
         _solid(f"post_{name}", Solid.BOX, (radius / 2, radius / 2, 1.8 * radius), (0.0, 0.0, 0.8 * radius), _UNIT),
-        _solid(
-            f"pointer_{name}", Solid.BOX, (1.2 * radius, radius / 3, radius / 5), (radius / 2, 0, 1.8 * radius), _UNIT
-        ),
+        _solid(f"pointer_{name}", Solid.BOX, pointer, (radius / 2, 0, 1.8 * radius), _UNIT),
         _solid(f"arm_{name}", Solid.BOX, (radius / 3, abs(aside), radius / 3), (0.0, aside / 2, 0.0), _UNIT),
         _wheel(name, radius, aside),
     )

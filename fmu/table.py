@@ -256,7 +256,7 @@ def neutral_effects(carried: Carried = Carried.STATELESS) -> tuple[Effect, ...]:
     """Effects that a model has for users to set, at each single place, of size zero.
 
     Args:
-        carried: which. What takes the place of a parameter that the vehicle has anyway, as `slip` does, is that parameter.
+        carried: which. What takes the place of a parameter that there is anyway, as `slip` does, is that parameter.
     """
     return tuple(
         make_effect(kind.name, where, kind.neutral())
