@@ -242,8 +242,7 @@ static qo_status give_up(qo_model *model, int worst) {
 
 /* What inputs that jump excite decays: the steps after it grow from one to the next, and alike after every jump. So each
    of the first has a length of its own, from the last time. */
-static double first_guess(qo_model *model)
-{
+static double first_guess(qo_model *model) {
     if (memcmp(model->u, model->last_u, sizeof model->u) != 0) {
         model->since_jump = 0;
     }
@@ -251,13 +250,11 @@ static double first_guess(qo_model *model)
 }
 
 /* A step that was cut short by the end of the communication step says nothing against a longer one. */
-static double learned(double before, double tried, double proposed)
-{
+static double learned(double before, double tried, double proposed) {
     return fmin(tried < before ? fmax(proposed, before) : proposed, LONGEST_STEP);
 }
 
-static void learn(qo_model *model, double tried, double proposed)
-{
+static void learn(qo_model *model, double tried, double proposed) {
     model->step = learned(model->step, tried, proposed);
     if (model->since_jump < QO_AFTER_JUMP) {
         double *own = &model->after_jump[model->since_jump];
@@ -307,7 +304,7 @@ qo_status qo_advance(qo_model *model, double h, double *taken) {
     qo_model before = *model;
     qo_status status = check_length(model, h);
     if (status == QO_OK && (status = integrate(model, h, taken)) == QO_OK) {
-        status = qo_outputs(model);
+        status = qo_outputs_after_step(model);
     }
     if (status != QO_OK) {
         memcpy(before.message, model->message, sizeof before.message);
@@ -339,8 +336,8 @@ qo_status qo_step(qo_model *model, double h) {
     int changed;
     qo_status status = check_length(model, h);
     if (status == QO_OK && (status = integrate_all(model, h)) == QO_OK &&
-        (status = qo_outputs(model)) == QO_OK) {
-        status = qo_update_discrete(model, &changed);
+        (status = qo_outputs_after_step(model)) == QO_OK) {
+        status = qo_mode_after_step(model, &changed);
     }
     if (status != QO_OK) {
         memcpy(before.message, model->message, sizeof before.message);
