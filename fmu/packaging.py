@@ -26,8 +26,7 @@ from fmu.platforms import PLATFORMS, Platform
 from fmu.reference import Reference, reference_drive
 from fmu.scene import scene
 from fmu.source import Model, ModelSource, make_model, with_neutral
-from fmu.table import Carried
-from fmu.variables import Inputs
+from fmu.variables import Carried, Inputs
 from ident.plant.contact import Contacts
 
 INDICATORS: Final = 4

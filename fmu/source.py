@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from fmu.model.generate import generate_core
 from fmu.parameter_rows import parameters_of
-from fmu.table import Carried, neutral_effects, variable_table
-from fmu.variables import Inputs, VariableTable
+from fmu.table import neutral_effects, variable_table
+from fmu.variables import Carried, Inputs, VariableTable
 from ident.effects import Effect
 from ident.errors import DataFileError
 from ident.plant.contact import Contacts

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from fmu.effect_states import (
-    AddedState,
-    coupled_states,
-    other_states,
-)
+from fmu.effect_states import AddedState, coupled_states, other_states
 from fmu.parameter_rows import parameter_rows
-from fmu.variables import DEGREES, Block, Causality, Inputs, Variability, Variable, VariableTable, numbered
+from fmu.variables import DEGREES, Block, Carried, Causality, Inputs, Variability, Variable, VariableTable, numbered
 from ident.effects import EFFECTS, Effect, make_effect, terms_of
 from ident.plant.contact import Contacts
 from ident.plant.memories import Memories, memories_of
@@ -22,14 +17,6 @@ from ident.plant.places import GROUPS
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.geometry import WHEELS
 from ident.vehicle.parameters import Parameters
-
-
-class Carried(enum.StrEnum):
-    """Which effects a model has beside the confirmed ones, with size zero."""
-
-    STATELESS = "stateless"
-    ALL = "all"
-
 
 _SIDES: Final = {"l": "left", "r": "right"}
 _PER_SECOND: Final = {

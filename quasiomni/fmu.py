@@ -13,8 +13,7 @@ from rich.table import Table
 from fmu.description import FmiVersion
 from fmu.packaging import Order
 from fmu.platforms import parse_platforms
-from fmu.table import Carried
-from fmu.variables import Inputs
+from fmu.variables import Carried, Inputs
 from hil.campaign.folder import sources_of
 from hil.campaign.reading import read_as
 from hil.cosimulation.assessment import refuse_unusable_fmu

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fmu.table import Carried, neutral_effects
+from fmu.table import neutral_effects
+from fmu.variables import Carried
 from ident.effects import Effect, make_effect
 from ident.effects.extended import ExtendedModel, simulation_of
 from ident.estimate.filters import zero_phase
