@@ -28,6 +28,9 @@
 /* After inputs that jump: how much longer than the step that was right after the last jump the next one may be. */
 #define BOLDER 1.2
 
+/* Part of the length tried, below which what is proposed after a refusal tells a jump of another kind. */
+#define UNLIKE 0.5
+
 static const double GAMMA = 0.5;
 static const double A[STAGES][STAGES] = {{0.0}, {0.0}, {2.0}, {2.0, 0.0, 1.0}};
 static const double C[STAGES][STAGES] = {{0.0}, {4.0}, {1.0, -1.0}, {1.0, -1.0, -8.0 / 3.0}};
@@ -263,6 +266,16 @@ static void learn(qo_model *model, double tried, double proposed) {
     }
 }
 
+/* After a step that was refused. By much: this jump is not like the last ones, and their lengths say nothing here. */
+static void forget(qo_model *model, double tried, double proposed) {
+    if (model->since_jump < QO_AFTER_JUMP) {
+        model->after_jump[model->since_jump] = proposed;
+        if (proposed < UNLIKE * tried) {
+            model->since_jump = QO_AFTER_JUMP;
+        }
+    }
+}
+
 /* One step of at most h that the tolerance accepts; y stays. */
 static qo_status integrate(qo_model *model, double h, double *taken) {
     linear_system system;
@@ -282,9 +295,7 @@ static qo_status integrate(qo_model *model, double h, double *taken) {
             memcpy(model->last_u, model->u, sizeof model->u);
             return QO_OK;
         }
-        if (!rejected && model->since_jump < QO_AFTER_JUMP) {
-            model->after_jump[model->since_jump] = proposed;
-        }
+        forget(model, tried, proposed);
         rejected = 1;
         model->step = tried = proposed;
         if (tried < SHORTEST_STEP) {
