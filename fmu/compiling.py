@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Final
 
@@ -35,6 +36,9 @@ FLAGS: Final = (
     "-shared",
 )
 """Of every platform; nothing that depends on the place of the sources, so that builds repeat byte for byte."""
+
+_WINDOWS_UNIT: Final = "windows.c"
+"""What libraries for Windows need beyond the C runtime of Windows, when the cross compiler's C library stays out."""
 
 _INCLUDE: Final = re.compile(rb'^#include "([^"]+)"', re.MULTILINE)
 
@@ -100,7 +104,8 @@ def compile_libraries(
 
     The cross compiler keeps objects and the C libraries of its targets. It knows an object by the place and content of
     its source, so each source lies in a folder named by its content: the equations are compiled once for all vehicles.
-    The first build for a platform compiles its C library, which takes a minute.
+    The first build for a platform compiles its C library. For Windows that takes two minutes a processor, so there
+    the C runtime that comes with Windows is used alone.
 
     Args:
         sources: file name -> text, `.c` files and the headers that they include.
@@ -115,9 +120,11 @@ def compile_libraries(
     check_platforms(compiler, platforms)
     place = cache or user_cache_path("quasiomni") / "fmu"
     units = [_keep(place, name, sources) for name in sorted(sources) if name.endswith(".c")]
+    windows = {_WINDOWS_UNIT: (resources.files("fmu") / "data" / _WINDOWS_UNIT).read_bytes()}
+    more = [_keep(place, _WINDOWS_UNIT, windows)] if any(_bare(platform, compiler) for platform in platforms) else []
 
     def build(platform: Platform) -> bytes:
-        library = _compile(place, units, platform, compiler)
+        library = _compile(place, [*units, *(more if _bare(platform, compiler) else [])], platform, compiler)
         progress(platform)
         return library
 
@@ -156,15 +163,35 @@ def _included(unit: str, sources: Mapping[str, bytes]) -> set[str]:
     return found
 
 
+def _bare(platform: Platform, compiler: Compiler) -> bool:
+    """Whether a library is linked with the C runtime of Windows alone."""
+    return compiler.cross and platform.suffix == ".dll"
+
+
+def _bare_flags() -> tuple[str, ...]:
+    """Of the cross compiler: its C library stays out, its headers of that stay in."""
+    return ("-nostdlib", "-isystem", str(_zig_folder() / "lib" / "libc" / "include" / "any-windows-any"))
+
+
+def _zig_folder() -> Path:
+    spec = importlib.util.find_spec("ziglang")
+    if spec is None or not spec.submodule_search_locations:
+        raise UserError("The cross compiler is gone.", "Install it: pip install 'quasiomni[ziglang]'.")
+    return Path(spec.submodule_search_locations[0])
+
+
 def _compile(place: Path, units: Sequence[str], platform: Platform, compiler: Compiler) -> bytes:
     windows = platform.suffix == ".dll"
     target = ("-target", platform.target, "-s") if compiler.cross else ("-s",)
-    flags = (*FLAGS, *platform.flags, *target, *(() if windows else ("-fPIC",)), "-I", str(HEADERS))
+    bare = _bare(platform, compiler)
+    kind = _bare_flags() if bare else () if windows else ("-fPIC",)
+    libraries = ("-lucrtbase",) if bare else () if windows else ("-lm",)
+    flags = (*FLAGS, *platform.flags, *target, *kind, "-I", str(HEADERS))
     with tempfile.TemporaryDirectory(prefix="quasiomni-") as folder:
         # A macOS library carries its own name, which must not depend on where it is built.
         name = () if not platform.name.endswith("darwin") else ("-install_name", f"@rpath/model{platform.suffix}")
         output = Path(folder) / f"model{platform.suffix}"
-        call = (*compiler.command, *flags, *name, "-o", str(output), *units, *(() if windows else ("-lm",)))
+        call = (*compiler.command, *flags, *name, "-o", str(output), *units, *libraries)
         done = subprocess.run(call, cwd=place, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             tail = " / ".join(done.stderr.strip().splitlines()[-3:])

@@ -25,8 +25,9 @@ from fmu.glue import wrapper_sources
 from fmu.interface import MODEL_IDENTIFIER, Experiment, Interface, with_indicators
 from fmu.platforms import PLATFORMS, Platform
 from fmu.reference import Reference, reference_drive
+from fmu.scene import scene
 from fmu.source import Model, ModelSource, make_model, with_neutral
-from fmu.variables import Inputs
+from fmu.variables import Carried, Inputs
 from ident.errors import UserError
 from ident.plant.contact import Contacts
 
@@ -59,6 +60,7 @@ class Order:
         contacts: stiff for solvers that are implicit, soft for others.
         limited: torque inputs are limited to what the motors can; speed loops always are.
         arrays: of the four wheels beside scalars.
+        carried: effects beside the confirmed ones, of size zero.
 
     Raises:
         UserError: arrays of a version that has none.
@@ -70,6 +72,7 @@ class Order:
     contacts: Contacts = Contacts.STIFF
     limited: bool = False
     arrays: bool = False
+    carried: Carried = Carried.STATELESS
 
     def __post_init__(self) -> None:
         if self.arrays and self.version is not FmiVersion.FMI3:
@@ -95,12 +98,12 @@ def build_fmu(
     Raises:
         UserError: a compiler is missing or fails.
     """
-    model = make_model(source, order.inputs, order.contacts, order.limited)
+    model = make_model(source, order.inputs, order.contacts, order.limited, order.carried)
     interface = _interface(source, model, order)
     token = token_of(model, interface, order.version)
     sources = fmu_sources(model, interface, order.version, token)
     libraries = compile_libraries(sources, order.platforms, compiler, progress, cache)
-    reference = reference_drive(model.table, with_neutral(source.effects), order.inputs)
+    reference = reference_drive(model.table, with_neutral(source.effects, order.carried), order.inputs)
     units = [name for name in sorted(sources) if name.endswith(".c")]
     description = model_description(interface, order.version, token, units)
     files = {
@@ -109,6 +112,7 @@ def build_fmu(
         **binaries_of(libraries, order.version),
         "sources/CMakeLists.txt": (resources.files("fmu") / "data" / "CMakeLists.txt").read_bytes(),
         **{f"resources/{name}": content for name, content in reference.files().items()},
+        "resources/vehicle.glb": scene(source.vehicle.geometry, reference, f"quasiomni {version('quasiomni')}"),
         **_documentation(source, interface, order, reference),
         **_VERSION_FILES[order.version](order.inputs, units),
     }

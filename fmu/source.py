@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from fmu.model.generate import generate_core
 from fmu.parameter_rows import parameters_of
 from fmu.table import neutral_effects, variable_table
-from fmu.variables import Inputs, VariableTable
+from fmu.variables import Carried, Inputs, VariableTable
 from ident.effects import Effect
 from ident.errors import DataFileError
 from ident.plant.contact import Contacts
@@ -74,16 +74,20 @@ class Model:
 
 
 def make_model(
-    source: ModelSource, inputs: Inputs, contacts: Contacts = Contacts.STIFF, limited: bool = False
+    source: ModelSource,
+    inputs: Inputs,
+    contacts: Contacts = Contacts.STIFF,
+    limited: bool = False,
+    carried: Carried = Carried.STATELESS,
 ) -> Model:
-    """The model with the confirmed effects, and with those of size zero that take no states of their own."""
-    effects = with_neutral(source.effects)
+    """The model with the confirmed effects, and with those of size zero that it shall carry."""
+    effects = with_neutral(source.effects, carried)
     table = variable_table(source.vehicle, source.parameters, effects, inputs, contacts, limited)
     core = generate_core(table, effects, inputs)
     return Model(table, core.files, core.dependencies, core.fastest)
 
 
-def with_neutral(confirmed: Sequence[Effect]) -> list[Effect]:
-    """Effects of an FMU: the confirmed ones, and those of size zero that it always has."""
+def with_neutral(confirmed: Sequence[Effect], carried: Carried = Carried.STATELESS) -> list[Effect]:
+    """Effects of an FMU: the confirmed ones, and those of size zero that it shall carry."""
     found = {(effect.name, effect.where) for effect in confirmed}
-    return [*confirmed, *(effect for effect in neutral_effects() if (effect.name, effect.where) not in found)]
+    return [*confirmed, *(effect for effect in neutral_effects(carried) if (effect.name, effect.where) not in found)]

@@ -7,13 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from fmu.effect_states import (
-    AddedState,
-    coupled_states,
-    other_states,
-)
+from fmu.effect_states import AddedState, coupled_states, other_states
 from fmu.parameter_rows import parameter_rows
-from fmu.variables import DEGREES, Block, Causality, Inputs, Variability, Variable, VariableTable, numbered
+from fmu.variables import DEGREES, Block, Carried, Causality, Inputs, Variability, Variable, VariableTable, numbered
 from ident.effects import EFFECTS, Effect, make_effect, terms_of
 from ident.plant.contact import Contacts
 from ident.plant.memories import Memories, memories_of
@@ -243,12 +239,16 @@ def _inputs(vehicle: VehicleDescription, parameters: Parameters, inputs: Inputs)
     return [*wheels, slope, across, load]
 
 
-def neutral_effects() -> tuple[Effect, ...]:
-    """Every effect that a model always has, at each single place, of size zero."""
+def neutral_effects(carried: Carried = Carried.STATELESS) -> tuple[Effect, ...]:
+    """Effects that a model has for users to set, at each single place, of size zero.
+
+    Args:
+        carried: which. What takes the place of a parameter that there is anyway, as `slip` does, is that parameter.
+    """
     return tuple(
         make_effect(kind.name, where, kind.neutral())
         for kind in EFFECTS.values()
-        if kind.always
+        if kind.always or (carried is Carried.ALL and not kind.stands_for)
         for where in kind.places
         if where not in GROUPS
     )

@@ -28,6 +28,13 @@ class Causality(enum.StrEnum):
     LOCAL = "local"
 
 
+class Carried(enum.StrEnum):
+    """Which effects a model has beside the confirmed ones, with size zero."""
+
+    STATELESS = "stateless"
+    ALL = "all"
+
+
 class Variability(enum.StrEnum):
     """When a variable may change; names of FMI."""
 

@@ -13,7 +13,7 @@ from rich.table import Table
 from fmu.description import FmiVersion
 from fmu.packaging import Order
 from fmu.platforms import parse_platforms
-from fmu.variables import Inputs
+from fmu.variables import Carried, Inputs
 from hil.campaign.folder import sources_of
 from hil.campaign.reading import read_as
 from hil.cosimulation.assessment import refuse_unusable_fmu
@@ -55,10 +55,17 @@ def build(
     arrays: Annotated[
         bool, typer.Option("--arrays", help="FMI 3.0: arrays of the four wheels beside scalars, `torque` for one.")
     ] = False,
+    effects: Annotated[
+        Carried,
+        typer.Option(
+            help="Of size zero, as parameters to set: those without states of their own, or `all`, delays, play and "
+            "compliance too."
+        ),
+    ] = Carried.STATELESS,
     force: ForceOption = False,
 ) -> None:
     """Package the identified model, with its confirmed effects, as an FMU for co-simulation and model exchange."""
-    order = Order(fmi, inputs, parse_platforms(platforms), contacts, limits, arrays)
+    order = Order(fmi, inputs, parse_platforms(platforms), contacts, limits, arrays, effects)
     with bars() as shown:
         task = shown.add_task("compiling", total=None)
 

@@ -49,13 +49,16 @@ static void start_values(double *values, const qo_row *rows, int count) {
 }
 
 void qo_init(qo_model *model) {
-    int changed;
+    int changed, index;
     memset(model, 0, sizeof *model);
     start_values(model->x, qo_states, QO_NX);
     start_values(model->u, qo_inputs, QO_NU);
     start_values(model->p, qo_parameters, QO_NP);
     model->tolerance = QO_TOLERANCE;
-    model->step = model->after_jump = QO_FIRST_STEP;
+    model->step = QO_FIRST_STEP;
+    for (index = 0; index < QO_AFTER_JUMP; ++index) {
+        model->after_jump[index] = QO_FIRST_STEP;
+    }
     memcpy(model->last_u, model->u, sizeof model->u);
     model->mode = 1;
     qo_update_discrete(model, &changed);
@@ -100,13 +103,9 @@ qo_status qo_check(qo_model *model) {
     return status == QO_OK ? check_rates(model) : status;
 }
 
-qo_status qo_outputs(qo_model *model) {
+static qo_status compute_outputs(qo_model *model) {
     double y[QO_NY];
     int broken;
-    qo_status status = qo_check(model);
-    if (status != QO_OK) {
-        return status;
-    }
     qo_eq_outputs(model->x, model->u, model->p, y);
     broken = qo_first_not_finite(y, QO_NY);
     if (broken >= 0) {
@@ -114,6 +113,19 @@ qo_status qo_outputs(qo_model *model) {
     }
     memcpy(model->y, y, sizeof y);
     return QO_OK;
+}
+
+qo_status qo_outputs(qo_model *model) {
+    qo_status status = qo_check(model);
+    return status == QO_OK ? compute_outputs(model) : status;
+}
+
+qo_status qo_outputs_after_step(qo_model *model) {
+    qo_status status = check_block(model, "Input ", model->u, qo_inputs, QO_NU);
+    if (status == QO_OK) {
+        status = check_block(model, "State ", model->x, qo_states, QO_NX);
+    }
+    return status == QO_OK ? compute_outputs(model) : status;
 }
 
 qo_status qo_derivatives(qo_model *model, double *xd) {
@@ -130,16 +142,17 @@ qo_status qo_derivatives(qo_model *model, double *xd) {
     return QO_OK;
 }
 
-qo_status qo_event_indicators(qo_model *model, double *z) {
-    qo_status status = qo_check(model);
-    if (status != QO_OK) {
-        return status;
-    }
+static qo_status compute_indicators(qo_model *model, double *z) {
     qo_eq_mode_distances(model->x, model->u, model->p, z);
     if (qo_first_not_finite(z, QO_NZ) >= 0) {
         return qo_fail(model, QO_ERROR, "Output ", "mode", " has no finite condition.");
     }
     return QO_OK;
+}
+
+qo_status qo_event_indicators(qo_model *model, double *z) {
+    qo_status status = qo_check(model);
+    return status == QO_OK ? compute_indicators(model, z) : status;
 }
 
 /* (9), in the order of ident.vehicle.modes: the angles of mode 4 meet the condition of mode 2 as well. */
@@ -154,8 +167,13 @@ static int mode_of(const double *z) {
 }
 
 qo_status qo_update_discrete(qo_model *model, int *changed) {
+    qo_status status = qo_check(model);
+    return status == QO_OK ? qo_mode_after_step(model, changed) : status;
+}
+
+qo_status qo_mode_after_step(qo_model *model, int *changed) {
     double z[QO_NZ];
-    qo_status status = qo_event_indicators(model, z);
+    qo_status status = compute_indicators(model, z);
     if (status == QO_OK) {
         int mode = mode_of(z);
         *changed = mode != model->mode;

@@ -17,6 +17,9 @@
 
 #define QO_MESSAGE_SIZE 160
 
+/* How many steps after a jump of the inputs have lengths of their own. */
+#define QO_AFTER_JUMP 4
+
 typedef enum {
     QO_OK = 0,
     QO_DISCARD = 1, /* the step cannot be taken: the error stays above the tolerance however short the step */
@@ -31,8 +34,9 @@ typedef struct {
     double ur[QO_NU]; /* rates of the inputs while time passes [per s]; zero: they are held */
     double tolerance; /* of a step, in units of the nominal values of the states */
     double step;      /* length that the next internal step tries [s] */
-    double after_jump; /* the same where the inputs have jumped */
+    double after_jump[QO_AFTER_JUMP]; /* the same of the first steps after inputs have jumped, one after the other */
     double last_u[QO_NU]; /* inputs at the end of the last internal step */
+    int since_jump; /* internal steps since then, QO_AFTER_JUMP at most */
     int mode;         /* k of (9) */
     char message[QO_MESSAGE_SIZE];
 } qo_model;

@@ -19,6 +19,10 @@ extern const char *const qo_outputs_by_name[QO_NY];
 /* Writes the message kind + name + what; returns status. */
 qo_status qo_fail(qo_model *model, qo_status status, const char *kind, const char *name, const char *what);
 
+/* y, then mode, after a step: states and inputs have changed since qo_check, parameters are not asked again. */
+qo_status qo_outputs_after_step(qo_model *model);
+qo_status qo_mode_after_step(qo_model *model, int *changed);
+
 /* Index of the first value that is not finite, -1 where all are. */
 int qo_first_not_finite(const double *values, int count);
 

@@ -28,6 +28,9 @@
 /* After inputs that jump: how much longer than the step that was right after the last jump the next one may be. */
 #define BOLDER 1.2
 
+/* Part of the length tried, below which what is proposed after a refusal tells a jump of another kind. */
+#define UNLIKE 0.5
+
 static const double GAMMA = 0.5;
 static const double A[STAGES][STAGES] = {{0.0}, {0.0}, {2.0}, {2.0, 0.0, 1.0}};
 static const double C[STAGES][STAGES] = {{0.0}, {4.0}, {1.0, -1.0}, {1.0, -1.0, -8.0 / 3.0}};
@@ -240,23 +243,51 @@ static qo_status give_up(qo_model *model, int worst) {
                    " is not accurate.");
 }
 
+/* What inputs that jump excite decays: the steps after it grow from one to the next, and alike after every jump. So each
+   of the first has a length of its own, from the last time. */
+static double first_guess(qo_model *model) {
+    if (memcmp(model->u, model->last_u, sizeof model->u) != 0) {
+        model->since_jump = 0;
+    }
+    return model->since_jump < QO_AFTER_JUMP ? model->after_jump[model->since_jump] : model->step;
+}
+
+/* A step that was cut short by the end of the communication step says nothing against a longer one. */
+static double learned(double before, double tried, double proposed) {
+    return fmin(tried < before ? fmax(proposed, before) : proposed, LONGEST_STEP);
+}
+
+static void learn(qo_model *model, double tried, double proposed) {
+    model->step = learned(model->step, tried, proposed);
+    if (model->since_jump < QO_AFTER_JUMP) {
+        double *own = &model->after_jump[model->since_jump];
+        *own = fmin(learned(*own, tried, proposed), BOLDER * fmax(tried, *own));
+        model->since_jump += 1;
+    }
+}
+
+/* After a step that was refused. By much: this jump is not like the last ones, and their lengths say nothing here. */
+static void forget(qo_model *model, double tried, double proposed) {
+    if (model->since_jump < QO_AFTER_JUMP) {
+        model->after_jump[model->since_jump] = proposed;
+        if (proposed < UNLIKE * tried) {
+            model->since_jump = QO_AFTER_JUMP;
+        }
+    }
+}
+
 /* One step of at most h that the tolerance accepts; y stays. */
 static qo_status integrate(qo_model *model, double h, double *taken) {
     linear_system system;
     const departure from = depart(model, &system);
-    const int jumped = memcmp(model->u, model->last_u, sizeof model->u) != 0;
     double next[QO_NX];
-    double tried = fmin(fmax(jumped ? fmin(model->step, model->after_jump) : model->step, SHORTEST_STEP), h);
+    double tried = fmin(fmax(first_guess(model), SHORTEST_STEP), h);
     int worst = 0, rejected = 0;
     for (;;) {
         double ratio = attempt(model, &system, &from, tried, next, &worst);
         double proposed = tried * (ratio <= 1.0 && rejected ? fmin(1.0, growth(ratio)) : growth(ratio));
         if (ratio <= 1.0) {
-            /* A step cut short by the end of the communication step says nothing against a longer one. */
-            model->step = fmin(tried < model->step ? fmax(proposed, model->step) : proposed, LONGEST_STEP);
-            if (jumped) {
-                model->after_jump = fmin(model->step, BOLDER * tried);
-            }
+            learn(model, tried, proposed);
             *taken = tried;
             flush(next);
             memcpy(model->x, next, sizeof next);
@@ -264,6 +295,7 @@ static qo_status integrate(qo_model *model, double h, double *taken) {
             memcpy(model->last_u, model->u, sizeof model->u);
             return QO_OK;
         }
+        forget(model, tried, proposed);
         rejected = 1;
         model->step = tried = proposed;
         if (tried < SHORTEST_STEP) {
@@ -283,7 +315,7 @@ qo_status qo_advance(qo_model *model, double h, double *taken) {
     qo_model before = *model;
     qo_status status = check_length(model, h);
     if (status == QO_OK && (status = integrate(model, h, taken)) == QO_OK) {
-        status = qo_outputs(model);
+        status = qo_outputs_after_step(model);
     }
     if (status != QO_OK) {
         memcpy(before.message, model->message, sizeof before.message);
@@ -315,8 +347,8 @@ qo_status qo_step(qo_model *model, double h) {
     int changed;
     qo_status status = check_length(model, h);
     if (status == QO_OK && (status = integrate_all(model, h)) == QO_OK &&
-        (status = qo_outputs(model)) == QO_OK) {
-        status = qo_update_discrete(model, &changed);
+        (status = qo_outputs_after_step(model)) == QO_OK) {
+        status = qo_mode_after_step(model, &changed);
     }
     if (status != QO_OK) {
         memcpy(before.message, model->message, sizeof before.message);

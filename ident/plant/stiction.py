@@ -3,7 +3,7 @@
     friction            d_c tanh(ξ),   ξ = q̇/ε + σ
     memory              T σ̇ = g s q̇/ε - 5 (1 - g) σ
     lagged load         (T/4) η̇ = ξ' - η,   ξ' = ξ / (1 + (ξ/4)⁴)^(1/4)
-    below creep         g = 1 / (1 + (q̇/(3 ε))⁴)
+    below creep         g = 1 / (1 + (q̇/(2.5 ε))⁴)
     steady              s = 1 / (1 + ((ξ' - η)/0.07)⁴)
 
 With tanh(q̇/ε) alone, equation (16), a joint creeps for ever under any torque. σ, a state of each joint, is the way that
@@ -25,8 +25,8 @@ from ident.plant.symbols import Symbols
 STICK_TIME: Final = 0.06
 """T where nobody sets one: how long motion below stiction goes on before it is held [s]; chosen in docs/adr/0008."""
 
-_CREEP: Final = 3.0
-"""Rate over ε below which a joint creeps: tanh 3 = 0.995."""
+_CREEP: Final = 2.5
+"""Rate over ε below which a joint creeps: tanh 2.5 = 0.987. At 3 slow turns of a motion are taken for creep."""
 
 _FADING: Final = 5.0
 """How many times faster σ fades in motion than it grows in creep. Much above 5 a joint close to its limit slides on."""

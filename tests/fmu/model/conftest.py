@@ -67,9 +67,10 @@ class Core:
         blocks = (Block.STATE, Block.INPUT, Block.PARAMETER, Block.OUTPUT)
         vectors = [(block.value, ctypes.c_double * self.sizes[block]) for block in blocks]
         vectors.append(("ur", ctypes.c_double * self.sizes[Block.INPUT]))
-        scalars = [(name, ctypes.c_double) for name in ("tolerance", "step_length", "after_jump")]
-        memory = [("last_u", ctypes.c_double * self.sizes[Block.INPUT]), ("mode", ctypes.c_int)]
-        return [*vectors, *scalars, *memory, ("message", ctypes.c_char * 160)]
+        scalars = [(name, ctypes.c_double) for name in ("tolerance", "step_length")]
+        memory = [("after_jump", ctypes.c_double * 4), ("last_u", ctypes.c_double * self.sizes[Block.INPUT])]
+        counts = [("since_jump", ctypes.c_int), ("mode", ctypes.c_int)]
+        return [*vectors, *scalars, *memory, *counts, ("message", ctypes.c_char * 160)]
 
     def new(self, **values: float) -> Instance:
         instance = Instance(self)

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from fmu.table import neutral_effects
+from fmu.variables import Carried
 from ident.effects import Effect, make_effect
 from ident.effects.extended import ExtendedModel, simulation_of
 from ident.estimate.filters import zero_phase
@@ -55,13 +57,15 @@ def reduced(
     return simulation_of(model, mode, vehicle.geometry).run(start, torques[None], SAMPLE_TIME)
 
 
-def in_the_fmu(core: Any, mode: Mode, **parameters: float) -> dict[str, Array]:
+def in_the_fmu(core: Any, mode: Mode, injected: dict[str, float], **parameters: float) -> dict[str, Array]:
     start, torques = swinging(mode, core.vehicle)
     instance = core.new(alpha_l=start.alpha[0, 0], alpha_r=start.alpha[0, 1], **QUICK, **parameters)
     names = [f"beta_{wheel}_dot" for wheel in WHEELS] + ["alpha_l_dot", "alpha_r_dot"]
     twists = [row.name for row in core.table.variables if row.name.endswith("_twist_dot")]
     found = [[instance[name] for name in names + twists]]
     for before, after in pairwise(torques):
+        if len(found) == 2:
+            instance.set(**injected)
         for part in range(PARTS):
             share = (part + 0.5) / PARTS
             instance.u[:4] = (1 - share) * before + share * after
@@ -86,7 +90,47 @@ def test_what_gives_way_or_is_late_moves_as_in_the_fmu(
     core_of: Callable[..., Any], mode: Mode, effects: tuple[Effect, ...], parameters: dict[str, float], part: float
 ) -> None:
     core = core_of("prototype", effects)
-    fmu = in_the_fmu(core, mode, **parameters)
+    assert_moves_as_the_reduced_model(core, mode, effects, parameters, {}, part)
+
+
+WARMING = make_effect("friction_warming", "wheel_fl", {"change": 4.0, "time": 0.3})
+CHANGED = make_effect("parameter_change", "d_cw", {"change": 0.5})
+WEAK = make_effect("torque_gain", "drive_rl", {"error": -0.3})
+
+
+@pytest.mark.parametrize(
+    ("mode", "effects", "parameters", "part"),
+    [
+        (Mode.STEERED, (SOFT, LATE), {}, ELASTIC),
+        (Mode.STEERED, (WARMING,), HELD_STEERING, 0.1),
+        (Mode.STEERED, (CHANGED,), {}, 0.1),
+        (Mode.STEERED, (WEAK,), HELD_STEERING, 0.1),
+        pytest.param(Mode.ROTATION, (LOOSE,), HELD_STEERING, PLAY, marks=pytest.mark.slow),
+        pytest.param(Mode.ALIGNMENT, (SOFT_SIDE,), {}, ELASTIC, marks=pytest.mark.slow),
+    ],
+)
+def test_an_effect_of_size_zero_that_is_given_a_size_moves_as_the_reduced_model_that_has_it(
+    core_of: Callable[..., Any], mode: Mode, effects: tuple[Effect, ...], parameters: dict[str, float], part: float
+) -> None:
+    """All effects are inside, at every place; the vehicle stands for a step before one of them is injected."""
+    core = core_of("prototype", neutral_effects(Carried.ALL))
+    injected = {
+        f"{effect.name}.{effect.where}.{name}": quantity.value
+        for effect in effects
+        for name, quantity in effect.parameters.items()
+    }
+    assert_moves_as_the_reduced_model(core, mode, effects, parameters, injected, part)
+
+
+def assert_moves_as_the_reduced_model(
+    core: Any,
+    mode: Mode,
+    effects: tuple[Effect, ...],
+    parameters: dict[str, float],
+    injected: dict[str, float],
+    part: float,
+) -> None:
+    fmu = in_the_fmu(core, mode, injected, **parameters)
     model, plain = (reduced(each, mode, core.vehicle, parameters).readings for each in (effects, ()))
     motors = np.stack([fmu[f"beta_{w}_dot"] + fmu.get(f"gear_{w}_twist_dot", 0.0) for w in WHEELS], axis=1)
     compared = [(motors, model.wheel_rates[0], plain.wheel_rates[0])]
