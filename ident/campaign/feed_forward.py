@@ -163,9 +163,8 @@ def _wheels_function(mode: Mode, terms: Sequence[Term]) -> Vectorised:
     local = plain + _at_its_place(forces)
     torques = local + driven.T @ ca.solve(driven @ driven.T, wanted - driven @ local)
     motor = MOTOR_SHARE * parameters[PARAMETER_NAMES.index("B_w")]
-    soft = ca.vertcat(
-        *(float(any(one.is_gear and one.place == wheel for one in springs_of(terms))) for wheel in range(4))
-    )
+    gears = [spring.place for spring in springs_of(terms) if spring.is_gear]
+    soft = ca.SX([float(wheel in gears) for wheel in range(4)])
     torques = _under_its_load(torques, loads, plain, soft * motor * accelerations[5:])
     results = ca.densify(ca.vertcat(torques, motor * accelerations[5:], motor))
     motion = [heading, alpha, beta, velocity, acceleration, elapsed, plain, bent, p]

@@ -2,8 +2,8 @@
 
     friction  T z,    ż = (q̇ - |q̇| z)/θ
 
-z goes from -1 to 1: after a reversal at z₀ and a way s it is sign(q̇) (1 - (1 + |z₀|) exp(-s/θ)). The rate is in it as an
-increment of the way alone, so that friction depends on where a joint has been, not on how fast.
+z goes from -1 to 1: after a reversal at z₀ and a way s it is sign(q̇) (1 - (1 + |z₀|) exp(-s/θ)). The rate is in it as
+an increment of the way alone, so that friction depends on where a joint has been, not on how fast.
 """
 
 from __future__ import annotations

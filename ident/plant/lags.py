@@ -64,5 +64,18 @@ def following(values: Array, time: float, sample_time: float) -> Array:
     return np.asarray(found)
 
 
+def late_series(torques: Array, delays: Array, lags: Array, sample_time: float) -> Array:
+    """Torques (R, T, 4) of R runs as they act, behind dead times and filters (4,) [s], settled at the start."""
+    if not (delays.any() or lags.any()):
+        return torques
+    time = np.arange(torques.shape[1]) * sample_time
+    late = torques.copy()
+    for wheel, (delay, lag) in enumerate(zip(delays, lags, strict=True)):
+        for run in range(len(torques)):
+            delayed = np.interp(time - delay, time, torques[run, :, wheel])
+            late[run, :, wheel] = following(delayed, lag, sample_time)
+    return late
+
+
 def _constant(time: Expression) -> Expression:
     return ca.sqrt(time**2 + _SHORTEST**2)

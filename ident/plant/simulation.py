@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ident.plant import symbolic
 from ident.plant.bristles import bristles_of
 from ident.plant.kinematics import GENERALIZED_VELOCITIES
-from ident.plant.lags import following
+from ident.plant.lags import late_series
 from ident.plant.modes import Mode
 from ident.plant.places import DRIVES
 from ident.plant.rolling import Point, RollingModel
@@ -131,7 +131,7 @@ class Simulation:
         Raises:
             FloatingPointError: a state stops being finite.
         """
-        late = _later(torques, self._delays, self._lags, sample_time)
+        late = late_series(torques, self._delays, self._lags, sample_time)
         bent = self._bent(start)
         twists, rates = self._resting(start, bent, late, sample_time, elapsed)
         state = np.hstack([start.heading[:, None], start.alpha, start.beta, twists, start.velocities, rates, bent])
@@ -150,7 +150,7 @@ class Simulation:
         Raises:
             FloatingPointError: a state stops being finite.
         """
-        late = _later(torques, self._delays, self._lags, sample_time)
+        late = late_series(torques, self._delays, self._lags, sample_time)
         bent = self._bent(start)
         twists, rates = self._resting(start, bent, late, sample_time, elapsed)
         beta = start.beta - self._functions.at_motors(twists)
@@ -288,15 +288,3 @@ def _resting(model: RollingModel, p: Expression) -> tuple[list[Expression], Expr
     moving = ca.vertcat(model.rates(angles, point.velocity)[2:9], acceleration)
     rate = ca.jtimes(twist, x, moving) + ca.jtimes(twist, u, change)
     return [x, bent, u, change, elapsed], ca.vertcat(twist - lag * rate, rate)
-
-
-def _later(torques: Array, delays: Array, lags: Array, sample_time: float) -> Array:
-    if not (delays.any() or lags.any()):
-        return torques
-    time = np.arange(torques.shape[1]) * sample_time
-    late = torques.copy()
-    for wheel, (delay, lag) in enumerate(zip(delays, lags, strict=True)):
-        for run in range(len(torques)):
-            delayed = np.interp(time - delay, time, torques[run, :, wheel])
-            late[run, :, wheel] = following(delayed, lag, sample_time)
-    return late

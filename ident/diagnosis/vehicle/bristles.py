@@ -15,7 +15,6 @@ from ident.diagnosis.problem import Candidate, Variant
 from ident.diagnosis.vehicle.bending import BristleCause, joint_angle
 from ident.diagnosis.vehicle.context import Context
 from ident.diagnosis.vehicle.dependences import levers_of
-from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.library import placed_parameters
 from ident.diagnosis.vehicle.sources import Source
 

@@ -195,7 +195,8 @@ class Formulas:
     def linearised(self, channel: Channel, spec: RowsOfStep, units: Sequence[UnitTerm]) -> Vectorised:
         """(z, geometry, ε, p, p₀) -> (N, rows, 12 + units): the rows at p = 0, then ∂/∂p, then ∂/∂unit.
 
-        In columns of gains and of friction under load stand the torques that the rows ask for by p₀, where motors share a row.
+        In columns of gains and of friction under load stand the torques that the rows ask for by p₀, where motors share
+        a row.
         """
         key = (channel, spec, tuple(units))
         if key not in self._linearised:
