@@ -1,4 +1,4 @@
-"""Rows of the table for effects that have states of their own: delays, springs and play.
+"""Rows of the table for effects that have states of their own: delays, filters, bristles, springs and play.
 
 They are in the table only where the effect is: a vehicle without them has the model that it would have anyway.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from ident.plant.bristles import state_name
 from ident.plant.memories import Memories
 from ident.plant.symbols import SIDES
 from ident.vehicle.geometry import WHEELS
@@ -33,9 +34,20 @@ def coupled_states(memories: Memories) -> list[AddedState]:
 
 
 def other_states(memories: Memories) -> list[AddedState]:
-    """The other of the two states of each, then the time since the start of the campaign."""
+    """The other of the two states of each, those that are alone, then the time since the start of the campaign."""
     elapsed = [AddedState("elapsed", "Time since the start of the campaign", "s", 100.0)] if memories.elapsed else []
-    return [*(other for _, other in _pairs(memories)), *elapsed]
+    return [*(other for _, other in _pairs(memories)), *_following(memories), *_bent(memories), *elapsed]
+
+
+def _following(memories: Memories) -> Iterator[AddedState]:
+    for wheel in (WHEELS[index] for index in memories.lags):
+        yield AddedState(f"following_torque_{wheel}", f"Torque of motor {wheel} behind its filter", "Nm", 1.0)
+
+
+def _bent(memories: Memories) -> Iterator[AddedState]:
+    for joint in memories.bristles:
+        text = f"How far the bristles of presliding@{joint[0]} are bent, over how far they bend before they slide"
+        yield AddedState(state_name(joint), text, "1", 1.0)
 
 
 def _pairs(memories: Memories) -> Iterator[tuple[AddedState, AddedState]]:

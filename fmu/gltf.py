@@ -180,7 +180,9 @@ Surface = tuple[Array, Array, NDArray[np.int64]]
 
 
 def _box() -> Surface:
-    points, normals, triangles = [], [], []
+    points: list[Array] = []
+    normals: list[Array] = []
+    triangles: list[tuple[int, int, int]] = []
     for axis in range(3):
         for side in (-1.0, 1.0):
             outward, first, second = np.zeros(3), np.zeros(3), np.zeros(3)

@@ -32,6 +32,7 @@ class DriveFlaws:
         bias: torque beyond the reported one while the power stage is on [Nm].
         ripples: cogging.
         delay: time by which torque acts later than it is reported [s].
+        lag: time constant with which it follows after that [s].
         compliance: of the gear, at the wheel [rad/Nm]; zero is rigid.
         gap: whole play of the gear, at the wheel [rad].
     """
@@ -40,6 +41,7 @@ class DriveFlaws:
     bias: float = 0.0
     ripples: tuple[Ripple, ...] = ()
     delay: float = 0.0
+    lag: float = 0.0
     compliance: float = 0.0
     gap: float = 0.0
 
@@ -107,11 +109,14 @@ class MotorTorque:
         self._stage = stage
         self._gear = gear_ratio
         self._line = DelayLine(flaws.delay, step) if flaws.delay else None
+        self._gained = -math.expm1(-step / flaws.lag) if flaws.lag else 1.0
+        self._following = 0.0
 
     def settle(self) -> None:
         """The stage has asked for its present torque for longer than any delay."""
+        self._following = self._stage.wheel_torque
         if self._line is not None:
-            self._line.fill(self._stage.wheel_torque)
+            self._line.fill(self._following)
 
     def __call__(self, angle: float) -> float:
         """Torque at the wheel [Nm]; call once a step.
@@ -123,6 +128,9 @@ class MotorTorque:
         if self._line is not None:
             self._line.push(torque)
             torque = self._line.value()
+        if self._flaws.lag:
+            self._following += self._gained * (torque - self._following)
+            torque = self._following
         torque *= 1.0 + self._flaws.gain
         if self._stage.enabled:
             torque += self._gear * self._flaws.bias

@@ -64,7 +64,8 @@ def _controller(path: Path, source: ModelSource) -> ControllerSource:
     if source.effects:
         reference = with_effects(reference, _model_of(source), plan.vehicle.geometry)
     loops = tuple(reference.tracks)
-    designs, limits = ({loop: table[loop] for loop in loops} for table in (plan.designs, plan.limits))
+    designs = {loop: plan.designs[loop] for loop in loops}
+    limits = {loop: plan.limits[loop] for loop in loops}
     return ControllerSource(plan.vehicle, reference, Mode.STEERED, designs, limits, source.provenance)
 
 

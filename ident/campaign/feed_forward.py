@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.effects.extended import ExtendedModel
-from ident.estimate.filters import second_derivative, zero_phase
+from ident.estimate.filters import differentiate, second_derivative, zero_phase
 from ident.plant import symbolic
+from ident.plant.bristles import FIRST_JOINT, bent_along, bristles_of
 from ident.plant.kinematics import GENERALIZED_VELOCITIES
 from ident.plant.modes import Mode
 from ident.plant.springs import MOTOR_SHARE, resting_twist, stiffness_of
@@ -26,7 +27,7 @@ from ident.plant.terms import (
     rolling_radii,
     shaft_torques,
 )
-from ident.plant.transmissions import Spring
+from ident.plant.transmissions import Spring, springs_of
 from ident.plant.vectorised import Vectorised
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
@@ -35,6 +36,10 @@ Array = NDArray[np.float64]
 
 TWIST_CUTOFF: Final = 150.0
 """Of the zero-phase filter on the twists that motors are asked for [rad/s]: no motor jumps from flank to flank."""
+
+
+LOAD_ROUNDS: Final = 4
+"""Of friction that depends on the torque which it asks for: at a tenth of the load 10⁻⁴ of it is left."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,8 @@ def feed_forward(model: ExtendedModel, course: Course, plain: Array, geometry: G
 
     What the effects ask for at a wheel or a steering side is given there, the rest by the pseudoinverse as in (21).
     Motors behind gears that give way turn ahead of their wheels by compliance times load and half the play, as fast
-    as TWIST_CUTOFF lets them; drives that are late are asked earlier. No torque makes up for a coupling of the steering
+    as TWIST_CUTOFF lets them; drives that are late are asked earlier, those that follow are asked for more while it
+    rises. Bristles are straight where the motion begins. No torque makes up for a coupling of the steering
     that gives way (the inertia of its rear unit asks for less than a thousandth of what the steering needs), nor for
     `slip`; steering encoders are the controller's business.
 
@@ -97,6 +103,7 @@ def feed_forward(model: ExtendedModel, course: Course, plain: Array, geometry: G
         course.accelerations,
         course.elapsed[:, None],
         plain,
+        _bent(model, course),
         model.parameters.values,
         geometry.as_vector(),
         np.array([COULOMB_EPSILON]),
@@ -108,7 +115,25 @@ def feed_forward(model: ExtendedModel, course: Course, plain: Array, geometry: G
         twists[:, spring.place] = twist
         shaft[:, spring.place] += motor_inertia * second_derivative(twist, sample_time) / geometry.gear_ratio
     asked = _asked_function(model.terms)(shaft, course.beta + twists, geometry.as_vector())[..., 0]
-    return Demand(_earlier(asked, model.drive_delays(), sample_time), twists)
+    ahead = _ahead_of_filters(asked, model.drive_lags(), sample_time)
+    return Demand(_earlier(ahead, model.drive_delays(), sample_time), twists)
+
+
+def _ahead_of_filters(torques: Array, lags: Array, sample_time: float) -> Array:
+    """What filters of these time constants (4,) [s] are asked for, where torques (N, 4) are to come out of them."""
+    if not lags.any():
+        return torques
+    smooth = zero_phase(torques, TWIST_CUTOFF, sample_time)
+    return np.asarray(torques + lags * differentiate(smooth, sample_time))
+
+
+def _bent(model: ExtendedModel, course: Course) -> Array:
+    """How far the bristles of joints are bent (N, m)."""
+    angles = np.hstack([course.alpha, course.beta])
+    found = [
+        bent_along(angles[:, row - FIRST_JOINT], float(angle)) for (_, row), angle in bristles_of(model.terms).items()
+    ]
+    return np.stack(found, axis=1) if found else np.zeros((len(angles), 0))
 
 
 def _twist(spring: Spring, load: Array, sample_time: float) -> Array:
@@ -126,8 +151,11 @@ def _wheels_function(mode: Mode, terms: Sequence[Term]) -> Vectorised:
     H = on_radii(symbolic.complement(mode, alpha), rolling_radii(terms, beta))
     rates = H @ velocity
     accelerations = ca.jtimes(rates, alpha, rates[3:5]) + ca.jtimes(rates, beta, rates[5:]) + H @ acceleration
-    elapsed = ca.SX.sym("t")
-    state = State(heading, alpha, beta, rates, accelerations, elapsed)
+    elapsed, loads = ca.SX.sym("t"), ca.SX.sym("load", 4)
+    joints = bristles_of(terms)
+    bent = ca.SX.sym("z", len(joints))
+    by_joint = dict(zip(joints, ca.vertsplit(bent), strict=True))
+    state = State(heading, alpha, beta, rates, accelerations, elapsed, loads, by_joint)
     parameters = changed_parameters(terms, p, state)
     forces = added_forces(terms, state, parameters)
     wanted = H.T @ (symbolic.regressor(rates, accelerations) @ parameters + forces)
@@ -135,9 +163,20 @@ def _wheels_function(mode: Mode, terms: Sequence[Term]) -> Vectorised:
     local = plain + _at_its_place(forces)
     torques = local + driven.T @ ca.solve(driven @ driven.T, wanted - driven @ local)
     motor = MOTOR_SHARE * parameters[PARAMETER_NAMES.index("B_w")]
+    gears = [spring.place for spring in springs_of(terms) if spring.is_gear]
+    soft = ca.SX([float(wheel in gears) for wheel in range(4)])
+    torques = _under_its_load(torques, loads, plain, soft * motor * accelerations[5:])
     results = ca.densify(ca.vertcat(torques, motor * accelerations[5:], motor))
-    inputs = [heading, alpha, beta, velocity, acceleration, elapsed, plain, p, symbolic.GEOMETRY, symbolic.EPSILON]
-    return Vectorised(ca.Function("torques", inputs, [ca.cse(results)]))
+    motion = [heading, alpha, beta, velocity, acceleration, elapsed, plain, bent, p]
+    return Vectorised(ca.Function("torques", [*motion, symbolic.GEOMETRY, symbolic.EPSILON], [ca.cse(results)]))
+
+
+def _under_its_load(torques: Expression, loads: Expression, first: Expression, at_motors: Expression) -> Expression:
+    """Torques (4,) that make the loads (4,) which they depend on; each round leaves a share of the error."""
+    found = first
+    for _ in range(LOAD_ROUNDS if ca.depends_on(torques, loads) else 0):
+        found = ca.cse(ca.substitute(torques, loads, symbolic.LENGTHS.i_G * found - at_motors))
+    return found if ca.depends_on(torques, loads) else torques
 
 
 def _at_its_place(forces: Expression) -> Expression:

@@ -20,6 +20,8 @@ class EffectName(enum.StrEnum):
     ASYMMETRIC_VISCOUS = "asymmetric_viscous"
     QUADRATIC_DRAG = "quadratic_drag"
     FRICTION_POSITION = "friction_position"
+    FRICTION_LOAD = "friction_load"
+    PRESLIDING = "presliding"
     SLOPE = "slope"
     COM_OFFSET = "com_offset"
     PAYLOAD = "payload"
@@ -27,6 +29,7 @@ class EffectName(enum.StrEnum):
     TORQUE_BIAS = "torque_bias"
     TORQUE_RIPPLE = "torque_ripple"
     TIME_DELAY = "time_delay"
+    TORQUE_FILTER = "torque_filter"
     BACKLASH = "backlash"
     ELASTICITY = "elasticity"
     WHEEL_RADIUS = "wheel_radius"
@@ -45,14 +48,24 @@ _AT_GROUPS: Final[Mapping[EffectName, tuple[str, ...]]] = MappingProxyType(
         EffectName.ASYMMETRIC_VISCOUS: ("wheels", "steering"),
         EffectName.QUADRATIC_DRAG: ("wheels",),
         EffectName.FRICTION_POSITION: ("steering",),
+        EffectName.FRICTION_LOAD: ("wheels",),
+        EffectName.PRESLIDING: ("wheels", "steering"),
         EffectName.TIME_DELAY: ("drives", "encoders"),
+        EffectName.TORQUE_FILTER: ("drives",),
         EffectName.TORQUE_RIPPLE: ("drives",),
     }
 )
 """Groups of equals at which an effect is looked for too: what one bearing, one bus or one firmware does, all do."""
 
 
-MEMORIES = (EffectName.TIME_DELAY, EffectName.BACKLASH, EffectName.ELASTICITY, EffectName.SLIP)
+MEMORIES = (
+    EffectName.TIME_DELAY,
+    EffectName.TORQUE_FILTER,
+    EffectName.BACKLASH,
+    EffectName.ELASTICITY,
+    EffectName.PRESLIDING,
+    EffectName.SLIP,
+)
 """Effects with states of their own, which are taken out of the signals; the others are terms of the rows."""
 
 

@@ -13,7 +13,7 @@ from ident.effects import Effect, EffectTerm, terms_of
 from ident.plant.modes import Mode
 from ident.plant.places import DRIVES, ENCODERS
 from ident.plant.simulation import Simulation
-from ident.plant.terms import delay_at, steering_errors
+from ident.plant.terms import delay_at, lag_at, steering_errors
 from ident.plant.transmissions import Spring, springs_of
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import Parameters
@@ -46,6 +46,10 @@ class ExtendedModel:
     def drive_delays(self) -> Array:
         """Dead times (4,) of the drives [s]."""
         return self._delays(DRIVES)
+
+    def drive_lags(self) -> Array:
+        """Time constants (4,) with which the torques of the drives follow [s]."""
+        return np.array([float(lag_at(self.terms, place)) for place in DRIVES])
 
     def encoder_delays(self) -> Array:
         """Dead times (2,) of the steering encoders [s]."""

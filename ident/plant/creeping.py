@@ -15,13 +15,15 @@ import casadi as ca
 
 from ident.plant import symbolic
 from ident.plant.balance import Resistance
+from ident.plant.bristles import bending_rates, bent_in
 from ident.plant.contact import contact_forces, held_twist, held_twist_rates, static_loads
 from ident.plant.delays import filter_rates, late_angles, late_torques
 from ident.plant.drives import DRIVES, Inputs
+from ident.plant.lags import following_rates, following_torques
 from ident.plant.memories import Memories, memories_of
 from ident.plant.stiction import held_rates, memory_rates
 from ident.plant.stops import stop_torques
-from ident.plant.symbolic import Expression
+from ident.plant.symbolic import LENGTHS, Expression
 from ident.plant.symbols import SIDES, Symbols, bound, dynamic_parameters
 from ident.plant.terms import (
     State,
@@ -100,15 +102,18 @@ def equations(x: Symbols, u: Symbols, p: Symbols, effects: Sequence[Term], input
     state = _state(x, memories)
     parameters = changed_parameters(terms, dynamic_parameters(p), state)
     couplings, gears = _twists(x, p, terms, parameters, memories)
-    motion = _motion(state, x, p, terms, couplings)
     alpha, rates = state.alpha, state.rates
     motor_angles, motor_rates = at_motors(gears, state.beta, "angle"), at_motors(gears, rates[5:], "rate")
     torques, integral_rates = DRIVES[inputs](motor_rates, x, u, p)
-    shaft = shaft_torques(terms, late_torques(x, terms, memories, torques), motor_angles)
+    late = late_torques(x, terms, memories, torques)
+    shaft = shaft_torques(terms, following_torques(x, terms, memories, late), motor_angles)
+    transmitted = transmitted_torques(gears, shaft)
+    state = replace(state, loads=LENGTHS.i_G * transmitted)
+    motion = _motion(state, x, p, terms, couplings)
     resistance = Resistance(terms, parameters, lambda state: stop_torques(state.alpha, state.rates, p))
     slip = motion.slip_with(ca.SX.zeros(3))
     forces = contact_forces(motion.slip_with(held_twist(x)), static_loads(p, terms), p)
-    accelerations = _acceleration(motion, resistance, forces, shaft, gears)
+    accelerations = _acceleration(motion, resistance, forces, transmitted, gears)
     slope_rates, filtered_rates = filter_rates(x, terms, memories, torques, rates[3:5])
     xd = ca.vertcat(
         accelerations,
@@ -119,6 +124,8 @@ def equations(x: Symbols, u: Symbols, p: Symbols, effects: Sequence[Term], input
         integral_rates,
         *(twisted.rate for twisted in (*couplings, *gears)),
         filtered_rates,
+        following_rates(x, terms, memories, late),
+        bending_rates(x, terms, rates),
         *([ca.SX(1)] if memories.elapsed else []),
         rates[3:],
         _pose_rate(state.heading, rates),
@@ -136,7 +143,8 @@ def _state(x: Symbols, memories: Memories) -> State:
     alpha, beta = x.sides("alpha_{}"), x.wheels("beta_{}")
     rates = ca.vertcat(x.stacked("x_dot", "y_dot", "gamma_dot"), x.sides("alpha_{}_dot"), x.wheels("beta_{}_dot"))
     elapsed = x["elapsed"] if memories.elapsed else ca.SX.sym("elapsed")
-    return State(x["gamma"], alpha, beta, rates, ca.SX.sym("qdd", 9), elapsed)
+    bent = bent_in(x, memories.bristles)
+    return State(x["gamma"], alpha, beta, rates, ca.SX.sym("qdd", 9), elapsed, bent=bent)
 
 
 def _twists(
@@ -182,12 +190,12 @@ def _constraint_matrix(alpha: Expression, couplings: Sequence[Twist]) -> Express
 
 
 def _acceleration(
-    motion: Motion, resistance: Resistance, forces: Expression, shaft: Expression, gears: Sequence[Twist]
+    motion: Motion, resistance: Resistance, forces: Expression, transmitted: Expression, gears: Sequence[Twist]
 ) -> Expression:
-    """q̈ (9 + n,), with the soft couplings', under forces (8,) of the contacts and torques (4,) of the motors."""
+    """q̈ (9 + n,), with the soft couplings', under forces (8,) of the contacts and what the gears transmit (4,)."""
     unknown = ca.vertcat(motion.state.accelerations, *(twisted.acceleration for twisted in motion.couplings))
     residual = resistance.at(motion.state, motion.held, motion.couplings) - motion.rolling.T @ forces
-    residual[:9] -= symbolic.input_matrix() @ transmitted_torques(gears, shaft)
+    residual[:9] -= symbolic.input_matrix() @ transmitted
     for each in gears:
         residual[5 + each.place] -= each.inertia * motion.state.accelerations[5 + each.place]
     residual[9:] += ca.vertcat(*(twisted.torque for twisted in motion.couplings))

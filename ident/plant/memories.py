@@ -1,4 +1,4 @@
-"""Which parts of a vehicle have states of their own: springs, delays, what depends on time."""
+"""Which parts of a vehicle have states of their own: springs, delays, filters, bristles, what depends on time."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import methodcaller
 
+from ident.plant.bristles import bristles_of
 from ident.plant.places import DRIVES, ENCODERS, STEERING
 from ident.plant.symbolic import Expression
-from ident.plant.terms import Term
+from ident.plant.terms import Joint, Term
 
-_COMPLIANCES, _GAPS, _DELAYS = (methodcaller(name) for name in ("compliances", "gaps", "delays"))
+_COMPLIANCES, _GAPS, _DELAYS, _LAGS = (methodcaller(name) for name in ("compliances", "gaps", "delays", "lags"))
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,8 @@ class Memories:
         gears: wheels (0 to 3) whose motor turns on its own.
         drives: wheels whose torque acts later.
         encoders: steering sides whose angle is reported later.
+        lags: wheels whose torque follows as a filter of first order does.
+        bristles: joints whose friction bends bristles before it slides.
         elapsed: whether something depends on the time since the start of the campaign.
     """
 
@@ -29,6 +32,8 @@ class Memories:
     gears: tuple[int, ...]
     drives: tuple[int, ...]
     encoders: tuple[int, ...]
+    lags: tuple[int, ...]
+    bristles: tuple[Joint, ...]
     elapsed: bool
 
     @property
@@ -49,5 +54,7 @@ def memories_of(terms: Sequence[Term]) -> Memories:
         gears=places(DRIVES, _COMPLIANCES, _GAPS),
         drives=places(DRIVES, _DELAYS),
         encoders=places(ENCODERS, _DELAYS),
+        lags=places(DRIVES, _LAGS),
+        bristles=tuple(bristles_of(terms)),
         elapsed=any(term.takes_time for term in terms),
     )

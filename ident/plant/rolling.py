@@ -15,7 +15,7 @@ is of the order t, and a wheel that is askew slides.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ident.plant import symbolic
 from ident.plant.balance import Resistance
+from ident.plant.bristles import bent_on, bristles_of
 from ident.plant.kinematics import GENERALIZED_VELOCITIES
 from ident.plant.modes import Mode
 from ident.plant.springs import resting_twist
@@ -36,6 +37,7 @@ from ident.plant.transmissions import (
     coupling,
     gear,
     motor_inertial,
+    transmitted_torques,
 )
 
 
@@ -48,12 +50,14 @@ class Point:
         twist: of the springs (n,).
         velocity: ṡ_k, then the rates of the twists (n_k + n,).
         elapsed: time since the start of the campaign [s].
+        bent: how far the bristles of joints are bent (m,).
     """
 
     angles: Expression
     twist: Expression
     velocity: Expression
     elapsed: Expression
+    bent: Expression
 
 
 class RollingModel:
@@ -67,11 +71,13 @@ class RollingModel:
     Attributes:
         twists: n, number of springs.
         width: n_k + n.
+        bristles: m joints whose friction bends bristles, with the angle θ of each.
     """
 
     def __init__(self, mode: Mode, terms: Sequence[Term], springs: Sequence[Spring]) -> None:
         self._mode, self._terms, self._springs = mode, list(terms), list(springs)
         self.twists = len(springs)
+        self.bristles = bristles_of(terms)
         self.width = len(GENERALIZED_VELOCITIES[mode]) + self.twists
 
     def motor_columns(self) -> NDArray[np.float64]:
@@ -108,6 +114,15 @@ class RollingModel:
         balance, twists = self._balance(point, unknown, u, p)
         return _solved(balance + self._in_rows([twist.torque for twist in twists]), unknown)
 
+    def bent_on(self, point: Point, time: Expression) -> Expression:
+        """How far the bristles are bent (m,) after a time [s] at these velocities."""
+        rates = self.rates(point.angles, point.velocity)
+        found = [
+            bent_on(bent, time * rates[row], angle)
+            for bent, ((_, row), angle) in zip(ca.vertsplit(point.bent), self.bristles.items(), strict=True)
+        ]
+        return ca.vertcat(*found)
+
     def resting(self, point: Point, u: Expression, p: Expression) -> tuple[Expression, Expression, Expression]:
         """A motion in which nothing swings: twists (n,) under its load, how late the dampers keep them [s], s̈_k.
 
@@ -118,7 +133,8 @@ class RollingModel:
         """
         plain = self.width - self.twists
         acceleration = ca.SX.sym("a", plain)
-        balance, twists = self._balance(point, ca.vertcat(acceleration, ca.SX.zeros(self.twists)), u, p)
+        unknown = ca.vertcat(acceleration, ca.SX.zeros(self.twists))
+        balance, twists = self._balance(point, unknown, u, p, resting=True)
         found = _solved(balance[:plain], acceleration)
         loads = -ca.substitute(balance[plain:], acceleration, found)
         angles = [resting_twist(loads[index], twist.stiffness, twist.gap) for index, twist in enumerate(twists)]
@@ -129,13 +145,18 @@ class RollingModel:
         return ca.vertcat(ca.SX.zeros(self.width - self.twists), *torques)
 
     def _balance(
-        self, point: Point, unknown: Expression, u: Expression, p: Expression
+        self, point: Point, unknown: Expression, u: Expression, p: Expression, *, resting: bool = False
     ) -> tuple[Expression, list[Twist]]:
-        """Generalized forces (n_k + n,) that must be zero together with those of the springs, and the springs."""
+        """Generalized forces (n_k + n,) that must be zero together with those of the springs, and the springs.
+
+        Gears transmit what their springs give, or, where these are what is asked for, what the motors do.
+        """
         H, state = self.directions(point.angles), self._state(point, unknown)
         parameters = changed_parameters(self._terms, p, state)
         gears, couplings = self._twists(point, unknown, parameters)
         shaft = shaft_torques(self._terms, u, at_motors(gears, state.beta, "angle"))
+        transmitted = transmitted_torques([] if resting else gears, shaft)
+        state = replace(state, loads=LENGTHS.i_G * transmitted)
         resisting = Resistance(self._terms, parameters).at(state, None, couplings)
         whole = resisting[:9] - symbolic.input_matrix() @ shaft
         motors = []
@@ -160,7 +181,9 @@ class RollingModel:
         H = self.directions(point.angles)
         rates = H @ point.velocity
         accelerations = ca.jtimes(rates, point.angles, rates[2:]) + H @ unknown
-        return State(point.angles[0], point.angles[1:3], point.angles[3:], rates, accelerations, point.elapsed)
+        bent = dict(zip(self.bristles, ca.vertsplit(point.bent), strict=True))
+        angles = point.angles
+        return State(angles[0], angles[1:3], angles[3:], rates, accelerations, point.elapsed, bent=bent)
 
 
 def _solved(balance: Expression, unknown: Expression) -> Expression:

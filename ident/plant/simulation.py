@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import casadi as ca
@@ -17,12 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.plant import symbolic
+from ident.plant.bristles import bristles_of
 from ident.plant.kinematics import GENERALIZED_VELOCITIES
+from ident.plant.lags import late_series
 from ident.plant.modes import Mode
 from ident.plant.places import DRIVES
 from ident.plant.rolling import Point, RollingModel
 from ident.plant.symbolic import Expression
-from ident.plant.terms import Term, delay_at
+from ident.plant.terms import Term, delay_at, lag_at
 from ident.plant.transmissions import springs_of
 from ident.plant.vectorised import Vectorised
 from ident.vehicle.geometry import Geometry
@@ -52,12 +54,14 @@ class Motion:
         alpha: (R, 2) true angles of the front units [rad].
         beta: (R, 4) of the wheels [rad].
         velocities: ṡ_k (R, n_k).
+        bent: how far the bristles of joints are bent (R, m), in the order of `Simulation.bristles`; None: not at all.
     """
 
     heading: Array
     alpha: Array
     beta: Array
     velocities: Array
+    bent: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -98,12 +102,18 @@ class Simulation:
         terms: additions with numbers.
         mode: k.
         geometry: of the vehicle.
+
+    Attributes:
+        bristles: joints whose friction bends bristles, with the angle θ of each [rad].
     """
 
     def __init__(self, parameters: Array, terms: Sequence[Term], mode: Mode, geometry: Geometry) -> None:
         springs = springs_of(terms)
         self._functions = _Functions(RollingModel(mode, terms, springs))
-        self._delays = np.array([float(delay_at(terms, drive)) for drive in DRIVES])
+        self.bristles = {joint: float(angle) for joint, angle in bristles_of(terms).items()}
+        self._delays, self._lags = (
+            np.array([float(late_at(terms, drive)) for drive in DRIVES]) for late_at in (delay_at, lag_at)
+        )
         self._longest = SPRING_STEP if springs else STEP
         self._constants = (parameters, geometry.as_vector(), np.array([COULOMB_EPSILON]))
         self._width = len(GENERALIZED_VELOCITIES[mode])
@@ -121,9 +131,10 @@ class Simulation:
         Raises:
             FloatingPointError: a state stops being finite.
         """
-        late = _later(torques, self._delays, sample_time)
-        twists, rates = self._resting(start, late, sample_time, elapsed)
-        state = np.hstack([start.heading[:, None], start.alpha, start.beta, twists, start.velocities, rates])
+        late = late_series(torques, self._delays, self._lags, sample_time)
+        bent = self._bent(start)
+        twists, rates = self._resting(start, bent, late, sample_time, elapsed)
+        state = np.hstack([start.heading[:, None], start.alpha, start.beta, twists, start.velocities, rates, bent])
         return self._run(state, late, sample_time, elapsed)
 
     def run_from_readings(
@@ -139,23 +150,30 @@ class Simulation:
         Raises:
             FloatingPointError: a state stops being finite.
         """
-        late = _later(torques, self._delays, sample_time)
-        twists, rates = self._resting(start, late, sample_time, elapsed)
+        late = late_series(torques, self._delays, self._lags, sample_time)
+        bent = self._bent(start)
+        twists, rates = self._resting(start, bent, late, sample_time, elapsed)
         beta = start.beta - self._functions.at_motors(twists)
         angles = np.hstack([start.heading[:, None], start.alpha, beta])
         matrix = self._functions.reading(angles, *self._constants[1:])
         read = np.hstack([readings.steering_rates[:, 0], readings.wheel_rates[:, 0]])
         read -= np.einsum("rij,rj->ri", matrix[:, :, self._width :], rates)
         velocities = np.einsum("rij,rj->ri", np.linalg.pinv(matrix[:, :, : self._width]), read)
-        return self._run(np.hstack([angles, twists, velocities, rates]), late, sample_time, elapsed)
+        return self._run(np.hstack([angles, twists, velocities, rates, bent]), late, sample_time, elapsed)
 
-    def _resting(self, start: Motion, torques: Array, sample_time: float, elapsed: float) -> tuple[Array, Array]:
+    def _bent(self, start: Motion) -> Array:
+        return np.zeros((len(start.heading), len(self.bristles))) if start.bent is None else start.bent
+
+    def _resting(
+        self, start: Motion, bent: Array, torques: Array, sample_time: float, elapsed: float
+    ) -> tuple[Array, Array]:
         """Twists and their rates (R, n) under the load of a motion in which nothing swings."""
         if not self._twists:
             return np.zeros((len(torques), 0)), np.zeros((len(torques), 0))
         state = np.hstack([start.heading[:, None], start.alpha, start.beta, start.velocities])
         change = (torques[:, 1] - torques[:, 0]) / sample_time
-        found = self._functions.resting(state, torques[:, 0], change, np.array([elapsed]), *self._constants)[..., 0]
+        now = torques[:, 0], change, np.array([elapsed])
+        found = self._functions.resting(state, bent, *now, *self._constants)[..., 0]
         return found[:, : self._twists], found[:, self._twists :]
 
     def _run(self, state: Array, torques: Array, sample_time: float, elapsed: float) -> Trajectory:
@@ -173,7 +191,8 @@ class Simulation:
     def _trajectory(self, states: Array) -> Trajectory:
         runs, samples, width = states.shape
         flat = states.reshape(-1, width)
-        speeds = flat[:, _ANGLES + self._twists :]
+        first = _ANGLES + self._twists
+        speeds = flat[:, first : first + self._width + self._twists]
         matrix = self._functions.reading(flat[:, :_ANGLES], *self._constants[1:])
         read = np.einsum("rij,rj->ri", matrix, speeds).reshape(runs, samples, 6)
         velocities = speeds[:, : self._width].reshape(runs, samples, -1)
@@ -185,7 +204,7 @@ class _Functions:
 
     Attributes:
         reading: (γ α β, geometry, ε) -> matrix (6, n_k + n) from velocities to what encoders read.
-        resting: (γ α β ṡ, u, u̇, t, p, geometry, ε) -> twists and their rates.
+        resting: (γ α β ṡ, z, u, u̇, t, p, geometry, ε) -> twists and their rates.
     """
 
     def __init__(self, model: RollingModel) -> None:
@@ -198,7 +217,7 @@ class _Functions:
         self.resting = _vectorised(_resting(model, parameters), parameters)
 
     def steps(self, state: Array, torques: Array, time: Array, step: float, constants: Sequence[Array]) -> Array:
-        """States (R, T, n) after each of T samples of S steps; a state is γ, α, β, twists, ṡ, rates of the twists.
+        """States (R, T, n) after each of T samples of S steps; a state is γ, α, β, twists, ṡ, rates of the twists, z.
 
         Args:
             state: at the start (R, n).
@@ -233,11 +252,12 @@ def _function(function: tuple[list[Expression], Expression], *parameters: Expres
 
 def _step(model: RollingModel, p: Expression) -> tuple[list[Expression], Expression]:
     """One step of ROS2. A twist follows its rate, so its stages are eliminated: k_θ = f_θ + γ h k_ω."""
-    count, width = model.twists, model.width
-    x, u = ca.SX.sym("x", _ANGLES + count + width), ca.SX.sym("u", 4)
+    count, width, start = model.twists, model.width, _ANGLES + model.twists
+    x, u = ca.SX.sym("x", start + width + len(model.bristles)), ca.SX.sym("u", 4)
     h, elapsed = ca.SX.sym("h"), ca.SX.sym("t")
-    angles, twist, velocity = x[:_ANGLES], x[_ANGLES : _ANGLES + count], x[_ANGLES + count :]
-    change = model.acceleration(Point(angles, twist, velocity, elapsed), u, p)
+    angles, twist, velocity, bent = x[:_ANGLES], x[_ANGLES:start], x[start : start + width], x[start + width :]
+    point = Point(angles, twist, velocity, elapsed, bent)
+    change = model.acceleration(replace(point, bent=model.bent_on(point, h / 2)), u, p)
     follows = ca.horzcat(ca.SX.zeros(count, width - count), ca.SX.eye(count))
     by_twist = GAMMA * h * ca.jacobian(change, twist)
     matrix = ca.SX.eye(width) - GAMMA * h * (ca.jacobian(change, velocity) + by_twist @ follows)
@@ -251,28 +271,20 @@ def _step(model: RollingModel, p: Expression) -> tuple[list[Expression], Express
     ahead = ca.substitute([change], [twist, velocity], moved)[0]
     twisted_on, second = stage(follows @ moved[1] - 2 * twisted, ahead - 2 * first)
     after = velocity + h * (1.5 * first + 0.5 * second)
-    turning = model.rates(angles, (velocity + after) / 2)[2:9]
-    return [x, u, h, elapsed], ca.vertcat(angles + h * turning, twist + h * (1.5 * twisted + 0.5 * twisted_on), after)
+    moving = replace(point, velocity=(velocity + after) / 2)
+    turning = model.rates(angles, moving.velocity)[2:9]
+    twist_after = twist + h * (1.5 * twisted + 0.5 * twisted_on)
+    return [x, u, h, elapsed], ca.vertcat(angles + h * turning, twist_after, after, model.bent_on(moving, h))
 
 
 def _resting(model: RollingModel, p: Expression) -> tuple[list[Expression], Expression]:
     plain = model.width - model.twists
     x, u, change = ca.SX.sym("x", _ANGLES + plain), ca.SX.sym("u", 4), ca.SX.sym("ud", 4)
+    bent = ca.SX.sym("z", len(model.bristles))
     angles, velocity = x[:_ANGLES], x[_ANGLES:]
     still, elapsed = ca.SX.zeros(model.twists), ca.SX.sym("t")
-    point = Point(angles, still, ca.vertcat(velocity, still), elapsed)
+    point = Point(angles, still, ca.vertcat(velocity, still), elapsed, bent)
     twist, lag, acceleration = model.resting(point, u, p)
     moving = ca.vertcat(model.rates(angles, point.velocity)[2:9], acceleration)
     rate = ca.jtimes(twist, x, moving) + ca.jtimes(twist, u, change)
-    return [x, u, change, elapsed], ca.vertcat(twist - lag * rate, rate)
-
-
-def _later(torques: Array, delays: Array, sample_time: float) -> Array:
-    if not delays.any():
-        return torques
-    time = np.arange(torques.shape[1]) * sample_time
-    late = torques.copy()
-    for wheel, delay in enumerate(delays):
-        for run in range(len(torques)):
-            late[run, :, wheel] = np.interp(time - delay, time, torques[run, :, wheel])
-    return late
+    return [x, bent, u, change, elapsed], ca.vertcat(twist - lag * rate, rate)

@@ -13,14 +13,14 @@ With additions, (14) reads
 | α′ | `true_steering` | zero errors of the steering encoders; α is the report |
 
 f is linear in q̈: ∂f/∂q̈ is what is added to the mass matrix. Without any addition all are those of the plain model. What
-gives way, comes late or slides has states of its own, or changes what holds the wheels to the floor: `compliance_at`,
-`gap_at`, `delay_at` and `grips` say how much.
+gives way, comes late, follows, bends before it slides or slides has states of its own, or changes what holds the wheels
+to the floor: `compliance_at`, `gap_at`, `delay_at`, `lag_at`, `bristles` and `grips` say how much.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import ClassVar, Final
 
@@ -35,6 +35,11 @@ FIRST_WHEEL: Final = 5
 
 _NONE: Final[Mapping[str, Expression]] = MappingProxyType({})
 
+Joint = tuple[str, int]
+"""Place of an effect, and the row of q of one of its joints."""
+
+_STRAIGHT: Final[Mapping[Joint, Expression]] = MappingProxyType({})
+
 
 @dataclass(frozen=True)
 class State:
@@ -46,6 +51,8 @@ class State:
         beta: (4,) [rad].
         rates, accelerations: q̇, q̈ (9,), twist in the chassis frame, as in `ident.plant.symbolic`.
         elapsed: time since the start of the campaign [s].
+        loads: (4,) torques that the gears of the wheels transmit, at the wheels [Nm].
+        bent: how far the bristles of each joint are bent, from -1 to 1 where they slide.
     """
 
     heading: Expression
@@ -54,6 +61,8 @@ class State:
     rates: Expression
     accelerations: Expression
     elapsed: Expression
+    loads: Expression = field(default_factory=lambda: ca.SX.zeros(4))
+    bent: Mapping[Joint, Expression] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -133,6 +142,14 @@ class Term:
     def delays(self) -> Mapping[str, Expression]:
         """Dead times, by drive and encoder [s]."""
         return _NONE
+
+    def lags(self) -> Mapping[str, Expression]:
+        """Time constants with which torques follow, by drive [s]."""
+        return _NONE
+
+    def bristles(self) -> Mapping[Joint, Expression]:
+        """Angles over which bristles bend before they slide, by joint [rad]."""
+        return _STRAIGHT
 
 
 @dataclass(frozen=True)
@@ -229,6 +246,11 @@ def gap_at(terms: Sequence[Term], place: str) -> Expression:
 def delay_at(terms: Sequence[Term], place: str) -> Expression:
     """Dead time of a drive or an encoder [s]."""
     return sum((term.delays().get(place, 0.0) for term in terms), ca.SX(0))
+
+
+def lag_at(terms: Sequence[Term], place: str) -> Expression:
+    """Time constant with which the torque of a drive follows [s]."""
+    return sum((term.lags().get(place, 0.0) for term in terms), ca.SX(0))
 
 
 def on_radii(complement: Expression, radii: Expression) -> Expression:

@@ -26,6 +26,7 @@ from hil.exam.sealing import effect_of
 from ident.campaign.feed_forward import Course, feed_forward
 from ident.diagnosis.names import MEMORIES, EffectName, places_of, refuse_strangers
 from ident.diagnosis.problem import Channel
+from ident.diagnosis.vehicle.bending import BristleCause
 from ident.diagnosis.vehicle.inputs import INPUTS
 from ident.diagnosis.vehicle.rows import Formulas, kinematic_coordinates
 from ident.diagnosis.vehicle.sliding import sliding_cause
@@ -220,9 +221,19 @@ def test_rows_of_a_diagnosis_have_it_or_the_model_is_refused(name: str, where: s
     refuse_strangers([effect])
     if EffectName(name) in MEMORIES:
         for single in at_single_places([effect]):
-            assert sliding_cause(single.where) if name == "slip" else transform_cause(EffectName(name), single.where)
+            assert memory_of(name, single.where)
         return
     assert any(_in_rows(name, where, channel, step) for channel in _CHANNELS for step in ROWS)
+
+
+def memory_of(name: str, where: str) -> object:
+    match EffectName(name):
+        case EffectName.SLIP:
+            return sliding_cause(where)
+        case EffectName.PRESLIDING:
+            return BristleCause(where).joints
+        case known:
+            return transform_cause(known, where)
 
 
 _CHANNELS = (Channel.DYNAMIC, Channel.KINEMATIC)

@@ -69,6 +69,8 @@ class Truth:
         off_centre: centre of every wheel off its axle [m], rolling radius r + off_centre cos(beta + phase).
         phase: [rad].
         patch: dry torque of every contact patch against turning about the vertical [Nm].
+        loss: share of the torque through the gear by which the dry friction of each wheel is larger.
+        dahl: rows of q that have bristles beside all that, as (row, friction [Nm], angle that they bend over [rad]).
         slope, uphill: inclination of the floor, and the heading that points up it [rad].
     """
 
@@ -97,6 +99,8 @@ class Truth:
     off_centre: tuple[float, ...] = NOWHERE
     phase: tuple[float, ...] = NOWHERE
     patch: tuple[float, ...] = NOWHERE
+    loss: tuple[float, ...] = NOWHERE
+    dahl: tuple[tuple[int, float, float], ...] = ()
     slope: float = 0.0
     uphill: float = 0.0
 
@@ -123,6 +127,7 @@ class Plant:
         self.velocity = np.zeros((runs, len(inertia)))
         self.beta, self.twist, self.bristle = np.zeros((runs, 4)), np.zeros(runs), np.zeros(runs)
         self.heading = np.zeros(runs)
+        self.bent = np.zeros((runs, len(truth.dahl)))
         self.viscous, self.dry = np.zeros((2, len(inertia)))
         self.viscous[3:9] = [p["d_vl"], p["d_vr"], *[p["d_vw"]] * 4]
         self.dry[3:9] = [p["d_cl"], p["d_cr"], *[p["d_cw"]] * 4]
@@ -149,6 +154,7 @@ class Plant:
     def advance(self, torques: Array, disturbance: Array, time: float) -> None:
         """One step at a time [s], under motor torques (R, 4) and torques on q (R, 9) that no drive reports."""
         v, h = self.velocity, STEP
+        through = self._through(torques)
         load = np.zeros_like(v)
         load[:, :9] = disturbance
         if self.truth.resists is not None:
@@ -165,12 +171,13 @@ class Plant:
         matrix = h * CREEP * np.swapaxes(jacobian, 1, 2) @ jacobian
         diagonal = self.mass + h * self.viscous / 2
         load -= self.viscous / 2 * v
-        dry = self._dry(time)
+        dry = self._dry(time, through)
         root = np.sqrt(v**2 + SHARP**2)
         slope = dry * SHARP**2 / root**3
         load += -dry * v / root + slope * v
         implicit = np.broadcast_to(diagonal, v.shape) + h * slope
         implicit, load = self._with_bristles(implicit, load)
+        implicit, load = self._with_dahl(implicit, load)
         index = np.arange(len(self.mass))
         matrix[:, index, index] += implicit
         self._scrub(matrix, load)
@@ -180,11 +187,21 @@ class Plant:
         after = np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0], dtype=np.float64)
         self._move(v, after)
 
-    def _dry(self, time: float) -> Array:
+    def _through(self, torques: Array) -> Array:
+        """Torques through the gears (R, 4), at the wheels [Nm]: those of the motors, or that of the spring."""
+        through = self.geometry.gear_ratio * torques
+        if self.soft:
+            rate = self.velocity[:, 9] - self.velocity[:, 5 + self.truth.soft]
+            stiffness, damping = self._spring()
+            through[:, self.truth.soft] = stiffness * self.twist + damping * rate
+        return through
+
+    def _dry(self, time: float, through: Array) -> Array:
         """Dry friction (R, n) [Nm]."""
         dry = np.broadcast_to(self.dry, self.velocity.shape).copy()
         if self.truth.dry is not None:
             dry[:, :9] += self.truth.dry(self.alpha, self.beta, self.velocity[:, :9], time)
+        dry[:, WHEELS] += np.array(self.truth.loss) * np.abs(through)
         return np.maximum(dry, 0.0)
 
     def _weigh(self, load: Array) -> None:
@@ -229,13 +246,26 @@ class Plant:
         implicit[:, row] += STEP * (law.stiffness * STEP + damping) * kept
         return implicit, load
 
+    def _with_dahl(self, implicit: Array, load: Array) -> tuple[Array, Array]:
+        """Dahl's bristles at the end of the step: T z⁺, z⁺ = kept (z + h v⁺/angle)."""
+        implicit = implicit.copy() if self.truth.dahl else implicit
+        for place, (row, torque, angle) in enumerate(self.truth.dahl):
+            kept = 1 / (1 + STEP * np.abs(self.velocity[:, row]) / angle)
+            load[:, row] -= torque * kept * self.bent[:, place]
+            implicit[:, row] += STEP * torque * kept * STEP / angle
+        return implicit, load
+
     def _height(self, law: LuGre, v: Array) -> Array:
         return np.asarray(self.dry[3 + law.side] + law.breakaway * np.exp(-((v / law.velocity) ** 2)))
 
+    def _spring(self) -> tuple[float, float]:
+        """Stiffness and damping of the gear that gives way [Nm/rad, Nm s/rad]."""
+        stiffness = 1 / self.truth.compliance
+        return stiffness, 0.1 * float(np.sqrt(stiffness * self.truth.parameters["B_w"] / 4))
+
     def _add_spring(self, matrix: Array, right: Array) -> None:
         """K at the middle of the step, by the trapezoidal rule, on motor (+) and wheel (-)."""
-        stiffness = 1 / self.truth.compliance
-        damping = 0.1 * np.sqrt(stiffness * self.truth.parameters["B_w"] / 4)
+        stiffness, damping = self._spring()
         wheel = 5 + self.truth.soft
         rate = self.velocity[:, 9] - self.velocity[:, wheel]
         now = stiffness * (self.twist + STEP / 4 * rate) + damping / 2 * rate
@@ -257,6 +287,9 @@ class Plant:
             v = before[:, 3 + law.side]
             kept = 1 / (1 + STEP * law.stiffness * np.abs(v) / self._height(law, v))
             self.bristle = kept * (self.bristle + STEP * after[:, 3 + law.side])
+        for place, (row, _, angle) in enumerate(self.truth.dahl):
+            kept = 1 / (1 + STEP * np.abs(before[:, row]) / angle)
+            self.bent[:, place] = kept * (self.bent[:, place] + STEP * after[:, row] / angle)
         self.velocity = after
 
     def read(self) -> tuple[Array, Array]:

@@ -217,6 +217,21 @@ def _time_delay(built: Built, effect: Effect) -> Built:
     return replace(built, flaws=replace(flaws, late=_added(flaws.late, _wheels(effect.where), delay)))
 
 
+def _torque_filter(built: Built, effect: Effect) -> Built:
+    flaws = built.flaws
+    return replace(built, flaws=replace(flaws, slow=_added(flaws.slow, _wheels(effect.where), effect["time"])))
+
+
+def _friction_load(built: Built, effect: Effect) -> Built:
+    loss = _added(built.truth.loss, _wheels(effect.where), effect["share"])
+    return replace(built, truth=replace(built.truth, loss=loss))
+
+
+def _presliding(built: Built, effect: Effect) -> Built:
+    bristles = ((row, effect["amplitude"], effect["angle"]) for row in _rows(effect.where))
+    return replace(built, truth=replace(built.truth, dahl=(*built.truth.dahl, *bristles)))
+
+
 def _steering_offset(built: Built, effect: Effect) -> Built:
     left, right = _added(built.flaws.offset, _sides(effect.where), effect["offset"])
     return replace(built, flaws=replace(built.flaws, offset=(left, right)))
@@ -274,6 +289,9 @@ _MADE: Final[Mapping[str, Callable[[Built, Effect], Built]]] = MappingProxyType(
         "parameter_change": _parameter_change,
         "friction_warming": _friction_warming,
         "friction_position": _friction_position,
+        "friction_load": _friction_load,
+        "presliding": _presliding,
+        "torque_filter": _torque_filter,
     }
     | dict.fromkeys(("law_rate", "law_angle", "law_angle_direction", "law_angle_rate"), _law)
 )

@@ -44,6 +44,7 @@ class Flaws:
         bias: torque that acts beside it [Nm].
         cogging: of any motors.
         late: torque acts later than it is reported, by drive [s].
+        slow: time constant with which it follows after that, by drive [s].
         offset: reported minus true steering angle, by side [rad].
         stale: steering angle is reported so late, by side [s].
     """
@@ -52,6 +53,7 @@ class Flaws:
     bias: tuple[float, ...] = NOWHERE
     cogging: tuple[Cogging, ...] = ()
     late: tuple[float, ...] = NOWHERE
+    slow: tuple[float, ...] = NOWHERE
     offset: tuple[float, float] = (0.0, 0.0)
     stale: tuple[float, float] = (0.0, 0.0)
 
@@ -113,10 +115,13 @@ class _Drives:
         self._flaws, self._gear = flaws, gear
         self._gain, self._bias = 1 + np.array(flaws.gain), np.array(flaws.bias)
         self._late = _Late(flaws.late, np.zeros((runs, 4)))
+        self._filtered = np.zeros((runs, 4))
+        self._gained = np.array([1 - np.exp(-STEP / time) if time else 1.0 for time in flaws.slow])
 
     def acting(self, reported: Array, motors: Array) -> Array:
         """(R, 4), in the middle of a step of the vehicle."""
-        acting = self._gain * self._late.of(reported) + self._bias
+        self._filtered += self._gained * (self._late.of(reported) - self._filtered)
+        acting = self._gain * self._filtered + self._bias
         for each in self._flaws.cogging:
             angle = each.order * self._gear * motors[:, each.wheel] + each.phase
             acting[:, each.wheel] += each.amplitude * np.sin(angle)

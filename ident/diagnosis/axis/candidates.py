@@ -47,7 +47,7 @@ GRID: Final = 0.3
 LEAST_SHARE: Final = 0.1
 """Of the effort that must lie behind a play for it to be one."""
 
-LATE: Final = (EffectName.TIME_DELAY, AxisEffect.TORQUE_FILTER)
+LATE: Final = (EffectName.TIME_DELAY, EffectName.TORQUE_FILTER)
 """What makes a motion follow its effort later than sampling does."""
 
 

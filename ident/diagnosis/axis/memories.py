@@ -13,6 +13,7 @@ from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
 from ident.diagnosis.axis.reference import NEAREST
 from ident.diagnosis.delays import HELD, led
 from ident.diagnosis.law.dependence import path_since_reversal
+from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate, Variant
 from ident.effects import EffectParameter
 from ident.estimate.filters import SEVEN, differentiate
@@ -49,14 +50,14 @@ def presliding(axis: AxisModel) -> Candidate:
         EffectParameter("distance", axis.kind.position_unit, "path over which it has fallen to 1/e"),
     )
     tried = [max(share * axis.reach, shortest) for share in PATHS]
-    candidate = shaped_by(axis, AxisEffect.PRESLIDING, parameters, series, tried, price=math.log(len(tried)))
+    candidate = shaped_by(axis, EffectName.PRESLIDING, parameters, series, tried, price=math.log(len(tried)))
     return replace(candidate, lowest=(0.0, shortest))
 
 
 def friction_load(axis: AxisModel) -> Candidate:
     """Dry friction that grows with the load, as that of screws and of worm gears."""
     parameter = EffectParameter("share", "1", "of the load that resists as dry friction")
-    return linear(axis, AxisEffect.FRICTION_LOAD, [parameter], np.abs(axis.effort) * np.sign(axis.motion.velocity))
+    return linear(axis, EffectName.FRICTION_LOAD, [parameter], np.abs(axis.effort) * np.sign(axis.motion.velocity))
 
 
 def friction_warming(axis: AxisModel) -> Candidate:
@@ -90,7 +91,7 @@ def torque_filter(axis: AxisModel) -> Candidate:
     variants = (Variant(axis.alone(slope[:, None])),)
     shortest = HELD * axis.sample_time
     return Candidate(
-        AxisEffect.TORQUE_FILTER,
+        EffectName.TORQUE_FILTER,
         axis.place,
         parameters,
         variants,

@@ -25,18 +25,13 @@ class AxisEffect(enum.StrEnum):
     """Effects that are looked for at axes alone."""
 
     COUPLED_FRICTION = "coupled_friction"
-    FRICTION_LOAD = "friction_load"
     FRICTION_WARMING = "friction_warming"
-    PRESLIDING = "presliding"
     GRAVITY_LOAD = "gravity_load"
     INERTIA_POSITION = "inertia_position"
-    TORQUE_FILTER = "torque_filter"
 
 
 OVER: Final[Mapping[str, tuple[Variable, Partner]]] = MappingProxyType(
     {
-        AxisEffect.FRICTION_LOAD: (Variable.LOAD, Partner.DIRECTION),
-        AxisEffect.PRESLIDING: (Variable.PATH_SINCE_REVERSAL, Partner.DIRECTION),
         AxisEffect.GRAVITY_LOAD: (Variable.ANGLE, Partner.NOTHING),
         AxisEffect.INERTIA_POSITION: (Variable.ANGLE, Partner.ACCELERATION),
     }

@@ -16,6 +16,8 @@ from ident.diagnosis.delays import HELD
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate, Variant
 from ident.diagnosis.vehicle.askew import beside_sliding, stands_askew
+from ident.diagnosis.vehicle.bending import BristleCause
+from ident.diagnosis.vehicle.bristles import bristle_candidate, bristle_causes
 from ident.diagnosis.vehicle.context import FORMULAS_KEPT, MODEL_COLUMNS, Context
 from ident.diagnosis.vehicle.contribution import Cause, acting_in, contribution_of, side_by_side
 from ident.diagnosis.vehicle.library import (
@@ -49,6 +51,9 @@ Array = NDArray[np.float64]
 ROUNDING: Final = 1e-12
 """Of a column, relative to what the model has in the same row."""
 
+
+RARER: Final = 1.0
+"""Log odds of a filter in a drive against a plain delay, which rows of low frequency do not tell from it."""
 
 OFFSET_STD: Final = 2.2e-5
 """Of an offset of the steering, beyond the scatter of the rows [rad].
@@ -99,7 +104,8 @@ def causes_of(effects: tuple[EffectName, ...], judged: bool) -> tuple[Cause, ...
     """Causes with these names, changed values only where a model is judged."""
     names = tuple(name for name in effects if judged or name not in DRIFTS)
     sliding = sliding_causes() if EffectName.SLIP in names else []
-    return (*term_causes(names), *transform_causes(names), *sliding)
+    bending = bristle_causes() if EffectName.PRESLIDING in names else []
+    return (*term_causes(names), *transform_causes(names), *bending, *sliding)
 
 
 def candidate_of(
@@ -108,6 +114,8 @@ def candidate_of(
     """A cause as a candidate; `columns` are the numbers of those in the tables that come next."""
     if isinstance(cause, SlidingCause):
         return _sliding(cause, sources, context)
+    if isinstance(cause, BristleCause):
+        return bristle_candidate(cause, sources, context)
     if isinstance(cause, TransformCause):
         variants: tuple[Variant, ...] = tuple(_probed(cause, sources, context))
     else:
@@ -130,13 +138,14 @@ def candidate_of(
         yielding=LOAD_STD[cause.where] if cause.name == EffectName.BACKLASH else 0.0,
         periodic=ripple_over(cause.where, context.geometry) if cause.name == EffectName.TORQUE_RIPPLE else None,
         curve=friction_curve(cause.name, cause.where),
+        price=RARER if cause.name == EffectName.TORQUE_FILTER else 0.0,
         along=EffectName.ELASTICITY if cause.name == EffectName.BACKLASH else "",
     )
 
 
 def _by_sampling(cause: Cause, sources: Sequence[Source]) -> tuple[float, float]:
-    """Sizes of a delay [s], as a lead and as itself, up to which sampling may be what it is."""
-    if cause.name != EffectName.TIME_DELAY:
+    """Sizes of a delay or a filter [s], as a lead and as itself, up to which sampling may be what it is."""
+    if cause.name not in (EffectName.TIME_DELAY, EffectName.TORQUE_FILTER):
         return 0.0, 0.0
     held = HELD * max((source.sample_time for source in sources), default=0.0)
     return held, held if cause.where == "drives" else 0.0

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.names import MEMORIES, EffectName
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.vehicle import rows
+from ident.diagnosis.vehicle.bending import BristleCause
 from ident.diagnosis.vehicle.sliding import SlidingCause, sliding_cause
 from ident.diagnosis.vehicle.sources import Source
 from ident.diagnosis.vehicle.transforms import Setting, TransformCause, transform_cause
@@ -23,6 +24,9 @@ from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES, Parameters
 
 Array = NDArray[np.float64]
+
+Remembering = TransformCause | BristleCause | SlidingCause
+"""What takes an effect with a memory out of the signals."""
 
 PRIOR_WEIGHT: Final = 1e-4
 """Of the vehicle file's guesses against the rows, per unit-norm column: only what no row shows is taken from them."""
@@ -62,7 +66,7 @@ class Context:
     known: Array
     asked: Array
     formulas: rows.Formulas
-    given: tuple[tuple[TransformCause | SlidingCause, Array], ...] = ()
+    given: tuple[tuple[Remembering, Array], ...] = ()
     kept: dict[int, tuple[bytes, Array]] = field(default_factory=dict)
 
     @property
@@ -168,8 +172,10 @@ def _formulas(given: tuple[_FrozenTerm, ...]) -> rows.Formulas:
     return rows.Formulas([effect_term(name, where, dict(values)) for name, where, values in given])
 
 
-def _memory(effect: Effect) -> tuple[TransformCause | SlidingCause, Array]:
+def _memory(effect: Effect) -> tuple[Remembering, Array]:
     """What takes an effect that is no term out of the signals, with its sizes."""
     if effect.name == EffectName.SLIP:
         return sliding_cause(effect.where), np.ones(1)
+    if effect.name == EffectName.PRESLIDING:
+        return BristleCause(effect.where), np.array([effect["amplitude"], effect["angle"]])
     return transform_cause(EffectName(effect.name), effect.where), np.array([effect.size])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.problem import Variant
+from ident.diagnosis.vehicle.bending import BristleCause
 from ident.diagnosis.vehicle.context import Context
 from ident.diagnosis.vehicle.library import TermCause
 from ident.diagnosis.vehicle.sliding import SlidingCause
@@ -17,7 +18,7 @@ from ident.diagnosis.vehicle.transforms import TransformCause
 from ident.vehicle.parameters import PARAMETER_NAMES
 
 Array = NDArray[np.float64]
-Cause = TermCause | TransformCause | SlidingCause
+Cause = TermCause | TransformCause | BristleCause | SlidingCause
 
 
 def contribution_of(

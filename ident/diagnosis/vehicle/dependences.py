@@ -70,7 +70,7 @@ _LAWS: Final = (
 
 def vehicle_dependences(sources: Sequence[Source], context: Context) -> list[Dependence]:
     """Every variable that is tried for the joints of the vehicle, with what the function is multiplied with."""
-    levers = [_levers(source, context) for source in sources]
+    levers = [levers_of(source, context) for source in sources]
     return [_dependence(law, where, sources, levers, context) for law in _LAWS for where in law.places]
 
 
@@ -124,7 +124,7 @@ def _acting(lever: Array | None, joints: Sequence[int]) -> list[int]:
     return [] if lever is None else np.flatnonzero(lever[:, joints].any(axis=(0, 1))).tolist()
 
 
-def _levers(source: Source, context: Context) -> Array | None:
+def levers_of(source: Source, context: Context) -> Array | None:
     """What a torque at each of the six joints is in the rows of a source, (M, 6, rows); None where it is nothing."""
     if source.channel is not Channel.DYNAMIC or source.own is not None:
         return None

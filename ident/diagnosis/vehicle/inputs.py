@@ -27,6 +27,7 @@ _SIZES: Final = {
     "rattle": 4,
     "wander": 2,
     "rest": 4,
+    "bristles": 6,
     "payload": 1,
 }
 
@@ -44,6 +45,8 @@ Zero but where something is loose: `hammer` [-], `swing` and `rattle` [rad] wher
 (`ident.diagnosis.vehicle.rattling`), `wander` [rad] where it can be told how far a rear unit moves in its coupling
 (`ident.diagnosis.vehicle.wandering`), `rest` [rad] where a motor moves whose wheel rests
 (`ident.diagnosis.vehicle.resting`).
+
+`bristles` is what bristles of a model resist at steering axes and wheels [Nm]; zero where it has none.
 
 `payload` is the mass of a known load [kg].
 """
@@ -74,6 +77,7 @@ class Inputs:
     rattle: Expression
     wander: Expression
     rest: Expression
+    bristles: Expression
     payload: Expression
 
 

@@ -54,6 +54,7 @@ SHAPES: Final[Mapping[EffectName, Shape]] = MappingProxyType(
         EffectName.ASYMMETRIC_VISCOUS: Shape(("imbalance",)),
         EffectName.QUADRATIC_DRAG: Shape(("coefficient",)),
         EffectName.FRICTION_POSITION: Shape(("slope",)),
+        EffectName.FRICTION_LOAD: Shape(("share",)),
         EffectName.SLOPE: Shape(("angle",), angle="direction", simple=True),
         EffectName.COM_OFFSET: Shape(("x", "y"), curved=True),
         EffectName.PAYLOAD: Shape(("mass", "inertia")),
@@ -77,6 +78,9 @@ DRIFTS: Final = (EffectName.PARAMETER_CHANGE, EffectName.PAYLOAD)
 ONE_SIDED: Final = (
     EffectName.BACKLASH,
     EffectName.ELASTICITY,
+    EffectName.FRICTION_LOAD,
+    EffectName.PRESLIDING,
+    EffectName.TORQUE_FILTER,
     EffectName.SCRUB,
     EffectName.STEERING_UNIT_MASS,
 )

@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel
+from ident.diagnosis.vehicle.bending import joint_angle
 from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.signals import shifted
 from ident.diagnosis.vehicle.sources import Source
 from ident.effects import make_effect
 from ident.effects.extended import ExtendedModel, simulation_of
 from ident.plant import kinematics
+from ident.plant.bristles import FIRST_JOINT, bent_along, bristles_of
 from ident.plant.kinematics import GENERALIZED_VELOCITIES
 from ident.plant.modes import Mode
 from ident.plant.simulation import Motion, Readings
@@ -57,11 +59,13 @@ class _Runs:
     Attributes:
         source: the segment.
         inputs: (W, T, INPUTS) recorded, encoders put right.
+        bent: (W, m) how far the bristles of the model are bent at the start of each.
         repeat, place: (W,) as of an outcome.
     """
 
     source: Source
     inputs: Array
+    bent: Array
     repeat: NDArray[np.int64]
     place: NDArray[np.int64]
 
@@ -89,8 +93,15 @@ def _runs(source: Source, model: ExtendedModel) -> _Runs | None:
     starts, repeat, place = _starts(source, length)
     if not len(starts):
         return None
-    inputs = without_encoder_errors(source.inputs, model, source.sample_time)[starts[:, None] + np.arange(length)]
-    return _Runs(source, inputs, repeat, place)
+    whole = without_encoder_errors(source.inputs, model, source.sample_time)
+    return _Runs(source, whole[starts[:, None] + np.arange(length)], _bent(whole, model)[starts], repeat, place)
+
+
+def _bent(inputs: Array, model: ExtendedModel) -> Array:
+    """How far the bristles of a model are bent along recorded angles (N, m)."""
+    joints = bristles_of(model.terms)
+    found = [bent_along(joint_angle(inputs, row - FIRST_JOINT), float(angle)) for (_, row), angle in joints.items()]
+    return np.stack(found, axis=1) if found else np.zeros((len(inputs), 0))
 
 
 def _simulated(
@@ -104,6 +115,7 @@ def _simulated(
         inputs[:, 0, SLICES["alpha"]],
         inputs[:, 0, SLICES["beta"]],
         recorded[:, 0],
+        np.concatenate([runs.bent for runs in group]),
     )
     simulation = simulation_of(_loaded(model, load), mode, geometry)
     run = simulation.run_from_readings(start, read, inputs[:, :, SLICES["torques"]], sample_time)

@@ -43,6 +43,9 @@ from ident.vehicle.parameters import PARAMETER_NAMES
 
 Array = NDArray[np.float64]
 
+_OF_TORQUES: Final = (EffectName.TORQUE_GAIN, EffectName.FRICTION_LOAD)
+"""Effects whose columns are made of torques."""
+
 DIFFERENCES: Final = ("front_rear_left", "front_rear_right", "left_right")
 """What wheels that drive a rigid vehicle can disagree in: [m/s] at the floor."""
 
@@ -98,11 +101,12 @@ def dynamic_rows(mode: Mode | None, z: Inputs, parameters: Expression, terms: Se
     terms = [*terms, known]
     alpha, radii = true_steering(terms, z.alpha), rolling_radii(terms, z.beta)
     rates, accelerations = _lifted(z) if mode is None else _on_the_floor(z, alpha, radii)
+    shaft = shaft_torques(terms, z.torques, z.beta)
     # Repeats are averaged, so that nothing here depends on when it was driven: names.refuse_strangers.
-    state = State(z.heading, alpha, z.beta, rates, accelerations, ca.SX(0))
+    state = State(z.heading, alpha, z.beta, rates, accelerations, ca.SX(0), LENGTHS.i_G * shaft)
     parameters = changed_parameters(terms, parameters, state)
     inertial = symbolic.regressor(rates, accelerations) @ parameters
-    driving = symbolic.input_matrix() @ shaft_torques(terms, z.torques, z.beta)
+    driving = symbolic.input_matrix() @ shaft - ca.vertcat(ca.SX.zeros(3), z.bristles)
     if mode is None:
         # No weight rests on a wheel in the air.
         weightless = [term for term in terms if term.name != EffectName.WHEEL_ECCENTRICITY]
@@ -191,7 +195,8 @@ class Formulas:
     def linearised(self, channel: Channel, spec: RowsOfStep, units: Sequence[UnitTerm]) -> Vectorised:
         """(z, geometry, ε, p, p₀) -> (N, rows, 12 + units): the rows at p = 0, then ∂/∂p, then ∂/∂unit.
 
-        In columns of gains stand the torques that the rows ask for by p₀, where motors share a row.
+        In columns of gains and of friction under load stand the torques that the rows ask for by p₀, where motors share
+        a row.
         """
         key = (channel, spec, tuple(units))
         if key not in self._linearised:
@@ -241,7 +246,7 @@ def _linearise(rows: Expression, z: Inputs, p: Expression, units: Sequence[UnitT
     nothing, zero = ca.SX.zeros(symbols.shape[0]), ca.SX.zeros(p.shape[0])
     plain = ca.substitute(rows, symbols, nothing)
     columns = ca.substitute(ca.jacobian(rows, symbols), symbols, nothing)
-    gains = [index for index, unit in enumerate(units) if unit.term.name == EffectName.TORQUE_GAIN]
+    gains = [index for index, unit in enumerate(units) if unit.term.name in _OF_TORQUES]
     if gains and shared and ca.depends_on(columns, z.torques):
         asked = _asked_for(ca.substitute(plain, p, asking), z.torques)
         columns[:, gains] = ca.substitute(columns[:, gains], z.torques, asked)

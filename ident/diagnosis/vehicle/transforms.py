@@ -21,6 +21,7 @@ from ident.diagnosis.vehicle.rattling import above_band, moved_by
 from ident.diagnosis.vehicle.resting import range_of
 from ident.diagnosis.vehicle.signals import shifted
 from ident.estimate.filters import SEVEN, differentiate, second_derivative, zero_phase
+from ident.plant.lags import following
 from ident.plant.places import DRIVES, ENCODERS, STEERING, indices
 from ident.plant.springs import MOTOR_SHARE
 from ident.vehicle.geometry import Geometry
@@ -68,6 +69,14 @@ def _later_torque(inputs: Array, place: int, sizes: Array, setting: Setting) -> 
     changed = inputs.copy()
     column = SLICES["torques"].start + place
     changed[:, column] = shifted(inputs[:, column], delay, setting.sample_time)
+    return changed
+
+
+def _following_torque(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
+    (time,) = sizes
+    changed = inputs.copy()
+    column = SLICES["torques"].start + place
+    changed[:, column] = following(inputs[:, column], float(time), setting.sample_time)
     return changed
 
 
@@ -239,6 +248,7 @@ _DRIVE, _SIDE = "drive", "side"
 _TRANSFORMS: Final[Mapping[tuple[EffectName, str], tuple[Transform, tuple[float, ...]]]] = MappingProxyType(
     {
         (EffectName.TIME_DELAY, _DRIVE): (_later_torque, (1e-3,)),
+        (EffectName.TORQUE_FILTER, _DRIVE): (_following_torque, (1e-3,)),
         (EffectName.TIME_DELAY, _SIDE): (_earlier_angle, (1e-3,)),
         (EffectName.ELASTICITY, _DRIVE): (_soft_gear, (1e-4,)),
         (EffectName.ELASTICITY, _SIDE): (_soft_coupling, (1e-5,)),

@@ -10,7 +10,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
+from emulator.effects import inject
 from emulator.effects.transmissions import MOTOR_SHARE, SpringWithPlay
+from emulator.prototype import load_prototype
+from ident.effects import make_effect
 from ident.errors import UserError
 
 Make = Callable[..., object]
@@ -35,6 +38,27 @@ def test_a_biased_drive_reports_all_but_its_bias(make: Make, rate: float) -> Non
     p, gear = moving.prototype.truth, moving.prototype.geometry.gear_ratio
     load = p["d_vw"] * rate + math.copysign(p["d_cw"], rate)
     assert reported(moving, rate, 1) == pytest.approx(load - gear * 0.06, rel=1e-3)
+
+
+def test_a_drive_that_follows_speeds_its_wheel_up_behind_a_filter_of_first_order(make: Make) -> None:
+    """In the air, with a = B_w/d_v: 1 - exp(-t/a) without, 1 - (a exp(-t/a) - T exp(-t/T))/(a - T) with the filter."""
+    time, duration, gained = 0.05, 0.1, []
+    for text in ((), (f"torque_filter@drive_rl={time}s",)):
+        moving = make(*text, lifted=True)
+        p = moving.prototype.truth
+        moving.torque([p["d_cw"] + 1.0] * 4, 2.0)
+        start = moving.vehicle.ground_truth().wheel_rates[1]
+        moving.torque([p["d_cw"] + 7.0] * 4, duration)
+        gained.append(moving.vehicle.ground_truth().wheel_rates[1] - start)
+    a = p["B_w"] / p["d_vw"]
+    plain = 1 - math.exp(-duration / a)
+    behind = 1 - (a * math.exp(-duration / a) - time * math.exp(-duration / time)) / (a - time)
+    assert gained[1] / gained[0] == pytest.approx(behind / plain, abs=0.01)
+
+
+def test_what_acts_before_its_cause_is_refused() -> None:
+    with pytest.raises(UserError, match="before its cause"):
+        inject(load_prototype(), [make_effect("torque_filter", "drive_fl", {"time": -0.01})], STEP)
 
 
 def test_a_drive_without_power_has_no_bias(make: Make) -> None:

@@ -100,6 +100,58 @@ def test_friction_over_the_position_is_the_same_at_both_units_of_a_side(angle: f
     assert now.torques == [0.0] * 8
 
 
+def test_a_gear_rubs_in_proportion_to_what_it_transmits() -> None:
+    [effect] = [make_effect("friction_load", "wheels", {"share": 0.05})]
+    now = Moment(0.0, None, [0.0] * 8, [0.0] * 8, [0.0] * 8, [8.0, -6.0, 0.0, 2.0], [1.0] * 8)
+    for law in inject(load_prototype(), [effect], 1e-3).laws:
+        law(now)
+    assert now.coulomb == pytest.approx([1.0] * 4 + [1.4, 1.3, 1.0, 1.1])
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.0])
+def test_a_gear_that_drives_itself_or_never_moves_is_refused(share: float) -> None:
+    with pytest.raises(UserError, match="either drives itself or never moves"):
+        inject(load_prototype(), [make_effect("friction_load", "wheel_fl", {"share": share})], 1e-3)
+
+
+def test_a_loaded_gear_asks_for_more_torque_at_constant_speed(make: Make) -> None:
+    """i_G u (1 - share) = d_c + d_v rate."""
+    moving = make("friction_load@wheel_rr=0.1", lifted=True)
+    p = moving.prototype.truth
+    held = moving.hold_speed([3.0] * 4, 3.0)
+    assert held[3] == pytest.approx((p["d_cw"] + 3 * p["d_vw"]) / 0.9, rel=2e-3)
+    assert held[0] == pytest.approx(p["d_cw"] + 3 * p["d_vw"], rel=2e-3)
+
+
+def test_bristles_build_up_over_an_angle_and_lose_work_in_a_cycle() -> None:
+    """After a reversal the force is T (1 - 2 exp(-s/angle)) at a way s; the loop's area is lost."""
+    effect = make_effect("presliding", "wheel_fl", {"amplitude": 0.5, "angle": 0.2})
+    [law] = inject(load_prototype(), [effect], 1e-3).laws
+    work, force = 0.0, []
+    for rate in [*[1.0] * 3000, *[-1.0] * 3000, *[1.0] * 3000]:
+        now = Moment(0.0, None, [0.0] * 8, [0.0] * 4 + [rate] * 4, [0.0] * 8, [0.0] * 4, [1.0] * 8)
+        law(now)
+        force.append(now.torques[4])
+        work += now.torques[4] * rate * 1e-3
+    way = 0.3
+    assert force[3000 + round(way / 1e-3) - 1] == pytest.approx(0.5 * (1 - 2 * math.exp(-way / 0.2)), abs=1e-6)
+    assert work < 0
+
+
+def test_bristles_of_a_side_are_half_at_each_of_its_units() -> None:
+    effect = make_effect("presliding", "steering_right", {"amplitude": 3.0})
+    now = Moment(0.0, None, [0.0] * 8, [0, 0, 1e4, -1e4, 0, 0, 0, 0], [0.0] * 8, [0.0] * 4, [1.0] * 8)
+    for law in inject(load_prototype(), [effect], 1e-3).laws:
+        law(now)
+    assert now.torques == pytest.approx([0, 0, -1.5, 1.5, 0, 0, 0, 0])
+
+
+@pytest.mark.parametrize("values", [{"amplitude": -1.0}, {"amplitude": 1.0, "angle": 1e-8}])
+def test_bristles_that_push_or_are_too_stiff_are_refused(values: dict[str, float]) -> None:
+    with pytest.raises(UserError, match="bristles"):
+        inject(load_prototype(), [make_effect("presliding", "wheels", values)], 1e-3)
+
+
 def test_friction_that_would_drive_a_steering_axis_is_refused() -> None:
     effect = make_effect("friction_position", "steering_left", {"slope": 50.0})
     with pytest.raises(UserError, match="more than the dry friction has to lose"):

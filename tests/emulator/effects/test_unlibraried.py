@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 
 from emulator.effects import INJECTORS, Unlibraried, inject
 from emulator.effects.laws import Moment
-from emulator.effects.library.presliding import Presliding
 from emulator.engine.protocol import MakeEngine
 from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
@@ -35,11 +33,6 @@ def test_a_weakened_field_takes_a_share_that_grows_with_the_square_of_speed() ->
     assert now.torques[4:] == pytest.approx([-0.1 * torque for torque in drives])
 
 
-def test_a_gear_rubs_in_proportion_to_what_it_transmits() -> None:
-    now = obey(Unlibraried("gear_loss", "wheels", 0.05), moment([0.0] * 8, [0.0] * 8, [8.0, -6.0, 0.0, 2.0]))
-    assert now.coulomb == pytest.approx([1.0] * 4 + [1.4, 1.3, 1.0, 1.1])
-
-
 def test_hoses_pull_both_units_of_their_side_to_straight_ahead() -> None:
     now = obey(
         Unlibraried("hose_spring", "steering_right", 3.0),
@@ -48,24 +41,9 @@ def test_hoses_pull_both_units_of_their_side_to_straight_ahead() -> None:
     assert now.torques == pytest.approx([0.0, 0.0, -0.6, 0.6, 0.0, 0.0, 0.0, 0.0])
 
 
-def test_presliding_builds_up_over_an_angle_and_loses_work_in_a_cycle() -> None:
-    """After a reversal the force is T (1 - 2 exp(-s/angle)) at a way s; the loop's area is lost."""
-    law = Presliding(4, 0.5, STEP, angle=0.2)
-    work, force = 0.0, []
-    for rate in [*[1.0] * 3000, *[-1.0] * 3000, *[1.0] * 3000]:
-        now = moment([0.0] * 8, [0.0] * 4 + [rate] * 4, [0.0] * 4)
-        law(now)
-        force.append(now.torques[4])
-        work += now.torques[4] * rate * STEP
-    way = 0.3
-    after = force[3000 + round(way / STEP) - 1]
-    assert after == pytest.approx(0.5 * (1 - 2 * math.exp(-way / 0.2)), rel=0.02)
-    assert work < 0
-
-
 @pytest.mark.parametrize("name", STRANGERS)
 def test_the_emulator_drives_with_each(name: str, drive_straight: Callable[..., float]) -> None:
-    sizes = {"floor_waves": 40.0, "gear_loss": 0.2, "presliding": 1.0, "field_weakening": 0.02}
+    sizes = {"floor_waves": 40.0, "field_weakening": 0.02}
     effect = Unlibraried(name, INJECTORS[name].places[0], sizes.get(name, 5.0))
     plain, changed = drive_straight(), drive_straight(effect)
     assert (abs(plain - changed) > 1e-5) is (name != "hose_spring")

@@ -1,4 +1,4 @@
-"""Delays, play and compliance of the FMU against what is known of them in closed form."""
+"""Delays, filters, bristles, play and compliance of the FMU against what is known of them in closed form."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ident.vehicle.description import load_vehicle
 
 Array = NDArray[np.float64]
 
-WITH_STATES = ("time_delay", "backlash", "elasticity")
+WITH_STATES = ("time_delay", "torque_filter", "backlash", "elasticity", "presliding")
 STEP = 5e-4
 STIFF = 1e6
 """Spring that gives less than what is looked at [Nm/rad]."""
@@ -68,9 +68,10 @@ def test_without_effects_no_state_is_added(soft: Any) -> None:
     vehicle = load_vehicle()
     plain = variable_table(vehicle, vehicle.prior)
     added = len(soft.table.block(Block.STATE)) - len(plain.block(Block.STATE))
-    assert added == 2 * (4 + 2 + 4 + 2)
+    # Bristles of a wheel and of all wheels, of a side and of both, each have a state of their own.
+    assert added == 2 * (4 + 2 + 4 + 2) + 4 + 2 * (4 + 2)
     names = {row.name for row in plain.variables}
-    assert not any("twist" in name or "filtered" in name or "spring" in name for name in names)
+    assert not any(word in name for name in names for word in ("twist", "filtered", "spring", "following", "bent"))
 
 
 @pytest.mark.parametrize("inputs", list(Inputs))
@@ -108,6 +109,32 @@ def test_a_late_drive_moves_its_wheel_by_the_torque_of_before(late: Any, frequen
     expected = np.exp(-1j * omega * delay)
     error = abs(answer(delay) / answer(0.0) - expected)
     assert error <= 1.1 * (omega * delay) ** 5 / 720 + 5e-4
+
+
+@pytest.mark.parametrize(("frequency", "time"), [(1.0, 0.01), (5.0, 0.02)])
+def test_a_filtered_torque_moves_its_wheel_as_one_of_first_order(soft: Any, frequency: float, time: float) -> None:
+    omega = 2 * np.pi * frequency
+
+    def answer(constant: float) -> complex:
+        instance = soft.new(**FREE, **FRICTIONLESS, spring_stiffness=STIFF)
+        instance.set_parameter("torque_filter.drive_rr.time", constant)
+        begin = round(1 / STEP)
+        rates = watch(instance, lambda now: {"torque_rr": np.sin(omega * now)}, 2.0, "beta_rr_dot")[:, 0]
+        return phase(rates[begin:], omega)
+
+    assert answer(time) / answer(0.0) == pytest.approx(1 / (1 + 1j * omega * time), abs=2e-3)
+
+
+def test_bristles_give_back_what_they_took_before_they_slide(core_of: Callable[..., Any]) -> None:
+    """z = 1 - exp(-way/angle) on the way out; where it stops, T z is all that pulls: B_w b'' = -T z."""
+    amplitude, angle, inertia = 0.5, 0.2, 0.12
+    core = core_of("prototype", [make_effect("presliding", "wheel_fl", {"amplitude": amplitude, "angle": angle})])
+    instance = core.new(**FREE, **FRICTIONLESS, B_w=inertia, beta_fl_dot=1.0)
+    table = watch(instance, lambda _: {}, 0.2, "beta_fl", "beta_fl_dot", "bent_beta_fl_wheel_fl")
+    way, rate, bent = table.T
+    assert bent == pytest.approx(1 - np.exp(-way / angle), abs=1e-3)
+    energy = amplitude * (way - angle * (1 - np.exp(-way / angle)))
+    assert inertia * rate**2 / 2 == pytest.approx(inertia / 2 - energy, rel=2e-3)
 
 
 @pytest.mark.parametrize("delay", [0.002, 0.01])
@@ -208,7 +235,7 @@ def test_directional_derivatives_are_exact_with_delays_and_springs(soft: Any, si
     instance = soft.new(creep_stiffness=1e3, spring_stiffness=1e4)
     instance.x[:] = generator.normal(size=instance.x.size) * 0.02
     for row in soft.table.block(Block.PARAMETER):
-        if "." in row.name:
+        if "." in row.name and not row.positive:
             instance.set_parameter(row.name, size)
     blocks = (Block.STATE, Block.INPUT, Block.PARAMETER)
 

@@ -34,6 +34,10 @@ LOOSE = make_effect("backlash", "drive_fl", {"gap": 0.01})
 SOFT_SIDE = make_effect("elasticity", "steering_left", {"compliance": 5e-4})
 LOOSE_SIDE = make_effect("backlash", "steering_right", {"gap": 0.005})
 LATE = make_effect("time_delay", "drive_rl", {"delay": 0.008})
+SLOW = make_effect("torque_filter", "drive_fr", {"time": 0.02})
+LOSSY = make_effect("friction_load", "wheels", {"share": 0.1})
+BRISTLES = make_effect("presliding", "wheels", {"amplitude": 2.0, "angle": 0.05})
+BRISTLES_OF_A_SIDE = make_effect("presliding", "steering_left", {"amplitude": 4.0, "angle": 0.05})
 
 
 def swinging(mode: Mode, vehicle: VehicleDescription) -> tuple[Motion, Array]:
@@ -74,7 +78,7 @@ def in_the_fmu(core: Any, mode: Mode, injected: dict[str, float], **parameters: 
     return dict(zip(names + twists, np.array(found).T, strict=True))
 
 
-ELASTIC, PLAY = 0.15, 0.25
+ELASTIC, PLAY, SMOOTH = 0.15, 0.25, 0.05
 """Part of what the effect does that may be left. A motor bounces between flanks, which no two solvers do alike."""
 CASES = [
     (Mode.STEERED, (SOFT, LATE), {}, ELASTIC),
@@ -82,6 +86,11 @@ CASES = [
     pytest.param(Mode.LATERAL, (SOFT,), HELD_STEERING, ELASTIC, marks=pytest.mark.slow),
     pytest.param(Mode.ALIGNMENT, (SOFT_SIDE,), {}, ELASTIC, marks=pytest.mark.slow),
     (Mode.ALIGNMENT, (LOOSE_SIDE,), {}, PLAY),
+    (Mode.ROTATION, (SLOW,), HELD_STEERING, SMOOTH),
+    (Mode.STEERED, (LOSSY,), {}, SMOOTH),
+    (Mode.LATERAL, (BRISTLES,), HELD_STEERING, SMOOTH),
+    (Mode.ALIGNMENT, (BRISTLES_OF_A_SIDE,), {}, SMOOTH),
+    pytest.param(Mode.ROTATION, (LOSSY, SOFT), HELD_STEERING, ELASTIC, marks=pytest.mark.slow),
 ]
 
 

@@ -64,7 +64,7 @@ def test_more_mass_may_be_a_payload_and_less_may_not(known: Identities) -> None:
 def test_what_the_steps_cannot_show_is_what_changed_values_do(known: Identities) -> None:
     for name, where in (("torque_gain", "drive_fl"), ("com_offset", "chassis"), ("steering_unit_mass", "chassis")):
         assert names(known, name, where) == {name, "parameter_change", "payload"}
-    assert names(known, "gear_loss", "wheels") == {"gear_loss"}
+    assert names(known, "hose_spring", "steering_left") == {"hose_spring"}
 
 
 def test_another_inertia_alone_is_no_payload(known: Identities) -> None:

@@ -17,16 +17,18 @@ Array = NDArray[np.float64]
 
 STEEPEST = 0.02
 """Slope [rad] whose sine is the angle, but for a hundredth of a percent."""
-KEPT = {"stribeck": {"velocity": 0.4}, "torque_ripple": {"order": 3.0}}
+KEPT = {"stribeck": {"velocity": 0.4}, "torque_ripple": {"order": 3.0}, "presliding": {"angle": 0.2}}
 """What two entries of one effect have in common."""
-MEMORIES = ("time_delay", "elasticity", "backlash")
+MEMORIES = ("time_delay", "torque_filter", "elasticity", "backlash")
 
 
 def everything(effects: tuple[Effect, ...], vehicle: VehicleDescription) -> Array:
     """All that effects are in the equations, one number behind the other."""
     generator = np.random.default_rng(3)
     alpha, beta, rates, accelerations = (generator.normal(size=count) for count in (2, 4, 9, 9))
-    state = terms.State(0.3, alpha, beta, rates, accelerations, 100.0)
+    loads = generator.normal(size=4)
+    bent = {("wheels", row): float(generator.uniform(-1, 1)) for row in range(5, 9)}
+    state = terms.State(0.3, alpha, beta, rates, accelerations, 100.0, loads, bent)
     there = terms_of(effects)
     parts = (
         terms.added_forces(there, state, vehicle.prior.values),
@@ -64,12 +66,12 @@ def test_the_one_does_what_the_two_did(name: str, vehicle: VehicleDescription) -
 
 
 @pytest.mark.parametrize("name", MEMORIES)
-def test_dead_times_plays_and_compliances_add(name: str, vehicle: VehicleDescription) -> None:
+def test_dead_times_time_constants_plays_and_compliances_add(name: str, vehicle: VehicleDescription) -> None:
     known, found = pair(name)
     together = combined([known], [found])
     assert len(together) == 1
     one, separate = (ExtendedModel(vehicle.prior, effects) for effects in (together, (known, found)))
-    for of in (ExtendedModel.encoder_delays, ExtendedModel.drive_delays):
+    for of in (ExtendedModel.encoder_delays, ExtendedModel.drive_delays, ExtendedModel.drive_lags):
         np.testing.assert_allclose(of(one), of(separate))
     assert one.springs == separate.springs
 

@@ -14,6 +14,7 @@ from ident.effects import Effect, make_effect
 from ident.effects.extended import ExtendedModel, simulation_of
 from ident.parameters_file import read_model, write_model
 from ident.plant import dynamics, kinematics
+from ident.plant.lags import following
 from ident.plant.modes import Mode
 from ident.plant.simulation import Motion
 from ident.vehicle.description import VehicleDescription
@@ -31,6 +32,9 @@ EFFECTS = (
     make_effect("wheel_radius", "wheel_rr", {"error": -0.002}),
     make_effect("steering_unit_mass", "chassis", {"mass": 3.0}),
     make_effect("parameter_change", "d_vw", {"change": 0.3}),
+    make_effect("friction_load", "wheels", {"share": 0.06}),
+    make_effect("presliding", "wheel_rl", {"amplitude": 1.0, "angle": 0.3}),
+    make_effect("presliding", "steering", {"amplitude": 2.0, "angle": 0.1}),
 )
 
 
@@ -116,6 +120,18 @@ def test_a_late_drive_is_asked_earlier(vehicle: VehicleDescription) -> None:
     none = feed_forward(ExtendedModel(vehicle.prior), course, plain, vehicle.geometry, SAMPLE_TIME).torques
     asked = feed_forward(ExtendedModel(vehicle.prior, late), course, plain, vehicle.geometry, SAMPLE_TIME).torques
     assert np.allclose(asked[:-5, 0], none[5:, 0])
+    assert np.array_equal(asked[:, 1:], none[:, 1:])
+
+
+def test_a_drive_that_follows_is_asked_for_what_comes_out_of_it_as_wanted(vehicle: VehicleDescription) -> None:
+    slow = (make_effect("torque_filter", "drive_fl", {"time": 0.02}),)
+    course, time = course_of(Mode.ROTATION, vehicle)
+    plain = np.tile(np.sin(3 * time)[:, None], 4)
+    none = feed_forward(ExtendedModel(vehicle.prior), course, plain, vehicle.geometry, SAMPLE_TIME).torques
+    asked = feed_forward(ExtendedModel(vehicle.prior, slow), course, plain, vehicle.geometry, SAMPLE_TIME).torques
+    middle = slice(75, -25)
+    assert following(asked[:, 0], 0.02, SAMPLE_TIME)[middle] == pytest.approx(none[middle, 0], abs=2e-3)
+    assert np.abs(asked[middle, 0] - none[middle, 0]).max() > 0.02
     assert np.array_equal(asked[:, 1:], none[:, 1:])
 
 

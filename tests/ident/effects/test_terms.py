@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 
 from ident.effects import EFFECTS, Effect, EffectTerm, effect_term, make_effect, symbolic_term, terms_of
 from ident.plant import symbolic, terms
+from ident.plant.places import rows_of
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
@@ -27,7 +30,10 @@ def term_of(effect: Effect) -> EffectTerm:
 def state() -> terms.State:
     generator = np.random.default_rng(7)
     heading, alpha, beta = 0.7, generator.normal(size=2), generator.normal(size=4)
-    return terms.State(heading, alpha, beta, generator.normal(size=9), generator.normal(size=9), 100.0)
+    rates, accelerations, loads = (generator.normal(size=count) for count in (9, 9, 4))
+    joints = [(where, row) for where in EFFECTS["presliding"].places for row in rows_of(where)]
+    bent = {joint: float(generator.uniform(-1, 1)) for joint in joints}
+    return terms.State(heading, alpha, beta, rates, accelerations, 100.0, loads, bent)
 
 
 def number(expression: object, geometry: Geometry) -> Array:
@@ -151,6 +157,25 @@ def test_friction_over_the_position_resists_what_turns_more_where_it_stands_furt
     found = forces("friction_position", "steering", state, vehicle, slope=2.0)
     assert found[3:5] == pytest.approx(2.0 * state.alpha * np.sign(rate))
     assert np.count_nonzero(found) == 2
+
+
+@pytest.mark.parametrize("rate", [0.4, -0.4])
+def test_a_share_of_the_load_of_a_gear_resists_whichever_way_it_acts(
+    rate: float, state: terms.State, vehicle: VehicleDescription
+) -> None:
+    state.rates[5:] = rate
+    loaded = replace(state, loads=np.array([8.0, -6.0, 0.0, 2.0]))
+    found = forces("friction_load", "wheels", loaded, vehicle, share=0.05)
+    assert found[5:] == pytest.approx(0.05 * np.array([8.0, 6.0, 0.0, 2.0]) * np.sign(rate), abs=6e-4)
+    assert not found[:5].any()
+
+
+def test_bristles_resist_by_how_far_they_are_bent_wherever_they_move(
+    state: terms.State, vehicle: VehicleDescription
+) -> None:
+    bent = replace(state, bent={("steering", 3): 0.7, ("steering", 4): -1.0})
+    found = forces("presliding", "steering", bent, vehicle, amplitude=2.0)
+    assert found == pytest.approx([0, 0, 0, 1.4, -2.0, 0, 0, 0, 0])
 
 
 def test_drag_takes_power_whatever_the_direction(state: terms.State, vehicle: VehicleDescription) -> None:

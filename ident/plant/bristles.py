@@ -1,0 +1,71 @@
+"""Friction that bends bristles before it slides: Dahl's model (1968), whose state is a part of the friction.
+
+    friction  T z,    ż = (q̇ - |q̇| z)/θ
+
+z goes from -1 to 1: after a reversal at z₀ and a way s it is sign(q̇) (1 - (1 + |z₀|) exp(-s/θ)). The rate is in it as
+an increment of the way alone, so that friction depends on where a joint has been, not on how fast.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.plant.symbolic import Expression
+from ident.plant.symbols import SIDES, Symbols
+from ident.plant.terms import Joint, Term
+from ident.vehicle.geometry import WHEELS
+
+Array = NDArray[np.float64]
+
+FIRST_JOINT = 3
+"""Row of q of the first joint."""
+
+
+def bristles_of(terms: Sequence[Term]) -> dict[Joint, Expression]:
+    """Angles θ [rad] of all bristles, by joint."""
+    return {joint: angle for term in terms for joint, angle in term.bristles().items()}
+
+
+def state_name(joint: Joint) -> str:
+    """Of the state z of a joint of an effect."""
+    where, row = joint
+    names = [*(f"alpha_{side}" for side in SIDES), *(f"beta_{wheel}" for wheel in WHEELS)]
+    return f"bent_{names[row - FIRST_JOINT]}_{where}"
+
+
+def bent_in(x: Symbols, joints: Sequence[Joint]) -> Mapping[Joint, Expression]:
+    """z of all joints from the states of a model."""
+    return {joint: x[state_name(joint)] for joint in joints}
+
+
+def bending_rates(x: Symbols, terms: Sequence[Term], rates: Expression) -> Expression:
+    """ż (n,) from q̇ (9,)."""
+    return ca.vertcat(
+        *(
+            (rates[joint[1]] - ca.fabs(rates[joint[1]]) * x[state_name(joint)]) / angle
+            for joint, angle in bristles_of(terms).items()
+        )
+    )
+
+
+def bent_on(bent: Expression, turned: Expression, angle: Expression) -> Expression:
+    """z behind a way [rad] in one direction, exactly."""
+    return bent + (ca.sign(turned) - bent) * (1 - ca.exp(-ca.fabs(turned) / angle))
+
+
+def bent_along(angles: Array, angle: float) -> Array:
+    """z (N,) of a joint that has been at some angles (N,) [rad], from bristles that are straight.
+
+    Args:
+        angles: of the joint.
+        angle: θ [rad].
+    """
+    turned = np.diff(angles)
+    kept, towards = np.exp(-np.abs(turned) / angle).tolist(), np.sign(turned).tolist()
+    steps = zip(kept, towards, strict=True)
+    return np.array(list(itertools.accumulate(steps, lambda z, step: step[1] + (z - step[1]) * step[0], initial=0.0)))
