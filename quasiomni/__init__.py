@@ -92,6 +92,10 @@ COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
     "serving": {
         "emulate": "Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C.",
     },
+    "replaying": {
+        "replay": "Play a record into the bench: which emulated node answers otherwise, where and when. Exit code 1 if "
+        "one does.",
+    },
     "can": {"can": "The CAN bus: unmodified SocketCAN programs on it, faults, load."},
     "descriptions": {
         "eds": "Write the EDS of every kind of device and the DCF of every node, as configured by the master.",

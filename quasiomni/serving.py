@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -23,6 +22,7 @@ from hil.network import load_network
 from ident.errors import UserError
 from quasiomni.application import app, console
 from quasiomni.filming import VIDEO_RATE, VideoOption, VideoRateOption, drawing, plan_video
+from quasiomni.scenarios import JsonOption, JunitOption, ScenarioOption, Stand, open_scenario
 from quasiomni.options import (
     DEFAULT_BUS,
     EffectOption,
@@ -42,15 +42,9 @@ from quasiomni.options import (
 )
 
 
-class Stand(StrEnum):
-    """Where an emulated vehicle stands when it comes up."""
-
-    FLOOR = "floor"
-    JACK = "jack"
-
-
 @app.command()
 def emulate(
+    context: typer.Context,
     bus: Annotated[
         str, typer.Option(help="INTERFACE:CHANNEL to serve, e.g. `unix:/tmp/can0` or `socketcan:can0`.")
     ] = DEFAULT_BUS,
@@ -75,6 +69,9 @@ def emulate(
         Path | None, typer.Option(help="Folder where the nodes keep parameters stored by 1010h, for the next start.")
     ] = None,
     duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
+    scenario: ScenarioOption = None,
+    junit: JunitOption = None,
+    json: JsonOption = None,
     effect: EffectOption = None,
     engine: EngineOption = None,
     plant: PlantOption = None,
@@ -86,13 +83,21 @@ def emulate(
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
     film = plan_video(video, video_rate, bus)
+    script = open_scenario(context, scenario, (junit, json))
     if plant is not None and simulator is not None:
         raise UserError("--from makes an emulated vehicle, --plant takes its place.", "Leave one of them out.")
     fmu, model = parse_plant(plant, force=force), read_simulator(simulator, force=force)
     chosen = choose_engine(engine) if fmu is None else None
     emulation = load_emulation()
-    network_file = network or network_file_of(prototype)
     faults = emulation.read_faults(fault or [])
+    if script is not None:
+        prototype, network, seed = script.bench(prototype, network, seed)
+        if script.drives_itself:
+            effects = parse_effects(effect)
+            script.drive(prototype, network, seed, chosen, effects, model, faults, delays=bit_times, gui=gui)
+            return
+        stand = script.stand(stand)
+    network_file = network or network_file_of(prototype)
     end = None if duration is None else time.monotonic() + duration
     tell_native(fmu)
     with (
@@ -109,19 +114,34 @@ def emulate(
             console.print(Text.assemble(f"{len(assumed)} numbers of it are in no file: ", (command, "bold"), "."))
         served_as, pace = plant or simulator or prototype, "in lockstep" if lockstep else "in real time"
         console.print(f"{served_as} is up on {bus}, {pace}. Ctrl-C ends it.")
+        watched = None if script is None else script.watch(vehicle, load_network(network_file))
         server = emulation.server(
-            vehicle, opened, WallClock(), network_file, lockstep, seed=seed, delays=bit_times, storage=storage
+            vehicle,
+            opened,
+            WallClock(),
+            network_file,
+            lockstep,
+            seed=seed,
+            delays=bit_times,
+            storage=storage,
+            hear=None if watched is None else watched.hear,
         )
+        if watched is not None:
+            watched.served_by(server)
         for one in faults:
             server.faults.add(one)
         with (
             _commands(control, bus, server.faults, partial(_clients, opened)) as poll,
             contextlib.suppress(KeyboardInterrupt),
         ):
-            server.serve(lambda: poll() or (end is not None and time.monotonic() > end))
+            server.serve(
+                lambda: poll() or (end is not None and time.monotonic() > end) or (watched is not None and watched.over())
+            )
         served = server.report
         _say_who_has_lost_frames(opened)
     console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
+    if script is not None and watched is not None:
+        script.end(watched.report())
 
 
 def _say_who_has_lost_frames(bus: can.BusABC) -> None:

@@ -32,6 +32,7 @@ class Track:
         node: whose it is.
         item: the object.
         unit: what one count is worth, and in what [rad, Nm]; a factor 1 and no unit for words of bits.
+        cycle: (N,) number of the SYNC that each sample belongs to.
         time: (N,) on the axis of the replay [s].
         recorded, emulated: (N,) counts; wrapped counters continued.
         tolerance: (N,) counts by which both may differ for no reason.
@@ -40,6 +41,7 @@ class Track:
     node: Node
     item: MappedObject
     unit: tuple[float, str]
+    cycle: Counts
     time: Array
     recorded: Counts
     emulated: Counts
@@ -134,7 +136,7 @@ class Compared:
     def ranked(self) -> list[Track]:
         """Tracks that differ, in the order in which they began to, the larger first among those of one cycle."""
         differing = [track for track in self.tracks if len(track.differing)]
-        return sorted(differing, key=lambda track: (round(float(track.time[track.differing[0]]), 4), -_times(track)))
+        return sorted(differing, key=lambda track: (int(track.cycle[track.differing[0]]), -_times(track)))
 
 
 def _times(track: Track) -> float:
@@ -182,7 +184,7 @@ def _tracks(node: Node, pdo: Pdo, sides: Sequence[tuple[FrameTable, Traffic]]) -
         unit = _unit(node, item)
         # A state that is another one is a difference, whatever others do.
         tolerance = _tolerance(values[1:]) if unit[1] else np.zeros(len(shared))
-        yield Track(node, item, unit, time, values[0], values[1], tolerance)
+        yield Track(node, item, unit, shared, time, values[0], values[1], tolerance)
 
 
 def _first_of_cycles(table: FrameTable, traffic: Traffic, can_id: int, size: int) -> tuple[Counts, NDArray[np.intp]]:
