@@ -145,7 +145,7 @@ class EmulatedVehicle:
         self._settle()
 
     def stand_as(self, steering: tuple[float, float], wheels: Sequence[float], *, lifted: bool) -> None:
-        """Put the vehicle at rest at the origin so that its encoders read these angles; a settling tyre may add to them.
+        """Put the vehicle at rest at the origin, its encoders at these angles; tyres that settle may add to them.
 
         Args:
             steering: left, right [rad].

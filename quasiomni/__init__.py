@@ -72,6 +72,10 @@ COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
         "report.html.",
         "report": "Write the HTML report of a run again, from its frames.",
     },
+    "converting": {
+        "convert": "Write the frames and channels of a run, a log or a record in another format: MCAP for Foxglove, "
+        "BLF, CSV, ...",
+    },
     "describing": {
         "init": "Describe your own vehicle: writes a commented vehicle file and, beside it, network and EDS files.",
     },

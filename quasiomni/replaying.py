@@ -18,7 +18,7 @@ from quasiomni.options import (
     NetworkOption,
     parse_effects,
 )
-from quasiomni.serving import Stand
+from quasiomni.scenarios import Stand
 from quasiomni.showing import bar, say
 
 

@@ -39,16 +39,16 @@ class Stand(StrEnum):
 ScenarioOption = Annotated[
     Path | None,
     typer.Option(
-        help="TOML file of timed set-points, faults and expectations. With set-points it drives by itself, in simulated "
-        "time, and no bus is served. Exit code 1 where an expectation fails."
+        help="TOML file of timed set-points, faults and expectations. With set-points it drives by itself, in "
+        "simulated time, and no bus is served. Exit code 1 where an expectation fails."
     ),
 ]
 JunitOption = Annotated[Path | None, typer.Option(help="With --scenario: write JUnit XML here.")]
 JsonOption = Annotated[Path | None, typer.Option(help="With --scenario: write times and values here.")]
 
-_OF_A_BUS: Final = ("bus", "lockstep", "control", "storage", "duration")
+_OF_A_BUS: Final[Sequence[str]] = ("bus", "lockstep", "control", "storage", "duration")
 """Options that say how a bus is served, which a scenario with set-points needs none for."""
-_NOT_WATCHED: Final = ("plant", "video")
+_NOT_WATCHED: Final[Sequence[str]] = ("plant", "video")
 """Options whose vehicle shows no ground truth."""
 
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import can
 import typer
@@ -22,7 +22,6 @@ from hil.network import load_network
 from ident.errors import UserError
 from quasiomni.application import app, console
 from quasiomni.filming import VIDEO_RATE, VideoOption, VideoRateOption, drawing, plan_video
-from quasiomni.scenarios import JsonOption, JunitOption, ScenarioOption, Stand, open_scenario
 from quasiomni.options import (
     DEFAULT_BUS,
     EffectOption,
@@ -40,6 +39,10 @@ from quasiomni.options import (
     read_simulator,
     tell_native,
 )
+from quasiomni.scenarios import JsonOption, JunitOption, ScenarioOption, Stand, WatchedServer, open_scenario
+
+if TYPE_CHECKING:
+    from hil.bench.serving import VehicleServer
 
 
 @app.command()
@@ -92,11 +95,11 @@ def emulate(
     faults = emulation.read_faults(fault or [])
     if script is not None:
         prototype, network, seed = script.bench(prototype, network, seed)
-        if script.drives_itself:
-            effects = parse_effects(effect)
-            script.drive(prototype, network, seed, chosen, effects, model, faults, delays=bit_times, gui=gui)
-            return
         stand = script.stand(stand)
+    if script is not None and script.drives_itself:
+        effects = parse_effects(effect)
+        script.drive(prototype, network, seed, chosen, effects, model, faults, delays=bit_times, gui=gui)
+        return
     network_file = network or network_file_of(prototype)
     end = None if duration is None else time.monotonic() + duration
     tell_native(fmu)
@@ -126,22 +129,28 @@ def emulate(
             storage=storage,
             hear=None if watched is None else watched.hear,
         )
-        if watched is not None:
-            watched.served_by(server)
         for one in faults:
             server.faults.add(one)
-        with (
-            _commands(control, bus, server.faults, partial(_clients, opened)) as poll,
-            contextlib.suppress(KeyboardInterrupt),
-        ):
-            server.serve(
-                lambda: poll() or (end is not None and time.monotonic() > end) or (watched is not None and watched.over())
-            )
-        served = server.report
+        with _commands(control, bus, server.faults, partial(_clients, opened)) as poll:
+            _serve(server, poll, end, watched)
         _say_who_has_lost_frames(opened)
+    served = server.report
     console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
     if script is not None and watched is not None:
         script.end(watched.report())
+
+
+def _serve(server: VehicleServer, poll: Callable[[], None], end: float | None, watched: WatchedServer | None) -> None:
+    """Serve until Ctrl-C, an instant of the monotonic clock [s], or the end of a scenario."""
+    if watched is not None:
+        watched.served_by(server)
+
+    def stop() -> bool:
+        poll()
+        return (end is not None and time.monotonic() > end) or (watched is not None and watched.over())
+
+    with contextlib.suppress(KeyboardInterrupt):
+        server.serve(stop)
 
 
 def _say_who_has_lost_frames(bus: can.BusABC) -> None:

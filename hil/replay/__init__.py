@@ -1,3 +1,1 @@
-"""A recorded log through the bench: its nodes answered by the emulator, and where those answers differ from the recorded
-ones.
-"""
+"""A recorded log through the bench: its nodes are answered by the emulator; where do both answers differ?"""

@@ -177,9 +177,7 @@ def _tracks(node: Node, pdo: Pdo, sides: Sequence[tuple[FrameTable, Traffic]]) -
     time = sides[0][0].time[taken[0]]
     offset = 0
     for item in pdo.objects:
-        values = [
-            _values(table, at, item, offset, node) for (table, _), at in zip(sides, taken, strict=True)
-        ]
+        values = [_values(table, at, item, offset, node) for (table, _), at in zip(sides, taken, strict=True)]
         offset += item.bits // 8
         unit = _unit(node, item)
         # A state that is another one is a difference, whatever others do.
@@ -218,31 +216,30 @@ def _tolerance(emulations: Sequence[Counts]) -> Array:
     """Largest difference among emulations so far (N,): what began as noise may grow, and never is less again."""
     spread = np.max(emulations, axis=0) - np.min(emulations, axis=0)
     if len(emulations) == 1:
-        return spread.astype(np.float64)
-    return SPREADS * np.maximum.accumulate(spread).astype(np.float64) + 1.0
+        return np.asarray(spread, dtype=np.float64)
+    return np.asarray(SPREADS * np.maximum.accumulate(spread) + 1.0)
 
 
 _POSITIONS: Final = (Index.POSITION_ACTUAL, Index.ENCODER_POSITION)
 _TORQUES: Final = (Index.TORQUE_ACTUAL, Index.TORQUE_DEMAND, Index.TARGET_TORQUE)
 
 
-def _equal(
-    recorded: FrameTable, emulated: FrameTable, played: Played, parties: Parties
-) -> tuple[int, float]:
+def _equal(recorded: FrameTable, emulated: FrameTable, played: Played, parties: Parties) -> tuple[int, float]:
     """Recorded answers that have an emulated twin, and how far apart in time such twins are at most [s]."""
     equal, latest = 0, 0.0
     for can_id in np.unique(recorded.can_id).tolist():
         one, other = (np.flatnonzero(table.can_id == can_id) for table in (recorded, emulated))
         if parties.kind(can_id) is Answer.SAMPLE:
-            cycles = [np.asarray(side.cycle)[rows] for side, rows in ((played.recorded, one), (played.emulated, other))]
-            _, a, b = np.intersect1d(*cycles, return_indices=True)
+            _, a, b = np.intersect1d(
+                np.asarray(played.recorded.cycle)[one], np.asarray(played.emulated.cycle)[other], return_indices=True
+            )
             one, other = one[a], other[b]
         else:
             pairs = min(len(one), len(other))
             one, other = one[:pairs], other[:pairs]
-        same = (recorded.length[one] == emulated.length[other]) & (
-            recorded.data[one] == emulated.data[other]
-        ).all(axis=1)
+        same = (recorded.length[one] == emulated.length[other]) & (recorded.data[one] == emulated.data[other]).all(
+            axis=1
+        )
         equal += int(same.sum())
         apart = np.abs(recorded.time[one] - emulated.time[other])[same]
         latest = max(latest, float(apart.max())) if len(apart) else latest
@@ -287,7 +284,7 @@ def _unlike(node: Node, answer: Answer, one: Spoken, other: Spoken) -> Iterator[
 
 
 def _changes(one: Sequence[bytes], other: Sequence[bytes]) -> Iterator[tuple[str, int, int, int, int]]:
-    """How one sequence becomes the other; very long ones are taken one by one, for aligning takes the square of them."""
+    """How one sequence becomes the other; very long ones are taken one by one, for aligning takes their square."""
     if max(len(one), len(other)) <= _LONGEST:
         yield from SequenceMatcher(None, one, other, autojunk=False).get_opcodes()
         return

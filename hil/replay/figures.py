@@ -25,7 +25,7 @@ _LONGEST_LABELS: Final = 40
 
 
 def timeline_figure(compared: Compared, marks: Sequence[Mark]) -> Figure:
-    """One line an object that differs: where it does, and how far in its own largest difference; messages as diamonds."""
+    """A line an object that differs: when it does, and how far in its own largest difference; messages as diamonds."""
     ranked = compared.ranked()
     names = [f"{track.node.role} {track.item.name}" for track in ranked]
     data = [_stretches(track, name) for track, name in zip(ranked, names, strict=True)]
@@ -61,7 +61,7 @@ def track_figure(track: Track) -> Figure:
     keep = slice(None, None, max(1, math.ceil(len(track.time) / MOST_SAMPLES)))
     time, scale = packed(track.time[keep]), abs(track.unit[0])
     unit = track.unit[1] or "raw"
-    recorded, emulated = track.recorded * track.unit[0], track.emulated * track.unit[0]
+    recorded, emulated = _scaled(track.recorded, track), _scaled(track.emulated, track)
     data = [
         _line(time, recorded[keep], "recorded", MEASURED, 2.4),
         _line(time, emulated[keep], "emulated", MODELLED, 1.2),
@@ -84,6 +84,10 @@ def track_figure(track: Track) -> Figure:
         "shapes": [_line_at(float(track.time[track.differing[0]]))],
     }
     return {"data": data, "layout": layout}
+
+
+def _scaled(counts: NDArray[np.int64], track: Track) -> NDArray[np.float64]:
+    return np.multiply(counts, track.unit[0], dtype=np.float64)
 
 
 def _stretches(track: Track, name: str) -> Figure:

@@ -1,4 +1,4 @@
-"""What hands did beside the vehicle between the sessions of a campaign: no frame tells of it, the names of the logs do."""
+"""What hands did beside the vehicle between the sessions of a campaign: no frame tells of it, names of logs do."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def resets_node(can_id: int, data: bytes) -> bool:
 
 
 class Hands:
-    """Lifts, lowers, loads and unloads where a campaign let it be done: before its sessions begin by resetting all nodes.
+    """Lifts, lowers, loads and unloads where a campaign let it be done: before a session begins by resetting the nodes.
 
     Args:
         recording: of a run folder.

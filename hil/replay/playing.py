@@ -179,9 +179,7 @@ class Player:
         if message is None:
             return False
         if not (message.is_error_frame or message.is_extended_id):
-            self.played.emulated.add(
-                message.timestamp, message.arbitration_id, bytes(message.data), self.played.syncs
-            )
+            self.played.emulated.add(message.timestamp, message.arbitration_id, bytes(message.data), self.played.syncs)
         return True
 
     def _drain(self) -> None:

@@ -32,7 +32,9 @@ class Part:
             return self
         order = np.argsort(self.table.time, kind="stable")
         table = self.table
-        return Part(self.name, FrameTable(table.time[order], table.can_id[order], table.length[order], table.data[order]))
+        return Part(
+            self.name, FrameTable(table.time[order], table.can_id[order], table.length[order], table.data[order])
+        )
 
     @property
     def start(self) -> float:

@@ -118,7 +118,7 @@ def _expected(table: Mapping[str, Any], where: str) -> Expected:
     found = read_keys(table, known, where)
     spans = [name for name in _SPANS if found[name] is not None]
     if len(spans) > 1:
-        raise DataFileError(f"{where} has {' and '.join(spans)}.", "Keep one of them; write another [[expect]] for more.")
+        raise DataFileError(f"{where} has {' and '.join(spans)}.", "Keep one, and write another [[expect]].")
     try:
         condition = build(**{name: found[name] for name in keys})
     except UserError as error:
@@ -126,5 +126,3 @@ def _expected(table: Mapping[str, Any], where: str) -> Expected:
     if not spans:
         return Expected(found["at"], condition, Span.NOW)
     return Expected(found["at"], condition, Span(spans[0]), found[spans[0]])
-
-

@@ -141,7 +141,7 @@ class _OwnMaster:
         self._master.enable()
 
     def step(self, time: float) -> None:
-        """One cycle at an instant of the scenario [s]; once the network has failed it stops the drives, and is silent."""
+        """One cycle at an instant of the scenario [s]; once the network has failed, the drives are stopped for good."""
         if self.notes:
             self._world.bus.recv(self._world.network.cycle_period)
             return

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left
 from typing import Final
 
 import can
@@ -52,8 +52,8 @@ class ServedWorld:
             self.frames.append(can.Message(self.now, can_id, is_extended_id=False, data=data))
 
     def frames_until(self, instant: float) -> int:
-        """Number of frames that had passed by `instant` [s]."""
-        return bisect_right(self.frames, instant, key=lambda frame: frame.timestamp)
+        """Number of frames that came before `instant` [s]; stamps are those of the instants in which they were sent."""
+        return bisect_left(self.frames, instant, key=lambda frame: frame.timestamp)
 
     def drive_state(self, role: Role) -> DriveState | None:
         """State of a drive."""
