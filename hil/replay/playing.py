@@ -98,6 +98,7 @@ class Player:
         self._period = network.cycle_period
         self._parties = Parties(network)
         self._told = told
+        self._origin = 0.0
         self.played = Played()
 
     def in_step(self, recording: Recording, before_frame: Before) -> Played:
@@ -139,8 +140,9 @@ class Player:
         _refuse_pauses(recording.source, parts)
         begin, first = round(self._bench.clock.now() + self._period, 9), parts[0].start
         grid = _Grid(begin, first, self._period)
+        self._origin = begin
         for part in parts:
-            self.played.marks.append(Mark(part.name, begin + part.start - first, part.start))
+            self.played.marks.append(Mark(part.name, part.start - first, part.start))
             for number, (stamp, can_id, data) in enumerate(part.frames()):
                 instant = grid.instant(stamp, can_id == self._sync)
                 if self._parties.sender(can_id) is None:
@@ -148,7 +150,7 @@ class Player:
                     before_frame(part.name, can_id, data)
                     self._send(can_id, data)
                 else:
-                    self._keep(instant, can_id, data)
+                    self._keep(instant - begin, can_id, data)
                 if not number % _REPORT:
                     self._told(part.name, number, len(part.table))
         self._bench.clock.wait_until(round(grid.last + self._period / 2, 9))
@@ -179,7 +181,7 @@ class Player:
         if message is None:
             return False
         if not (message.is_error_frame or message.is_extended_id):
-            self.played.emulated.add(message.timestamp, message.arbitration_id, bytes(message.data), self.played.syncs)
+            self.played.emulated.add(message.timestamp - self._origin, message.arbitration_id, bytes(message.data), self.played.syncs)
         return True
 
     def _drain(self) -> None:
