@@ -24,6 +24,10 @@ SPREADS: Final = 2.0
 """Times what emulations differ among themselves, from which a difference to the record is one."""
 
 
+AHEAD: Final = 125
+"""Samples beyond one that tell how much emulations differ at it: 0.25 s at 500 Hz."""
+
+
 @dataclass(frozen=True)
 class Track:
     """One object of one node, as often as both sides have sampled it.
@@ -213,11 +217,15 @@ def _unit(node: Node, item: MappedObject) -> tuple[float, str]:
 
 
 def _tolerance(emulations: Sequence[Counts]) -> Array:
-    """Largest difference among emulations so far (N,): what began as noise may grow, and never is less again."""
+    """Largest difference among emulations so far (N,): what began as noise may grow, and never is less again.
+
+    So far, and a little beyond: the first samples alone do not show how much noise there is.
+    """
     spread = np.max(emulations, axis=0) - np.min(emulations, axis=0)
     if len(emulations) == 1:
         return np.asarray(spread, dtype=np.float64)
-    return np.asarray(SPREADS * np.maximum.accumulate(spread) + 1.0)
+    largest = np.maximum.accumulate(spread)
+    return np.asarray(SPREADS * largest[np.minimum(np.arange(len(largest)) + AHEAD, len(largest) - 1)] + 1.0)
 
 
 _POSITIONS: Final = (Index.POSITION_ACTUAL, Index.ENCODER_POSITION)
@@ -251,7 +259,9 @@ def _messages(played: Played, parties: Parties) -> Iterator[Event]:
     one, other = _spoken(played.recorded, parties), _spoken(played.emulated, parties)
     for can_id in sorted({*one, *other}):
         node, answer = parties.sender(can_id), parties.kind(can_id)
-        if node is not None:
+        # Who recorded no heartbeats at all has left them out; emergencies there may have been none.
+        kept = can_id in one or answer is Answer.EMERGENCY
+        if node is not None and kept:
             yield from _unlike(node, answer, one.get(can_id, []), other.get(can_id, []))
 
 
