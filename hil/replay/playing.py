@@ -181,7 +181,8 @@ class Player:
         if message is None:
             return False
         if not (message.is_error_frame or message.is_extended_id):
-            self.played.emulated.add(message.timestamp - self._origin, message.arbitration_id, bytes(message.data), self.played.syncs)
+            instant = message.timestamp - self._origin
+            self.played.emulated.add(instant, message.arbitration_id, bytes(message.data), self.played.syncs)
         return True
 
     def _drain(self) -> None:
