@@ -10,7 +10,8 @@ from typing import Any, Final
 from markupsafe import Markup
 from plotly import offline
 
-from hil.replay.comparing import Event, Track
+from hil.replay.comparing import Track
+from hil.replay.events import Event
 from hil.replay.figures import timeline_figure, track_figure
 from hil.replay.playing import part_at
 from hil.replay.replaying import ReplayAnswer
