@@ -68,7 +68,9 @@ def convert(source: Path, target: Path, vehicle: str | None = None, network: Pat
     if suffix == LogFormat.MCAP:
         return _to_mcap(source, target, vehicle, network)
     frames = _holds_frames(source)
-    if suffix in _RECORDS or (suffix == LogFormat.MF4 and not frames):
+    # An MF4 file is a log where its name is that of one, here as everywhere else.
+    channels = suffix == LogFormat.MF4 and step_of(target) is None and (not frames or _tells_steps(source))
+    if suffix in _RECORDS or channels:
         record = _record_of(source, vehicle, network)
         write_record(record, target)
         return Converted(samples=_count(record))
