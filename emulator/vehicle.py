@@ -144,6 +144,21 @@ class EmulatedVehicle:
         self.engine.place(on_stand=False, angles=self.engine.angles())
         self._settle()
 
+    def stand_as(self, steering: tuple[float, float], wheels: Sequence[float], *, lifted: bool) -> None:
+        """Put the vehicle at rest at the origin, its encoders at these angles; tyres that settle may add to them.
+
+        Args:
+            steering: left, right [rad].
+            wheels: (4,) fl, rl, fr, rr [rad].
+            lifted: on the jack-stand.
+        """
+        angles = self._mechanics.angles_read_as(steering, wheels, [0.0] * 8)
+        self.engine.place(on_stand=lifted, angles=angles)
+        if lifted:
+            self._mechanics.settle()
+        else:
+            self._settle()
+
     def load(self, mass: float) -> None:
         """Put a load [kg] on the chassis, over its centre, instead of any load before; at rest at the origin.
 

@@ -72,6 +72,10 @@ COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
         "report.html.",
         "report": "Write the HTML report of a run again, from its frames.",
     },
+    "converting": {
+        "convert": "Write the frames and channels of a run, a log or a record in another format: MCAP for Foxglove, "
+        "BLF, CSV, ...",
+    },
     "describing": {
         "init": "Describe your own vehicle: writes a commented vehicle file and, beside it, network and EDS files.",
     },
@@ -94,6 +98,10 @@ COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
     },
     "serving": {
         "emulate": "Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C.",
+    },
+    "replaying": {
+        "replay": "Play a record into the bench: which emulated node answers otherwise, where and when. Exit code 1 if "
+        "one does.",
     },
     "can": {"can": "The CAN bus: unmodified SocketCAN programs on it, faults, load."},
     "descriptions": {

@@ -128,6 +128,8 @@ def campaign(
     read_simulator(simulator, force=force)
     if log_format is LogFormat.MF4:
         require(Extra.RECORDS, "--format .mf4", ("asammdf",))
+    if log_format is LogFormat.MCAP:
+        require(Extra.MCAP, "--format .mcap")
     prototype, where = (vehicle, LOCKSTEP) if bus is None and plant is None else ("", bus or plant or "")
     order = Order(
         out,

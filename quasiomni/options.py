@@ -17,8 +17,14 @@ if TYPE_CHECKING:
     from hil.bench.simulators import Simulator
     from ident.effects import Effect  # loads CasADi, which few commands need
 
-READERS: Final[Mapping[str, str]] = MappingProxyType({".parquet": "pyarrow", ".mf4": "asammdf"})
-"""What reads and writes files with these endings."""
+READERS: Final[Mapping[str, tuple[Extra, str]]] = MappingProxyType(
+    {
+        ".parquet": (Extra.RECORDS, "pyarrow"),
+        ".mf4": (Extra.RECORDS, "asammdf"),
+        ".mcap": (Extra.MCAP, "mcap"),
+    }
+)
+"""What reads and writes files with these endings: a module, and the extra that brings it."""
 
 DEFAULT_BUS = "unix:/tmp/can0"
 """What the emulator serves, and where the commands around it look for it."""
@@ -138,7 +144,8 @@ def require_readers(paths: Iterable[Path]) -> None:
         UserError: an extra is missing.
     """
     for suffix in sorted({path.suffix.lower() for path in paths} & READERS.keys()):
-        require(Extra.RECORDS, f"A record that ends in {suffix}", (READERS[suffix],))
+        extra, module = READERS[suffix]
+        require(extra, f"A record that ends in {suffix}", (module,))
 
 
 def tell_native(path: Path | None) -> None:

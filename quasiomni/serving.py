@@ -5,10 +5,9 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import can
 import typer
@@ -40,17 +39,15 @@ from quasiomni.options import (
     read_simulator,
     tell_native,
 )
+from quasiomni.scenarios import JsonOption, JunitOption, ScenarioOption, Stand, WatchedServer, open_scenario
 
-
-class Stand(StrEnum):
-    """Where an emulated vehicle stands when it comes up."""
-
-    FLOOR = "floor"
-    JACK = "jack"
+if TYPE_CHECKING:
+    from hil.bench.serving import VehicleServer
 
 
 @app.command()
 def emulate(
+    context: typer.Context,
     bus: Annotated[
         str, typer.Option(help="INTERFACE:CHANNEL to serve, e.g. `unix:/tmp/can0` or `socketcan:can0`.")
     ] = DEFAULT_BUS,
@@ -75,6 +72,9 @@ def emulate(
         Path | None, typer.Option(help="Folder where the nodes keep parameters stored by 1010h, for the next start.")
     ] = None,
     duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
+    scenario: ScenarioOption = None,
+    junit: JunitOption = None,
+    json: JsonOption = None,
     effect: EffectOption = None,
     engine: EngineOption = None,
     plant: PlantOption = None,
@@ -86,13 +86,21 @@ def emulate(
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
     film = plan_video(video, video_rate, bus)
+    script = open_scenario(context, scenario, (junit, json))
     if plant is not None and simulator is not None:
         raise UserError("--from makes an emulated vehicle, --plant takes its place.", "Leave one of them out.")
     fmu, model = parse_plant(plant, force=force), read_simulator(simulator, force=force)
     chosen = choose_engine(engine) if fmu is None else None
     emulation = load_emulation()
-    network_file = network or network_file_of(prototype)
     faults = emulation.read_faults(fault or [])
+    if script is not None:
+        prototype, network, seed = script.bench(prototype, network, seed)
+        stand = script.stand(stand)
+    if script is not None and script.drives_itself:
+        effects = parse_effects(effect)
+        script.drive(prototype, network, seed, chosen, effects, model, faults, delays=bit_times, gui=gui)
+        return
+    network_file = network or network_file_of(prototype)
     end = None if duration is None else time.monotonic() + duration
     tell_native(fmu)
     with (
@@ -109,19 +117,40 @@ def emulate(
             console.print(Text.assemble(f"{len(assumed)} numbers of it are in no file: ", (command, "bold"), "."))
         served_as, pace = plant or simulator or prototype, "in lockstep" if lockstep else "in real time"
         console.print(f"{served_as} is up on {bus}, {pace}. Ctrl-C ends it.")
+        watched = None if script is None else script.watch(vehicle, load_network(network_file))
         server = emulation.server(
-            vehicle, opened, WallClock(), network_file, lockstep, seed=seed, delays=bit_times, storage=storage
+            vehicle,
+            opened,
+            WallClock(),
+            network_file,
+            lockstep,
+            seed=seed,
+            delays=bit_times,
+            storage=storage,
+            hear=None if watched is None else watched.hear,
         )
         for one in faults:
             server.faults.add(one)
-        with (
-            _commands(control, bus, server.faults, partial(_clients, opened)) as poll,
-            contextlib.suppress(KeyboardInterrupt),
-        ):
-            server.serve(lambda: poll() or (end is not None and time.monotonic() > end))
-        served = server.report
+        with _commands(control, bus, server.faults, partial(_clients, opened)) as poll:
+            _serve(server, poll, end, watched)
         _say_who_has_lost_frames(opened)
+    served = server.report
     console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
+    if script is not None and watched is not None:
+        script.end(watched.report())
+
+
+def _serve(server: VehicleServer, poll: Callable[[], None], end: float | None, watched: WatchedServer | None) -> None:
+    """Serve until Ctrl-C, an instant of the monotonic clock [s], or the end of a scenario."""
+    if watched is not None:
+        watched.served_by(server)
+
+    def stop() -> bool:
+        poll()
+        return (end is not None and time.monotonic() > end) or (watched is not None and watched.over())
+
+    with contextlib.suppress(KeyboardInterrupt):
+        server.serve(stop)
 
 
 def _say_who_has_lost_frames(bus: can.BusABC) -> None:

@@ -15,7 +15,7 @@ from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.storage import FolderMemory
 from emulator.vehicle import EmulatedVehicle
 from hil.bench.lockstep import LockstepBench
-from hil.bench.serving import VehicleServer
+from hil.bench.serving import Hear, VehicleServer
 from hil.bench.simulators import Simulator, load_simulated, naming
 from hil.bus.clock import Clock
 from hil.bus.opening import open_served_bus
@@ -192,11 +192,13 @@ def server(
     seed: int = 0,
     delays: bool = False,
     storage: Path | None = None,
+    hear: Hear | None = None,
 ) -> VehicleServer:
     """A server of an emulated vehicle on a bus; `seed` is that of its faults, see `VehicleServer`.
 
     Args:
         storage: folder where the nodes store parameters.
+        hear: called with every frame as it passes.
 
     Raises:
         OSError: the folder cannot be made.
@@ -205,7 +207,7 @@ def server(
         # Now, and not when a master stores for the first time, it shows whether that is possible.
         storage.mkdir(parents=True, exist_ok=True)
     memory = None if storage is None else FolderMemory(storage)
-    return VehicleServer(emulated, bus, clock, network, lockstep, emulated, seed, delays, memory)
+    return VehicleServer(emulated, bus, clock, network, lockstep, emulated, seed, delays, memory, hear)
 
 
 def read_faults(texts: Sequence[str]) -> list[Fault]:

@@ -53,6 +53,10 @@ class ServingReport:
     worst_lag: float = 0.0
 
 
+Hear = Callable[[int, bytes], None]
+"""Called with identifier, with the flags of `can_frame`, and data of a frame."""
+
+
 class _Port(Protocol):
     """Frames as (identifier with the flags of `can_frame`, data): no message is built for each."""
 
@@ -83,6 +87,30 @@ class _BusPort:
         return contextlib.nullcontext()
 
 
+class _HeardPort:
+    """A port that somebody listens at: whatever passes, in the order in which it does.
+
+    Args:
+        port: what passes it.
+        hear: called with identifier, with flags, and data of each frame.
+    """
+
+    def __init__(self, port: _Port, hear: Hear) -> None:
+        self._port = port
+        self._hear = hear
+        self.burst = port.burst
+
+    def take(self, timeout: float) -> tuple[int, bytes] | None:
+        frame = self._port.take(timeout)
+        if frame is not None:
+            self._hear(*frame)
+        return frame
+
+    def send_data(self, can_id: int, data: bytes) -> None:
+        self._hear(can_id, data)
+        self._port.send_data(can_id, data)
+
+
 class VehicleServer:
     """Emulated nodes on any python-can bus.
 
@@ -100,6 +128,7 @@ class VehicleServer:
         seed: of the randomness of faults.
         delays: frames wait for arbitration and take their bit times, in simulated time.
         memory: where the nodes store parameters (1010h); without one they outlive resets only.
+        hear: called with every frame as it passes, of both sides.
 
     Attributes:
         faults: what can go wrong between the bus and the nodes.
@@ -117,9 +146,11 @@ class VehicleServer:
         seed: int = 0,
         delays: bool = False,
         memory: Memory | None = None,
+        hear: Hear | None = None,
     ) -> None:
         described = load_network(network)
-        self._port: _Port = bus if isinstance(bus, UnixHub) else _BusPort(bus)
+        port: _Port = bus if isinstance(bus, UnixHub) else _BusPort(bus)
+        self._port = port if hear is None else _HeardPort(port, hear)
         self._clock = clock
         self._lockstep = lockstep
         self._period = described.cycle_period

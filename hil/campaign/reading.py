@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,8 +72,12 @@ def read_logs(paths: Sequence[Path], network: Network) -> Record:
     return _record(logs, network, None, ", ".join(str(path) for path in paths))
 
 
+_OF_BOTH_KINDS: Final = (LogFormat.MF4, LogFormat.MCAP)
+"""Formats of logs and of records: there the name tells which it is."""
+
+
 def read_any(path: Path, network: Network) -> Record:
-    """Record from a run folder, a folder of logs, a log, or a CSV, Parquet or MF4 record.
+    """Record from a run folder, a folder of logs, a log, or a CSV, Parquet, MF4 or MCAP record.
 
     Raises:
         DataFileError, RecordError: there is nothing usable at the path.
@@ -85,7 +90,7 @@ def read_any(path: Path, network: Network) -> Record:
         if not logs:
             raise RecordError(f"{path} holds no logs of finished steps.", "Name a run folder or a record.")
         return read_logs(logs, network)
-    if path.suffix in tuple(LogFormat) and (path.suffix != LogFormat.MF4 or step_of(path) is not None):
+    if path.suffix in tuple(LogFormat) and (path.suffix not in _OF_BOTH_KINDS or step_of(path) is not None):
         if not path.is_file():
             raise RecordError(f"{path} does not exist.", "Name an existing log.")
         return read_logs([path], network)

@@ -53,7 +53,7 @@ MISALIGNED: Final = 0.01
 """Steering error after the last attempt with which no step is begun [rad]."""
 
 
-class _Session(enum.IntEnum):
+class Session(enum.IntEnum):
     """Steps between which the drives lose their power: to move or load the vehicle by hand, and to identify before
     validating.
     """
@@ -109,12 +109,13 @@ def check_network(bus: can.BusABC, clock: Clock, network: Network) -> None:
     Master(bus, clock, network).check()
 
 
-def _session_of(step: str) -> _Session:
+def session_of(step: str) -> Session:
+    """The session in which a step is driven."""
     if base_step(step) is Step.WHEEL_LIFTED:
-        return _Session.LIFTED
+        return Session.LIFTED
     if step in LOADED:
-        return _Session.LOADED
-    return _Session.VALIDATION if step == Step.LANE_CHANGE else _Session.FLOOR
+        return Session.LOADED
+    return Session.VALIDATION if step == Step.LANE_CHANGE else Session.FLOOR
 
 
 class CampaignRunner:
@@ -163,19 +164,19 @@ class CampaignRunner:
         # A killed run may have left the vehicle on its stand or loaded, so a resumed one asks for floor and unloading.
         maybe_lifted = Step.WHEEL_LIFTED in self._plan.steps
         maybe_loaded = any(step in LOADED and step in finished for step in self._plan.steps)
-        for session in _Session:
-            steps = [step for step in self._plan.steps if _session_of(step) is session and step not in finished]
+        for session in Session:
+            steps = [step for step in self._plan.steps if session_of(step) is session and step not in finished]
             if not steps:
                 continue
-            if session is _Session.LIFTED:
+            if session is Session.LIFTED:
                 self._operator.lift()
             elif maybe_lifted:
                 self._operator.lower()
                 maybe_lifted = False
-            if session is _Session.LOADED:
+            if session is Session.LOADED:
                 self._operator.load(self._run.payload)
                 maybe_loaded = True
-            elif maybe_loaded and session is _Session.VALIDATION:
+            elif maybe_loaded and session is Session.VALIDATION:
                 self._operator.unload()
             self._drive_session(steps)
 
@@ -192,7 +193,7 @@ class CampaignRunner:
             master.boot()
             master.enable()
             for reference in references:
-                if _session_of(reference.step) is not _Session.LIFTED:
+                if session_of(reference.step) is not Session.LIFTED:
                     self._align(master, reference.step)
                 self._drive(master, reference)
         self.overruns += master.overruns

@@ -11,6 +11,7 @@ import can
 import numpy as np
 
 from hil.frames.blf import read_blf
+from hil.frames.mcap_log import read_mcap_frames
 from hil.frames.recorder import PARTIAL, LogFormat
 from hil.frames.table import NOT_DATA, FrameTable
 from hil.frames.text_logs import read_asc, read_candump
@@ -22,7 +23,7 @@ from ident.records.mf4_blocks import check_blocks
 
 
 def read_log(path: Path, accept_truncated: bool = False) -> FrameTable:
-    """Read the frames of a BLF, ASC, candump or MF4 log.
+    """Read the frames of a BLF, ASC, candump, MF4 or MCAP log.
 
     Args:
         path: the log; its suffix tells the format.
@@ -57,6 +58,20 @@ def read_log(path: Path, accept_truncated: bool = False) -> FrameTable:
     return table
 
 
+def read_frames(path: Path) -> list[can.Message]:
+    """Every frame of a log with all that its format tells of it, remote, extended and error frames among them.
+
+    Raises:
+        RecordError: as `read_log`.
+    """
+    read_log(path)
+    if path.suffix.lower() == LogFormat.MCAP:
+        return read_mcap_frames(path)[0]
+    # By now it is known to be whole and sound, and python-can's readers tell more of each frame.
+    with quietly(), can.LogReader(path) as reader:
+        return list(reader)
+
+
 def _said(error: BaseException) -> str:
     """What an error says, its kind where it says nothing."""
     return (str(error) or type(error).__name__).rstrip(".")
@@ -67,6 +82,11 @@ def _read_mf4(path: Path) -> tuple[FrameTable, str]:
         raise RecordError("Reading MF4 needs asammdf.", "Install quasiomni[records].")
     check_blocks(path)
     return read_apart(_mf4_frames, path), ""
+
+
+def _read_mcap(path: Path) -> tuple[FrameTable, str]:
+    frames, cut = read_mcap_frames(path)
+    return _collect(frames), cut
 
 
 def _mf4_frames(path: Path) -> FrameTable:
@@ -101,5 +121,6 @@ _READERS: Final[dict[LogFormat, Callable[[Path], tuple[FrameTable, str]]]] = {
     LogFormat.ASC: read_asc,
     LogFormat.CANDUMP: read_candump,
     LogFormat.MF4: _read_mf4,
+    LogFormat.MCAP: _read_mcap,
 }
 """Reader of each format: frames, and why the log is not whole, empty where it is."""

@@ -18,6 +18,7 @@ from typing import Any, Protocol
 
 import can
 
+from hil.frames.mcap_log import McapFrames
 from ident.errors import RecordError
 from ident.writing import finish, sync_folder
 
@@ -46,6 +47,8 @@ class LogFormat(StrEnum):
     """Text log of can-utils."""
     MF4 = ".mf4"
     """ASAM MDF 4; slow to write, and kept in memory until the step ends."""
+    MCAP = ".mcap"
+    """JSON messages that Foxglove reads."""
 
 
 class _Writer(Protocol):
@@ -177,7 +180,7 @@ class Recorder:
         try:
             # Another recorder in the same folder has taken the number, and its file is not ours to write over.
             self._path.open("xb").close()
-            self._writer = writer = _make_writer(self._path, self._format)
+            self._writer = writer = make_writer(self._path, self._format)
         except OSError as error:
             raise _unwritable(self._path, error) from error
         self._next_flush = float("-inf")
@@ -243,7 +246,13 @@ def _next_number(directory: Path) -> int:
     return max(numbers, default=-1) + 1
 
 
-def _make_writer(path: Path, log_format: LogFormat) -> _Writer:
+def make_writer(path: Path, log_format: LogFormat) -> _Writer:
+    """A writer of frames.
+
+    Raises:
+        RecordError: a package for the format is missing.
+        OSError: the file cannot be made.
+    """
     if log_format is LogFormat.BLF:
         # Level 1 compresses nearly as well as the default and takes a third of its time.
         return can.BLFWriter(path, compression_level=1)
@@ -251,6 +260,8 @@ def _make_writer(path: Path, log_format: LogFormat) -> _Writer:
         return can.ASCWriter(path)
     if log_format is LogFormat.CANDUMP:
         return can.CanutilsLogWriter(path)
+    if log_format is LogFormat.MCAP:
+        return McapFrames(path)
     try:
         return can.MF4Writer(path)
     except NotImplementedError as error:

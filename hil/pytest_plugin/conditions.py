@@ -12,12 +12,13 @@ import can
 
 from hil.network import DRIVES, Role
 from hil.network.cia import NMT_STATE, DriveState, NmtState, Service
-from hil.pytest_plugin.world import World
+from hil.pytest_plugin.world import Observed
 from ident.errors import UserError
 
 _NMT_STATES: Final = {int(state): state.name.lower().replace("_", "-") for state in NmtState}
-_ANY_ERROR: Final = 0xFFFF
-_STANDSTILL: Final = 0.002
+ANY_ERROR: Final = 0xFFFF
+"""Stands for every error code but "error reset"."""
+STANDSTILL: Final = 0.002
 """Speed that counts as rest [m/s]: the wheels' dry friction holds the vehicle below it."""
 
 
@@ -32,8 +33,8 @@ class Condition:
     """
 
     text: str
-    holds: Callable[[World, int], bool]
-    found: Callable[[World, int], str]
+    holds: Callable[[Observed, int], bool]
+    found: Callable[[Observed, int], str]
 
 
 def frame(can_id: int, data: str | None = None) -> Condition:
@@ -57,7 +58,7 @@ def frame(can_id: int, data: str | None = None) -> Condition:
     )
 
 
-def emergency(role: str, code: int = _ANY_ERROR) -> Condition:
+def emergency(role: str, code: int = ANY_ERROR) -> Condition:
     """An EMCY message of a node, from now on.
 
     Args:
@@ -66,19 +67,19 @@ def emergency(role: str, code: int = _ANY_ERROR) -> Condition:
     """
     wanted = _role(role, list(Role))
 
-    def codes(world: World, since: int) -> list[int]:
+    def codes(world: Observed, since: int) -> list[int]:
         can_id = Service.EMERGENCY + world.network.node(wanted).node_id
         seen = [message.data for message in world.frames[since:] if message.arbitration_id == can_id]
         return [int(struct.unpack_from("<H", data)[0]) for data in seen if len(data) == 8]
 
-    def holds(world: World, since: int) -> bool:
-        return any(seen == code or (code == _ANY_ERROR and seen != 0) for seen in codes(world, since))
+    def holds(world: Observed, since: int) -> bool:
+        return any(seen == code or (code == ANY_ERROR and seen != 0) for seen in codes(world, since))
 
-    def found(world: World, since: int) -> str:
+    def found(world: Observed, since: int) -> str:
         seen = codes(world, since)
         return f"it sent {', '.join(f'{one:04X}h' for one in seen)}" if seen else "it sent none"
 
-    which = "an emergency" if code == _ANY_ERROR else f"emergency {code:04X}h"
+    which = "an emergency" if code == ANY_ERROR else f"emergency {code:04X}h"
     return Condition(f"{which} of {role}", holds, found)
 
 
@@ -88,7 +89,7 @@ def heartbeat_state(role: str, state: str) -> Condition:
     if state not in _NMT_STATES.values():
         raise UserError(f"There is no NMT state {state!r}.", f"Use one of {', '.join(_NMT_STATES.values())}.")
 
-    def states(world: World, since: int) -> list[str]:
+    def states(world: Observed, since: int) -> list[str]:
         can_id = Service.HEARTBEAT + world.network.node(wanted).node_id
         seen = [message.data for message in world.frames[since:] if message.arbitration_id == can_id]
         return [_NMT_STATES.get(data[0] & NMT_STATE, "unknown") for data in seen if data]
@@ -110,7 +111,7 @@ def all_drives(state: str) -> Condition:
     return _drives(DRIVES, state, f"all drives to be {state}")
 
 
-def at_rest(speed: float = _STANDSTILL) -> Condition:
+def at_rest(speed: float = STANDSTILL) -> Condition:
     """The vehicle slower than `speed` [m/s] over the floor."""
     return Condition(
         f"the vehicle to be at rest (below {speed:g} m/s)",
@@ -131,7 +132,7 @@ def moving(faster_than: float) -> Condition:
 def travelled(distance: float, since: tuple[float, float] = (0.0, 0.0)) -> Condition:
     """The chassis centre farther than `distance` [m], as the crow flies, from a point `since` [m, m]."""
 
-    def covered(world: World) -> float:
+    def covered(world: Observed) -> float:
         x, y, _ = world.truth().pose
         return math.hypot(x - since[0], y - since[1])
 
@@ -142,10 +143,28 @@ def travelled(distance: float, since: tuple[float, float] = (0.0, 0.0)) -> Condi
     )
 
 
+def value_of(role: str, index: int, subindex: int, at_least: float | None, at_most: float | None) -> Condition:
+    """An object of a node within bounds, read behind the bus, whatever is mapped into its PDOs.
+
+    Args:
+        role: of the node.
+        index, subindex: of an integer object.
+        at_least, at_most: bounds, None for none.
+    """
+    wanted = _role(role, list(Role))
+    low, high = (-math.inf if at_least is None else at_least), (math.inf if at_most is None else at_most)
+    bounds = [f"at least {low:g}"] * (at_least is not None) + [f"at most {high:g}"] * (at_most is not None)
+    return Condition(
+        f"{index:04X}h:{subindex} of {role} to be {' and '.join(bounds)}",
+        lambda world, _: low <= world.object_value(wanted, index, subindex) <= high,
+        lambda world, _: f"it is {world.object_value(wanted, index, subindex)}",
+    )
+
+
 def _drives(roles: tuple[Role, ...], state: str, text: str) -> Condition:
     wanted = _state(state)
 
-    def found(world: World, _since: int) -> str:
+    def found(world: Observed, _since: int) -> str:
         return ", ".join(f"{role} is {_label(world.drive_state(role))}" for role in roles)
 
     return Condition(text, lambda world, _: all(world.drive_state(role) is wanted for role in roles), found)
@@ -174,7 +193,7 @@ def _starts_with(data: bytearray, pattern: list[int | None]) -> bool:
     return all(wanted is None or wanted == byte for wanted, byte in zip(pattern, data, strict=False))
 
 
-def _last_frame(world: World, since: int, can_id: int) -> str:
+def _last_frame(world: Observed, since: int, can_id: int) -> str:
     last = next((one for one in reversed(world.frames[since:]) if one.arbitration_id == can_id), None)
     if last is None:
         return f"none of the {len(world.frames) - since} frames since then has this identifier"

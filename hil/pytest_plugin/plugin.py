@@ -23,11 +23,14 @@ if TYPE_CHECKING:
     from hil.pytest_plugin.health import Symptom
     from hil.pytest_plugin.recording import Artifacts
     from hil.pytest_plugin.world import World
+    from hil.scenario.running import ScenarioReport
 
 _WORLD: Final[pytest.StashKey[World]] = pytest.StashKey()
 _ARTIFACTS: Final[pytest.StashKey[Artifacts]] = pytest.StashKey()
 _ALLOWED: Final[pytest.StashKey[set[Symptom]]] = pytest.StashKey()
 _FAILED: Final[pytest.StashKey[bool]] = pytest.StashKey()
+_SCENARIO: Final = ".scenario.toml"
+"""How the names of files end that are tests by themselves."""
 _CHOICES: Final = {
     "prototype": "prototype",
     "network": None,
@@ -73,6 +76,16 @@ def pytest_runtest_makereport(
     return report
 
 
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """A scenario file is a test."""
+    if not file_path.name.endswith(_SCENARIO):
+        return None
+    from hil.pytest_plugin.scenarios import ScenarioFile
+
+    collected: pytest.Collector = ScenarioFile.from_parent(parent, path=file_path)
+    return collected
+
+
 @pytest.fixture
 def vehicle(request: pytest.FixtureRequest) -> Iterator[EmulatedVehicle]:
     """An emulated vehicle on the floor, at rest; the marker `hil` says which."""
@@ -96,7 +109,6 @@ def vehicle(request: pytest.FixtureRequest) -> Iterator[EmulatedVehicle]:
 def bench(request: pytest.FixtureRequest, vehicle: EmulatedVehicle) -> Iterator[World]:
     """The vehicle behind a bus in lockstep; at the end the bus has to be well, see the fixture `allow`."""
     from hil.bench.lockstep import LockstepBench
-    from hil.pytest_plugin.recording import Artifacts
     from hil.pytest_plugin.world import World
 
     asked = _asked(request)
@@ -104,11 +116,9 @@ def bench(request: pytest.FixtureRequest, vehicle: EmulatedVehicle) -> Iterator[
     network = _emulated(asked).network
     with LockstepBench(vehicle, network.path, ground=vehicle, seed=seed, delays=delays) as lockstep:
         world = World(lockstep, vehicle, network)
-        request.node.stash[_WORLD] = world
-        folder = Path(request.config.getoption("--hil-artifacts"))
-        request.node.stash[_ARTIFACTS] = Artifacts(folder / _file_name(request.node.nodeid), request.node.nodeid)
+        keep(request.node, world)
         yield world
-        _describe(request.node, world, seed)
+        describe(request.node, world, seed)
         _assert_health(request.node, world)
 
 
@@ -136,6 +146,21 @@ def expect(bench: World) -> Expect:
     from hil.pytest_plugin.expectations import Expect
 
     return Expect(bench)
+
+
+@pytest.fixture
+def scenario(request: pytest.FixtureRequest, bench: World) -> Callable[[str | Path], ScenarioReport]:
+    """Runs a scenario file, named from the test's own folder: `scenario("bad_day.toml")`; fails where it does."""
+    from hil.pytest_plugin.scenarios import hold
+    from hil.scenario.reader import read_scenario
+    from hil.scenario.running import run_scenario
+
+    def run(path: str | Path) -> ScenarioReport:
+        report = run_scenario(read_scenario(request.path.parent / path), bench)
+        hold(report)
+        return report
+
+    return run
 
 
 @pytest.fixture
@@ -174,7 +199,7 @@ def _file_name(node_id: str) -> str:
     return re.sub(r"[^\w.-]+", "_", node_id.rpartition("/")[2])
 
 
-def _describe(item: pytest.Item, world: World, seed: int) -> None:
+def describe(item: pytest.Item, world: World, seed: int) -> None:
     """What JUnit XML tells of the test."""
     load = world.bench.load
     faults = [str(injected.fault) for injected in world.injected]
@@ -202,6 +227,15 @@ def _assert_health(item: pytest.Item, world: World) -> None:
         listed = "\n".join(f"  {finding.symptom}: {finding.what}" for finding in wrong)
         symptoms = ", ".join(dict.fromkeys(f'"{finding.symptom}"' for finding in wrong))
         pytest.fail(f"The bus was not well:\n{listed}\nIf the test provokes that: allow({symptoms}).", pytrace=False)
+
+
+def keep(item: pytest.Item, world: World) -> None:
+    """Let an item that builds a bench by itself have what the fixture `bench` gives: artifacts, numbers."""
+    from hil.pytest_plugin.recording import Artifacts
+
+    item.stash[_WORLD] = world
+    folder = Path(item.config.getoption("--hil-artifacts"))
+    item.stash[_ARTIFACTS] = Artifacts(folder / _file_name(item.nodeid), item.nodeid)
 
 
 def _attach(item: pytest.Item, report: pytest.TestReport) -> None:

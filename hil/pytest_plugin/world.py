@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import can
 
+from emulator.firmware.network import DeviceNetwork
 from emulator.vehicle import EmulatedVehicle, GroundTruth
 from hil.bench.lockstep import LockstepBench
 from hil.bus.clock import SimulatedClock
@@ -47,6 +48,50 @@ class Note:
 
     time: float
     text: str
+
+
+class Observed(Protocol):
+    """What conditions are about: a network in simulated time, and the vehicle behind it."""
+
+    @property
+    def frames(self) -> Sequence[can.Message]:
+        """Every frame on the bus so far, in the order of the bus."""
+
+    @property
+    def network(self) -> Network:
+        """The network file."""
+
+    @property
+    def now(self) -> float:
+        """Simulated time [s]."""
+
+    def frames_until(self, instant: float) -> int:
+        """Number of frames whose last bit had passed by `instant` [s]."""
+
+    def drive_state(self, role: Role) -> DriveState | None:
+        """State of a drive; None for a pattern that CiA 402 does not know."""
+
+    def object_value(self, role: Role, index: int, subindex: int = 0) -> int:
+        """Value of an integer object of a node.
+
+        Raises:
+            UserError: it has no such object.
+        """
+
+    def truth(self) -> GroundTruth:
+        """The true state of motion."""
+
+    def speed(self) -> float:
+        """Speed of the chassis centre over the floor [m/s]."""
+
+
+def object_value(devices: DeviceNetwork, network: Network, role: Role, index: int, subindex: int) -> int:
+    """Value of an integer object in the dictionary of an emulated node.
+
+    Raises:
+        UserError: it has no such object.
+    """
+    return devices.nodes[network.node(role).node_id].object_dictionary.value(index, subindex)
 
 
 class World:
@@ -147,8 +192,15 @@ class World:
 
     def statusword(self, role: Role) -> int:
         """6041h of a drive, from its object dictionary: whatever is mapped into its PDOs."""
-        node = self._bench.devices.nodes[self.network.node(role).node_id]
-        return node.object_dictionary.value(Index.STATUSWORD)
+        return self.object_value(role, Index.STATUSWORD)
+
+    def object_value(self, role: Role, index: int, subindex: int = 0) -> int:
+        """Value of an integer object of a node, from its dictionary: whatever is mapped into its PDOs.
+
+        Raises:
+            UserError: it has no such object.
+        """
+        return object_value(self._bench.devices, self.network, role, index, subindex)
 
     def drive_state(self, role: Role) -> DriveState | None:
         """State of a drive; None for a pattern that CiA 402 does not know."""

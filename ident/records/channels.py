@@ -1,4 +1,4 @@
-"""Named channels in files: CSV, Parquet and ASAM MDF 4, chosen by the file's ending, whatever they describe."""
+"""Named channels in files: CSV, Parquet, ASAM MDF 4 and MCAP, chosen by the file's ending, whatever they describe."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ident.errors import RecordError
 from ident.reading import LARGEST_RECORD, PARSER_ERRORS, refuse_unreadable
 from ident.records.apart import read_apart
+from ident.records.mcap_channels import read_mcap_channels, write_mcap_channels
 from ident.records.mf4_blocks import check_blocks
 from ident.writing import write_by
 
@@ -60,7 +61,7 @@ def read_channels(path: Path) -> Channels:
 
 
 def write_channels(channels: Channels, path: Path) -> None:
-    """Write channels of one length; CSV implies SI units, Parquet and MF4 state them.
+    """Write channels of one length; CSV implies SI units, the others state them.
 
     Raises:
         RecordError: the file's ending is unknown, or a package for it is missing.
@@ -285,13 +286,23 @@ def _write_mf4(channels: Channels, path: Path) -> None:
         mdf.save(path, overwrite=True, compression=1)
 
 
+def _read_mcap(path: Path) -> Channels:
+    return Channels(*read_mcap_channels(path))
+
+
+def _write_mcap(channels: Channels, path: Path) -> None:
+    write_mcap_channels(channels.values, channels.units, path)
+
+
 _READERS: Final[dict[str, Callable[[Path], Channels]]] = {
     ".csv": _read_csv,
     ".parquet": _read_parquet,
     ".mf4": _read_mf4,
+    ".mcap": _read_mcap,
 }
 _WRITERS: Final[dict[str, Callable[[Channels, Path], None]]] = {
     ".csv": _write_csv,
     ".parquet": _write_parquet,
     ".mf4": _write_mf4,
+    ".mcap": _write_mcap,
 }

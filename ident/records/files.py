@@ -1,4 +1,4 @@
-"""Vehicle records in files: CSV, Parquet and ASAM MDF 4, chosen by the file's ending."""
+"""Vehicle records in files: CSV, Parquet, ASAM MDF 4 and MCAP, chosen by the file's ending."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def read_record(path: Path) -> Record:
 
 
 def write_record(record: Record, path: Path) -> None:
-    """Write a record; CSV implies SI units, Parquet and MF4 state them.
+    """Write a record; CSV implies SI units, the others state them.
 
     Raises:
         RecordError: the file's ending is unknown.

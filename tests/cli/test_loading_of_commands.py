@@ -40,7 +40,17 @@ def test_every_command_is_listed_with_the_first_line_of_its_help() -> None:
 
 def test_every_module_of_the_command_line_is_listed() -> None:
     modules = {path.stem for path in Path(quasiomni.__file__).parent.glob("*.py")}
-    shared = {"__init__", "__main__", "application", "behind_the_bus", "filming", "interface", "options", "showing"}
+    shared = {
+        "__init__",
+        "__main__",
+        "application",
+        "behind_the_bus",
+        "filming",
+        "interface",
+        "options",
+        "scenarios",
+        "showing",
+    }
     assert modules - shared == set(quasiomni.COMMANDS)
 
 

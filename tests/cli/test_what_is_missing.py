@@ -42,6 +42,7 @@ CASES = {
     "emulate an FMU": ("fmpy", "cosim", ["emulate", "--bus", "unix:OUT", "--plant", "fmu:x.fmu"]),
     "demo with a video": ("av", "video", ["demo", "--out", "OUT", "--video", "OUT.mp4"]),
     "campaign with a video": ("PIL", "video", ["campaign", "--out", "OUT", "--video", "OUT.mp4"]),
+    "convert to MCAP": ("mcap", "mcap", ["convert", "record.csv", "--out", "OUT.mcap"]),
     "emulate with a video": ("av", "video", ["emulate", "--bus", "unix:OUT", "--video", "OUT.mp4"]),
     "cosim": ("fmpy", "cosim", ["cosim", "x.fmu", "--record", "x.csv"]),
     "identify from MF4": ("asammdf", "records", ["identify", "x.csv", "x.mf4"]),

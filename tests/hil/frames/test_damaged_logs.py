@@ -15,6 +15,7 @@ from emulator.firmware.flywheels import Flywheels
 from hil.bench.lockstep import LockstepBench
 from hil.campaign.reading import read_logs
 from hil.frames import decode_log, read_log
+from hil.frames.mcap_log import McapFrames
 from hil.frames.recorder import LogFormat, Recorder
 from hil.master import Master
 from hil.network import Network
@@ -31,6 +32,7 @@ WRITERS: dict[LogFormat, Callable[[Path], can.io.generic.MessageWriter]] = {
     LogFormat.ASC: can.ASCWriter,
     LogFormat.CANDUMP: can.CanutilsLogWriter,
     LogFormat.MF4: can.MF4Writer,
+    LogFormat.MCAP: McapFrames,
 }
 
 

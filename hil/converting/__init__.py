@@ -1,0 +1,1 @@
+"""Logs and records in other formats."""

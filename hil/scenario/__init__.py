@@ -1,0 +1,1 @@
+"""Scenarios: set-points, faults and expectations at instants, written in a file."""
