@@ -23,6 +23,7 @@ class Extra(enum.StrEnum):
     EXAM = "exam"
     CLUSTER = "cluster"
     VIDEO = "video"
+    WEB = "web"
 
 
 MODULES: Final[Mapping[Extra, Sequence[str]]] = MappingProxyType(
@@ -36,6 +37,7 @@ MODULES: Final[Mapping[Extra, Sequence[str]]] = MappingProxyType(
         Extra.EXAM: ("cryptography", "pyarrow"),
         Extra.CLUSTER: ("distributed",),
         Extra.VIDEO: ("av", "PIL"),
+        Extra.WEB: ("viser",),
     }
 )
 """What an extra brings, by the names that are imported."""
@@ -51,6 +53,7 @@ PURPOSES: Final[Mapping[Extra, str]] = MappingProxyType(
         Extra.EXAM: "exam",
         Extra.CLUSTER: "exam --scheduler",
         Extra.VIDEO: "demo, campaign and emulate with --video",
+        Extra.WEB: "campaign and emulate with --web",
     }
 )
 """What an extra is for, in commands and options."""

@@ -17,6 +17,7 @@ from rich.text import Text
 from hil.bench.control import ControlServer, Injection, control_path
 from hil.bus.clock import WallClock
 from hil.bus.report import ListenerReport
+from hil.bus.traffic import Traffic
 from hil.bus.unix import UnixHub
 from hil.campaign.folder import network_file_of
 from hil.network import load_network
@@ -39,6 +40,18 @@ from quasiomni.options import (
     parse_plant,
     read_simulator,
     tell_native,
+)
+
+from quasiomni.paging import (
+    LOOPBACK,
+    PORT,
+    WebHostOption,
+    WebOption,
+    WebPortOption,
+    paging,
+    plan_page,
+    say_where,
+    watching,
 )
 
 
@@ -83,9 +96,12 @@ def emulate(
     gui: GuiOption = False,
     video: VideoOption = None,
     video_rate: VideoRateOption = VIDEO_RATE,
+    web: WebOption = False,
+    web_host: WebHostOption = LOOPBACK,
+    web_port: WebPortOption = PORT,
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
-    film = plan_video(video, video_rate, bus)
+    film, address = plan_video(video, video_rate, bus), plan_page(web, web_host, web_port)
     if plant is not None and simulator is not None:
         raise UserError("--from makes an emulated vehicle, --plant takes its place.", "Leave one of them out.")
     fmu, model = parse_plant(plant, force=force), read_simulator(simulator, force=force)
@@ -96,6 +112,7 @@ def emulate(
     end = None if duration is None else time.monotonic() + duration
     tell_native(fmu)
     with (
+        paging(address) as page,
         drawing(film) as drawn,
         emulation.vehicle(
             prototype, seed, gui, network_file, parse_effects(effect), fmu, chosen, drawn, model
@@ -109,19 +126,37 @@ def emulate(
             console.print(Text.assemble(f"{len(assumed)} numbers of it are in no file: ", (command, "bold"), "."))
         served_as, pace = plant or simulator or prototype, "in lockstep" if lockstep else "in real time"
         console.print(f"{served_as} is up on {bus}, {pace}. Ctrl-C ends it.")
+        clients, traffic = partial(_clients, opened), Traffic() if page is not None else None
         server = emulation.server(
-            vehicle, opened, WallClock(), network_file, lockstep, seed=seed, delays=bit_times, storage=storage
+            vehicle,
+            opened,
+            WallClock(),
+            network_file,
+            lockstep,
+            seed=seed,
+            delays=bit_times,
+            storage=storage,
+            traffic=traffic,
         )
         for one in faults:
             server.faults.add(one)
+        attend: Callable[[], None] = _nobody_watches
+        if page is not None and traffic is not None:
+            network_shown = emulation.complete_network(prototype, network_file, model)
+            attend = watching().watch_server(page, str(served_as), vehicle, server, network_shown, traffic, clients).attend
+            say_where(page)
         with (
-            _commands(control, bus, server.faults, partial(_clients, opened)) as poll,
+            _commands(control, bus, server.faults, clients) as poll,
             contextlib.suppress(KeyboardInterrupt),
         ):
-            server.serve(lambda: poll() or (end is not None and time.monotonic() > end))
+            server.serve(lambda: attend() or poll() or (end is not None and time.monotonic() > end))
         served = server.report
         _say_who_has_lost_frames(opened)
     console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
+
+
+def _nobody_watches() -> None:
+    """There is no page."""
 
 
 def _say_who_has_lost_frames(bus: can.BusABC) -> None:

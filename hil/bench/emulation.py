@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +19,7 @@ from hil.bench.serving import VehicleServer
 from hil.bench.simulators import Simulator, load_simulated, naming
 from hil.bus.clock import Clock
 from hil.bus.opening import open_served_bus
+from hil.bus.traffic import Traffic
 from hil.cosimulation.plant import FmuVehicle
 from hil.faults import Fault, parse_fault, parse_script
 from hil.faults.devices import Slippery
@@ -87,6 +88,15 @@ def assumed(prototype: str, network: Path, simulator: Simulator | None = None) -
     return load_simulated(prototype, network, simulator).assumed
 
 
+def complete_network(prototype: str, network: Path, simulator: Simulator | None = None) -> Network:
+    """The network of an emulated vehicle, with what its vehicle file owns.
+
+    Raises:
+        DataFileError: a file is missing or malformed, or two places disagree.
+    """
+    return load_simulated(prototype, network, simulator).network
+
+
 @contextmanager
 def vehicle(
     prototype: str,
@@ -137,6 +147,10 @@ def vehicle(
         yield plant
 
 
+def _leave_alone(_vehicle: Plant, _bench: LockstepBench) -> None:
+    """Nobody watches."""
+
+
 @contextmanager
 def bench(
     prototype: str,
@@ -148,12 +162,14 @@ def bench(
     engine: EngineName | None = None,
     video: Video | None = None,
     simulator: Simulator | None = None,
+    begin: Callable[[Plant, LockstepBench], object] = _leave_alone,
 ) -> Iterator[Bench]:
-    """What `vehicle` gives, behind an in-process bus in lockstep."""
+    """What `vehicle` gives, behind an in-process bus in lockstep; `begin` is called with both before anything moves."""
     with (
         vehicle(prototype, seed, gui, network, effects, fmu, engine, video, simulator) as emulated,
-        LockstepBench(emulated, network) as lockstep,
+        LockstepBench(emulated, network, ground=emulated, seed=seed) as lockstep,
     ):
+        begin(emulated, lockstep)
         yield Bench(lockstep.bus, lockstep.clock, BenchOperator(emulated))
 
 
@@ -192,11 +208,13 @@ def server(
     seed: int = 0,
     delays: bool = False,
     storage: Path | None = None,
+    traffic: Traffic | None = None,
 ) -> VehicleServer:
     """A server of an emulated vehicle on a bus; `seed` is that of its faults, see `VehicleServer`.
 
     Args:
         storage: folder where the nodes store parameters.
+        traffic: counts the frames, if they are to be counted.
 
     Raises:
         OSError: the folder cannot be made.
@@ -205,7 +223,7 @@ def server(
         # Now, and not when a master stores for the first time, it shows whether that is possible.
         storage.mkdir(parents=True, exist_ok=True)
     memory = None if storage is None else FolderMemory(storage)
-    return VehicleServer(emulated, bus, clock, network, lockstep, emulated, seed, delays, memory)
+    return VehicleServer(emulated, bus, clock, network, lockstep, emulated, seed, delays, memory, traffic)
 
 
 def read_faults(texts: Sequence[str]) -> list[Fault]:

@@ -18,6 +18,7 @@ from emulator.firmware.storage import Memory
 from hil.bus.clock import Clock
 from hil.bus.frame_kinds import ERROR_FRAME, EXTENDED, REMOTE, STANDARD_MASK, device_frame
 from hil.bus.realtime import steady_memory
+from hil.bus.traffic import Traffic
 from hil.bus.unix import UnixHub
 from hil.bus.wire import Wire
 from hil.bus.wired import Devices, WiredDevices
@@ -83,6 +84,25 @@ class _BusPort:
         return contextlib.nullcontext()
 
 
+class _CountedPort:
+    """A port whose frames are counted."""
+
+    def __init__(self, port: _Port, traffic: Traffic) -> None:
+        self.burst = port.burst
+        self._take, self._send = port.take, port.send_data
+        self._by_length = traffic.by_length
+
+    def take(self, timeout: float) -> tuple[int, bytes] | None:
+        frame = self._take(timeout)
+        if frame is not None:
+            self._by_length[len(frame[1])] += 1
+        return frame
+
+    def send_data(self, can_id: int, data: bytes) -> None:
+        self._by_length[len(data)] += 1
+        self._send(can_id, data)
+
+
 class VehicleServer:
     """Emulated nodes on any python-can bus.
 
@@ -100,6 +120,7 @@ class VehicleServer:
         seed: of the randomness of faults.
         delays: frames wait for arbitration and take their bit times, in simulated time.
         memory: where the nodes store parameters (1010h); without one they outlive resets only.
+        traffic: counts the frames, if they are to be counted.
 
     Attributes:
         faults: what can go wrong between the bus and the nodes.
@@ -117,9 +138,12 @@ class VehicleServer:
         seed: int = 0,
         delays: bool = False,
         memory: Memory | None = None,
+        traffic: Traffic | None = None,
     ) -> None:
         described = load_network(network)
         self._port: _Port = bus if isinstance(bus, UnixHub) else _BusPort(bus)
+        if traffic is not None:
+            self._port = _CountedPort(self._port, traffic)
         self._clock = clock
         self._lockstep = lockstep
         self._period = described.cycle_period
