@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import ModuleType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hil.network import Network
 from ident.errors import UserError
 from ident.extras import Extra, require, require_engine
 from quasiomni.application import console, errors
@@ -90,6 +91,24 @@ def say_where(page: Page | None) -> None:
     """
     if page is not None:
         console.print(f"The page is {page.wait()}", highlight=False, soft_wrap=True)
+
+
+def watching_bench(page: Page | None, title: str, told: Told, network: Network) -> Callable[[Any, Any], None]:
+    """What to call with a vehicle and its bench before anything moves; does nothing without a page.
+
+    Args:
+        page: that shows them.
+        title: of it.
+        told: is told the step that is driven.
+        network: of the vehicle, complete.
+    """
+
+    def begin(vehicle: Any, bench: Any) -> None:
+        if page is not None:
+            watching().watch_bench(page, title, vehicle, bench, network, told.doing)
+            say_where(page)
+
+    return begin
 
 
 @dataclass

@@ -41,7 +41,6 @@ from quasiomni.options import (
     read_simulator,
     tell_native,
 )
-
 from quasiomni.paging import (
     LOOPBACK,
     PORT,
@@ -143,13 +142,21 @@ def emulate(
         attend: Callable[[], None] = _nobody_watches
         if page is not None and traffic is not None:
             network_shown = emulation.complete_network(prototype, network_file, model)
-            attend = watching().watch_server(page, str(served_as), vehicle, server, network_shown, traffic, clients).attend
+            attend = (
+                watching().watch_server(page, str(served_as), vehicle, server, network_shown, traffic, clients).attend
+            )
             say_where(page)
+
+        def over() -> bool:
+            attend()
+            poll()
+            return end is not None and time.monotonic() > end
+
         with (
             _commands(control, bus, server.faults, clients) as poll,
             contextlib.suppress(KeyboardInterrupt),
         ):
-            server.serve(lambda: attend() or poll() or (end is not None and time.monotonic() > end))
+            server.serve(over)
         served = server.report
         _say_who_has_lost_frames(opened)
     console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")

@@ -80,7 +80,7 @@ class LockstepBench:
         self._hub.listen(hear)
 
     def attend(self, call: Callable[[], None]) -> None:
-        """Call `call` before every move of time: the nodes are at one instant then, and may be looked at and changed."""
+        """Call `call` before every move of time: the nodes may be looked at then, and changed."""
         self._hub.attend(call)
 
     @property

@@ -19,9 +19,7 @@ from hil.video.film import FilmedVehicle
 from ident.errors import UserError
 
 
-def watch(
-    page: Page, title: str, vehicle: object, faults: FaultInjector, network: Network, around: Around
-) -> Watch:
+def watch(page: Page, title: str, vehicle: object, faults: FaultInjector, network: Network, around: Around) -> Watch:
     """Show a vehicle on a page; whoever moves it calls `attend` of what this gives, between any two steps.
 
     Args:

@@ -15,7 +15,7 @@ _AT_ONCE: Final = 256
 """Most messages taken at once."""
 
 
-class Closed(Exception):
+class ClosedError(Exception):
     """The other side has gone."""
 
 
@@ -34,21 +34,21 @@ class Channel:
         """Send a message; whether there was room for it.
 
         Raises:
-            Closed: the other side has gone.
+            ClosedError: the other side has gone.
         """
         try:
             self._socket.send(pickle.dumps(message, pickle.HIGHEST_PROTOCOL))
         except BlockingIOError:
             return False
         except OSError as error:
-            raise Closed from error
+            raise ClosedError from error
         return True
 
     def receive(self) -> Messages:
         """All messages that are there, oldest first.
 
         Raises:
-            Closed: the other side has gone, and everything from it has been taken.
+            ClosedError: the other side has gone, and everything from it has been taken.
         """
         found: list[Message] = []
         with contextlib.suppress(BlockingIOError):
@@ -57,7 +57,7 @@ class Channel:
                 if not packet:
                     if found:
                         break
-                    raise Closed
+                    raise ClosedError
                 found.append(cast(Message, pickle.loads(packet)))
         return found
 

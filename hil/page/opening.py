@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
-from hil.page.channel import Channel, Closed, make_pair
+from hil.page.channel import Channel, ClosedError, make_pair
 from hil.page.shown import Failed, Ready
 from ident.errors import UserError
 from ident.extras import Extra, require
@@ -99,7 +99,7 @@ class Page:
                         return self._address.url(message.port)
                     if isinstance(message, Failed):
                         raise PageError(message.what, "Take another --web-port.")
-        except Closed:
+        except ClosedError:
             pass
         raise PageError("The page does not come up.", "Try `python -c 'import viser'`, or go without --web.")
 
@@ -122,7 +122,7 @@ def open_page(address: Address) -> Iterator[Page]:
     """
     refuse_unservable(address)
     ours, theirs = make_pair()
-    # A program of its own: a fork would hold buses and engine open, and `multiprocessing` runs the caller's script again.
+    # A program of its own: a fork would hold buses and engine open, `multiprocessing` run the caller's script again.
     with theirs:
         words = (str(theirs.fileno()), address.host, str(address.port))
         process = subprocess.Popen([sys.executable, "-P", "-m", _PROGRAM, *words], pass_fds=[theirs.fileno()])
@@ -135,7 +135,8 @@ def open_page(address: Address) -> Iterator[Page]:
 
 def _no_address(address: Address, why: str) -> PageError:
     return PageError(
-        f"The page cannot be served at {address.host}: {why}.", "Give an address of this computer: --web-host 127.0.0.1."
+        f"The page cannot be served at {address.host}: {why}.",
+        "Give an address of this computer: --web-host 127.0.0.1.",
     )
 
 

@@ -15,7 +15,7 @@ from hil.page.scene import Scene
 from hil.page.shown import Action, Asked, Sketch, Snapshot, Told
 from ident.vehicle.geometry import WHEELS
 
-_RIGHT: Final = 430
+_RIGHT: Final = 500
 _LEFT: Final = 430
 """Widths of the panels [pixels]."""
 
@@ -157,7 +157,8 @@ class Panel:
         doing = snapshot.doing
         if doing.step:
             self._doing.visible = True
-            self._bar.value = 100.0 * doing.done / max(doing.total, 1)
+            # A progress bar's value is drawn as it is set, whatever the type hints of its base say.
+            self._bar.value = 100.0 * doing.done / max(doing.total, 1)  # type: ignore[misc]
         self._set(self._step_text, tables.step(snapshot, self._finished))
 
     def _draw_faults(self, snapshot: Snapshot) -> None:

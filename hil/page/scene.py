@@ -11,6 +11,7 @@ import viser
 from numpy.typing import NDArray
 
 from emulator.engine.camera import VIEW_ANGLE, Camera
+from emulator.engine.camera import heading as camera_heading
 from emulator.engine.looks import Kind, Shape
 from hil.page.shown import Health, Pose, Sketch, Snapshot, Vector
 from ident.vehicle.geometry import WHEELS
@@ -40,7 +41,7 @@ _WEIGHT_ARROW: Final = 0.3
 _FORCES_APART: Final = 3.0
 """The arrows of drive forces are drawn so much longer than those of normal forces, which are larger."""
 
-_AZIMUTH, _ELEVATION, _DISTANCE = math.radians(-38.0), math.radians(-36.0), 1.25
+_AZIMUTH, _ELEVATION, _DISTANCE = math.radians(-38.0), math.radians(-36.0), 2.3
 
 
 def _wxyz(orientation: tuple[float, ...]) -> tuple[float, float, float, float]:
@@ -56,6 +57,7 @@ def _about_y(angle: float) -> tuple[float, float, float, float]:
     return math.cos(angle / 2), 0.0, math.sin(angle / 2), 0.0
 
 
+_UP: Final = np.array((0.0, 0.0, 1.0))
 _LYING: Final = (math.cos(math.pi / 4), math.sin(math.pi / 4), 0.0, 0.0)
 """Turns the z axis of a cylinder into y."""
 
@@ -88,7 +90,7 @@ class Scene:
             cell_color=(206, 210, 214),
             section_color=(150, 156, 162),
         )
-        scene.add_frame("/world/origin", axes_length=0.5, axes_radius=0.015)
+        scene.add_frame("/world/origin", axes_length=0.3, axes_radius=0.008)
         self._vehicle = scene.add_frame("/vehicle", show_axes=False)
         for number, shape in enumerate(sketch.chassis):
             self._solid(f"/vehicle/body_{number}", shape)
@@ -102,12 +104,22 @@ class Scene:
             for number, shape in enumerate(wheel.wheel):
                 self._solid(f"{at}/wheel/part_{number}", shape)
             above = (wheel.axle[0], wheel.axle[1], 2.6 * wheel.radius)
-            self._labels.append(scene.add_label(f"{at}/name", f"{drive} ({node})", position=above))
+            self._labels.append(
+                scene.add_label(f"{at}/name", f"{drive} ({node})", position=above, anchor="bottom-center")
+            )
         idle = np.zeros((len(WHEELS), 2, 3))
         size = sketch.size / 100
-        thick = {"shaft_radius": 0.4 * size, "head_radius": 0.9 * size, "head_length": 2.0 * size}
-        self._normal = scene.add_arrows("/forces/normal", idle, NORMAL_COLOUR, **thick)
-        self._drive = scene.add_arrows("/forces/drive", idle, DRIVE_COLOUR, **thick)
+        self._normal, self._drive = (
+            scene.add_arrows(
+                f"/forces/{name}",
+                idle,
+                colour,
+                shaft_radius=0.4 * size,
+                head_radius=0.9 * size,
+                head_length=2.0 * size,
+            )
+            for name, colour in (("normal", NORMAL_COLOUR), ("drive", DRIVE_COLOUR))
+        )
         self._path: deque[tuple[float, float, float]] = deque(maxlen=_LONGEST_PATH)
         self._line = scene.add_line_segments(
             "/world/path", np.zeros((1, 2, 3)), _PATH_COLOUR, thickness=0.02, thickness_units="world"
@@ -161,8 +173,7 @@ class Scene:
 
     def _draw_forces(self, pose: Pose, away: NDArray[np.float64]) -> None:
         normal_scale, drive_scale = self.force_scales
-        x, y, z, w = pose.orientation
-        heading = 2 * math.atan2(z, w)
+        heading = camera_heading(pose.orientation)
         normal, drive = [], []
         for index, wheel in enumerate(self._sketch.wheels):
             steered = heading + pose.angles[index]
@@ -170,8 +181,8 @@ class Scene:
             foot = np.array(pose.position) + away + _turned(wheel.corner, heading) + _turned(wheel.axle, steered)
             foot[2] = 0.02
             side = foot + 1.6 * wheel.axle[1] * np.array((-math.sin(steered), math.cos(steered), 0.0))
-            normal.append((side, side + (0.0, 0.0, pose.normal_forces[index] / normal_scale)))
-            top = side + (0.0, 0.0, wheel.radius)
+            normal.append((side, side + pose.normal_forces[index] / normal_scale * _UP))
+            top = side + wheel.radius * _UP
             drive.append((top, top + pose.drive_forces[index] / drive_scale * ahead))
         self._normal.points = np.array(normal, dtype=np.float32)
         self._drive.points = np.array(drive, dtype=np.float32)

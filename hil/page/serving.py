@@ -15,7 +15,7 @@ from typing import Final
 
 import viser
 
-from hil.page.channel import Channel, Closed
+from hil.page.channel import Channel, ClosedError
 from hil.page.panel import Panel
 from hil.page.scene import Scene
 from hil.page.shown import Asked, Failed, Ready, Sketch, Snapshot, Told
@@ -37,13 +37,13 @@ def serve(channel: Channel, host: str, port: int) -> None:
     with contextlib.suppress(OSError):
         os.nice(_POLITENESS)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)
-    with contextlib.redirect_stdout(None), contextlib.suppress(Closed):
+    with contextlib.redirect_stdout(None), contextlib.suppress(ClosedError):
         server = viser.ViserServer(host, port, verbose=False)
         if port not in (0, server.get_port()):
             channel.send(Failed(f"Port {port} of {host} has just been taken by another program."))
             return
         # A tunnel to the outside is nothing that a page on this computer may open, whoever asks.
-        vars(server)["request_share_url"] = lambda *_, **__: None
+        server.__dict__["request_share_url"] = lambda *_, **__: None
         channel.send(Ready(server.get_port()))
         try:
             Drawing(server, channel).run()
@@ -75,7 +75,7 @@ class Drawing:
         """Go on until the loop has gone.
 
         Raises:
-            Closed: it has.
+            ClosedError: it has.
         """
         while True:
             self._channel.wait(_PATIENCE)
@@ -98,7 +98,8 @@ class Drawing:
             self._draw(newest)
 
     def _draw(self, snapshot: Snapshot) -> None:
-        assert self._scene is not None and self._panel is not None
+        assert self._scene is not None
+        assert self._panel is not None
         with self._server.atomic():
             self._scene.draw(snapshot)
         now = self._monotonic()

@@ -10,8 +10,8 @@ from hil.page.scene import COLOURS
 from hil.page.shown import DriveNow, EncoderNow, Health, Sketch, Snapshot
 
 _STYLE = (
-    "<style>.qo{font-size:12px;width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums}"
-    ".qo td,.qo th{padding:2px 4px;text-align:right;white-space:nowrap;border-bottom:1px solid #e3e6e9}"
+    "<style>.qo{font-size:11px;width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums}"
+    ".qo td,.qo th{padding:2px 3px;text-align:right;white-space:nowrap;border-bottom:1px solid #e3e6e9}"
     ".qo td:first-child,.qo th:first-child,.qo .l{text-align:left}.qo th{font-weight:500;color:#667}"
     ".qo .b{color:#fff;border-radius:3px;padding:0 5px}</style>"
 )
@@ -28,11 +28,11 @@ def headline(snapshot: Snapshot, pace: float) -> str:
 
 def nodes(sketch: Sketch, snapshot: Snapshot) -> str:
     """The six nodes."""
-    head = _row(("node", "NMT", "state", "fault", "τ [Nm]", "ω [rad/s]", "I²t"), "th")
+    head = _row(("node", "NMT", "state", "603Fh", "Nm", "rad/s", "I²t"), "th")
     drives = "".join(
         _drive(f"{node} {name}", now) for (name, node), now in zip(sketch.drives, snapshot.drives, strict=True)
     )
-    encoder_head = _row(("", "NMT", "reading [deg]", "error [mdeg]", "", "", ""), "th")
+    encoder_head = _row(("", "", "NMT", "", "deg", "error mdeg", ""), "th")
     encoders = "".join(
         _encoder(f"{node} {name}", now) for (name, node), now in zip(sketch.encoders, snapshot.encoders, strict=True)
     )
@@ -107,7 +107,7 @@ def _drive(name: str, now: DriveNow) -> str:
 
 def _encoder(name: str, now: EncoderNow) -> str:
     error = "–" if math.isnan(now.error) else f"{1e3 * math.degrees(now.error):+.1f}"
-    return _row((name, _badge(now.nmt, now.health), f"{math.degrees(now.angle):+.3f}", error, "", "", ""))
+    return _row((name, "", _badge(now.nmt, now.health), "", f"{math.degrees(now.angle):+.3f}", error, ""))
 
 
 def _badge(text: str, health: Health) -> str:

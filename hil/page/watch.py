@@ -8,8 +8,8 @@ from typing import Final, Protocol
 
 from hil.faults import Fault, FaultKind, parse_fault
 from hil.faults.injector import Injected
-from hil.page.channel import Channel, Closed
-from hil.page.shown import ActiveFault, Action, Asked, Sketch, Snapshot, Told
+from hil.page.channel import Channel, ClosedError
+from hil.page.shown import Action, ActiveFault, Asked, Sketch, Snapshot, Told
 from ident.errors import UserError
 
 PERIOD: Final = 0.04
@@ -93,7 +93,7 @@ class Watch:
     def _try(self, talk: Callable[[], object]) -> None:
         try:
             talk()
-        except Closed:
+        except ClosedError:
             # Whoever drives goes on without it.
             self.gone = True
 

@@ -200,7 +200,7 @@ class DriveApplication:
             self.fail(fault)
 
     def press_stop(self) -> None:
-        """The emergency stop opens the supply of the power stage, which shall stay off (stop category 0, IEC 60204-1)."""
+        """The emergency stop takes the supply of the power stage, which stays off (stop category 0, IEC 60204-1)."""
         self._stopped_outside = True
         self.trip(STOPPED_OUTSIDE)
 
