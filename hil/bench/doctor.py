@@ -47,6 +47,7 @@ class CheckName(enum.StrEnum):
     EXAM = "exam"
     CLUSTER = "cluster"
     VIDEO = "video"
+    WEB = "web"
     COMPILER = "compiler"
     SOCKETCAN = "socketcan"
     CAN_UTILS = "can-utils"

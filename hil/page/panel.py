@@ -69,7 +69,8 @@ class Panel:
         self.plots.take(snapshot)
         self._pace.append((snapshot.wall, snapshot.time))
         doing = snapshot.doing
-        if doing.step and doing.done >= doing.total and doing.step not in self._finished:
+        # An alignment is told as `aligning for STEP, attempt N of M`; steps have one word.
+        if doing.done >= doing.total > 0 and " " not in doing.step and doing.step not in self._finished:
             self._finished.append(doing.step)
 
     def draw(self, snapshot: Snapshot) -> None:
@@ -115,7 +116,7 @@ class Panel:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(_RIGHT)
         curves = gui.add_panel()
-        with curves.add_tab("Curves over simulated time [s]"):
+        with curves.add_tab("Curves, t in s"):
             self.plots = Plots(self._server, self._sketch)
         curves.dock_left()
         curves.set_width(_LEFT)
