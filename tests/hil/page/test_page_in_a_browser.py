@@ -14,10 +14,7 @@ from typing import Any
 import pytest
 
 from hil.bench.control import command
-from hil.bus.clock import FreeRunningClock
 from hil.bus.opening import open_bus
-from hil.master import Master
-from hil.network import load_network
 
 PATIENCE = 120.0
 """Software rendering on a computer that does other things besides [s]."""
@@ -61,19 +58,12 @@ def test_a_fault_injected_on_the_page_is_seen_there_and_the_emergency_stop_stops
 ) -> None:
     bus = f"unix:{tmp_path / 'bus'}"
     control = tmp_path / "bus.control"
-    with running("emulate", "--bus", bus, "--lockstep") as (_, address):
+    with running("emulate", "--bus", bus) as (_, address):
         page, asked = opened(browser, address)
         nodes, faults = page.locator("#qo-nodes"), page.locator("#qo-faults")
-        network = load_network()
-        with open_bus(bus) as bench, Master(bench, FreeRunningClock(), network) as master:
-            master.boot()
-            master.enable()
-            for _ in range(500):
-                master.exchange((0.5,) * 4)
-            until(lambda: nodes.inner_text().count("operation enabled") == 4, page)
-            # The listener that has lost frames would be counted here.
-            assert "lost" in page.locator("#qo-bus").inner_text()
-
+        with open_bus(bus):
+            # Who listens, and has lost how much.
+            until(lambda: "lost" in page.locator("#qo-bus").inner_text(), page)
         page.get_by_label("How").fill("")
         page.get_by_role("button", name="Inject").click()
         until(lambda: "power@drive_fl" in faults.inner_text(), page)
