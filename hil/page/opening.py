@@ -21,7 +21,7 @@ from ident.extras import Extra, require
 LOOPBACK: Final = "127.0.0.1"
 PORT: Final = 8080
 _PROGRAM: Final = "hil.page.serving"
-_PATIENCE: Final = 30.0
+_PATIENCE: Final = 120.0
 """Longest wait for the process of the page [s]."""
 
 _FAREWELL: Final = 2.0
