@@ -50,12 +50,6 @@ def _plots(sketch: Sketch) -> tuple[Curves, ...]:
         ),
         Curves("Wheel speed, 606Ch", "rad/s", drives, lambda now: [drive.speed for drive in now.drives]),
         Curves(
-            "Following error 60F4h at the wheel (position modes)",
-            "deg",
-            drives,
-            lambda now: [math.degrees(drive.position_error) for drive in now.drives],
-        ),
-        Curves(
             "Steering angle, 6004h", "deg", encoders, lambda now: [math.degrees(one.angle) for one in now.encoders], 130
         ),
         Curves(
@@ -64,6 +58,12 @@ def _plots(sketch: Sketch) -> tuple[Curves, ...]:
             encoders,
             lambda now: [1e3 * math.degrees(one.error) for one in now.encoders],
             130,
+        ),
+        Curves(
+            "Following error 60F4h at the wheel (position modes)",
+            "deg",
+            drives,
+            lambda now: [math.degrees(drive.position_error) for drive in now.drives],
         ),
     )
 
