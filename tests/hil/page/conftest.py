@@ -29,7 +29,7 @@ def browser(tmp_path: Path, need: Callable[..., str]) -> Iterator[Any]:
             executable_path=need("chromium"),
             headless=True,
             args=FLAGS,
-            viewport={"width": 1600, "height": 950},
+            viewport={"width": 1300, "height": 700},
             timeout=120_000,
         )
         context.set_default_timeout(120_000)
