@@ -12,7 +12,7 @@ BIN := .venv/bin
 PIP := -m pip --disable-pip-version-check
 WITH_PYBULLET := $(shell $(PYTHON) -c 'import sys; print("yes" if sys.version_info[:2] == (3, 11) else "")')
 EMULATOR := $(if $(WITH_PYBULLET),emulator,mujoco)
-ALL := .[$(if $(WITH_PYBULLET),emulator$(comma)mujoco,mujoco),records,dbc,ziglang,cosim,exam,cluster,video,mcap,test]
+ALL := .[$(if $(WITH_PYBULLET),emulator$(comma)mujoco,mujoco),records,dbc,ziglang,cosim,exam,cluster,video,mcap,web,test]
 
 .PHONY: demo test test-all bench check constraints clean
 

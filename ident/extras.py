@@ -24,6 +24,7 @@ class Extra(enum.StrEnum):
     CLUSTER = "cluster"
     VIDEO = "video"
     MCAP = "mcap"
+    WEB = "web"
 
 
 MODULES: Final[Mapping[Extra, Sequence[str]]] = MappingProxyType(
@@ -38,6 +39,7 @@ MODULES: Final[Mapping[Extra, Sequence[str]]] = MappingProxyType(
         Extra.CLUSTER: ("distributed",),
         Extra.VIDEO: ("av", "PIL"),
         Extra.MCAP: ("mcap", "zstandard", "lz4"),
+        Extra.WEB: ("viser",),
     }
 )
 """What an extra brings, by the names that are imported."""
@@ -54,6 +56,7 @@ PURPOSES: Final[Mapping[Extra, str]] = MappingProxyType(
         Extra.CLUSTER: "exam --scheduler",
         Extra.VIDEO: "demo, campaign and emulate with --video",
         Extra.MCAP: "MCAP records and logs: convert, campaign --format .mcap",
+        Extra.WEB: "campaign and emulate with --web",
     }
 )
 """What an extra is for, in commands and options."""

@@ -32,16 +32,25 @@ from quasiomni.options import (
     read_simulator,
     tell_native,
 )
+from quasiomni.paging import Told, paging, watching_bench
 from quasiomni.showing import HumanOperator, bars, say
 
 if TYPE_CHECKING:
+    from hil.page.opening import Address
     from hil.video.film import Video
 
 
 def drive_on_emulator(
-    run: Run, order: Order, effects: Sequence[Effect], gui: bool, film: Video | None, *, force: bool = False
+    run: Run,
+    order: Order,
+    effects: Sequence[Effect],
+    gui: bool,
+    film: Video | None,
+    *,
+    force: bool = False,
+    page: Address | None = None,
 ) -> None:
-    """On the emulated vehicle, with a video or without.
+    """On the emulated vehicle, with a video or without, with a page or without.
 
     Raises:
         UserError: the run was driven on something else, or cannot be driven.
@@ -54,14 +63,25 @@ def drive_on_emulator(
     engine = choose_engine(run.engine) if order.resume else run.engine
     network, simulator = run.network.path, read_simulator(run.simulator, force=force)
     _say_assumed(emulation.assumed(run.emulated, network, simulator))
-    with (
-        drawing(film) as video,
-        emulation.bench(
-            run.emulated, run.seed, gui, network, effects, engine=engine, video=video, simulator=simulator
-        ) as bench,
-        _stop_is_no_error(order.out),
-    ):
-        _drive(run, order, bench.bus, bench.clock, bench.operator, film=film)
+    told = Told()
+    with paging(page) as opened:
+        begin = watching_bench(opened, str(order.out), told, run.network)
+        with (
+            drawing(film) as video,
+            emulation.bench(
+                run.emulated,
+                run.seed,
+                gui,
+                network,
+                effects,
+                engine=engine,
+                video=video,
+                simulator=simulator,
+                begin=begin,
+            ) as bench,
+            _stop_is_no_error(order.out),
+        ):
+            _drive(run, order, bench.bus, bench.clock, bench.operator, film=film, told=told)
 
 
 def drive_on_fmu(run: Run, order: Order, prototype: str, fmu: Path) -> None:
@@ -110,6 +130,7 @@ def _drive(
     *,
     lockstep: bool = False,
     film: Video | None = None,
+    told: Told | None = None,
 ) -> None:
     """Check the network, ask, and only then move; exit code 1 where the answer is no."""
     with driving(run.folder.path):
@@ -127,6 +148,8 @@ def _drive(
             raise typer.Exit(code=1)
         with bars() as shown:
             progress = captioned(film, _bar_per_step(shown))
+            if told is not None:
+                told.follow, progress = progress, told
             overruns = drive_run(run, order, bus, clock, operator, progress, lockstep=lockstep)
     if overruns:
         console.print(f"{overruns} cycles began late: close other programs on this computer.", style="yellow")

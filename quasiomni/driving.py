@@ -41,6 +41,7 @@ from quasiomni.options import (
     read_simulator,
     truth_of,
 )
+from quasiomni.paging import LOOPBACK, PORT, WebHostOption, WebOption, WebPortOption, plan_page
 from quasiomni.showing import bar, stages
 
 if TYPE_CHECKING:
@@ -110,6 +111,9 @@ def campaign(
     gui: GuiOption = False,
     video: VideoOption = None,
     video_rate: VideoRateOption = VIDEO_RATE,
+    web: WebOption = False,
+    web_host: WebHostOption = LOOPBACK,
+    web_port: WebPortOption = PORT,
 ) -> None:
     """Drive the identification steps and record every frame; on the emulator, or with --bus on a real vehicle.
 
@@ -123,8 +127,8 @@ def campaign(
         steps = _diagnostic_steps(skip or (), payload)
     inertia = known_inertia(b_w, b_w_std)
     effects, fmu = parse_effects(effect), parse_plant(plant, force=force)
-    _refuse_two_vehicles(bus, fmu, effects, engine, video, simulator)
-    film = plan_video(video, video_rate, AT_REST)
+    _refuse_two_vehicles(bus, fmu, effects, engine, video, simulator, web)
+    film, page = plan_video(video, video_rate, AT_REST), plan_page(web, web_host, web_port)
     read_simulator(simulator, force=force)
     if log_format is LogFormat.MF4:
         require(Extra.RECORDS, "--format .mf4", ("asammdf",))
@@ -152,7 +156,7 @@ def campaign(
         same = not resume or carries_vehicle(run.folder, find_data_file("ident.vehicle", vehicle))
         drive_on_fmu(run, order, vehicle if same else str(run.folder.vehicle), fmu)
     elif bus is None:
-        drive_on_emulator(run, order, effects, gui, film, force=force)
+        drive_on_emulator(run, order, effects, gui, film, force=force, page=page)
     else:
         drive_on_bus(run, order, bus, ask=not yes, lockstep=lockstep)
     show_next(f"quasiomni identify {out}")
@@ -170,15 +174,16 @@ def _refuse_two_vehicles(
     engine: EngineName | None,
     video: Path | None,
     simulator: Path | None,
+    web: bool,
 ) -> None:
-    if bus is not None and (effects or fmu or engine or video or simulator):
+    if bus is not None and (effects or fmu or engine or video or simulator or web):
         raise UserError(
-            "--effect, --engine, --from, --plant and --video are of the emulator, and --bus names another vehicle.",
+            "--effect, --engine, --from, --plant, --video, --web are of the emulator, and --bus names another vehicle.",
             "Leave one of them out.",
         )
-    if fmu is not None and (engine or video or simulator):
+    if fmu is not None and (engine or video or simulator or web):
         raise UserError(
-            "--plant takes the place of the emulated vehicle that --engine, --from and --video are of.",
+            "--plant takes the place of the emulated vehicle that --engine, --from, --video and --web are of.",
             "Leave one of them out.",
         )
 

@@ -16,6 +16,7 @@ from rich.text import Text
 from hil.bench.control import ControlServer, Injection, control_path
 from hil.bus.clock import WallClock
 from hil.bus.report import ListenerReport
+from hil.bus.traffic import Traffic, heard_by
 from hil.bus.unix import UnixHub
 from hil.campaign.folder import network_file_of
 from hil.network import load_network
@@ -38,6 +39,17 @@ from quasiomni.options import (
     parse_plant,
     read_simulator,
     tell_native,
+)
+from quasiomni.paging import (
+    LOOPBACK,
+    PORT,
+    WebHostOption,
+    WebOption,
+    WebPortOption,
+    paging,
+    plan_page,
+    say_where,
+    watching,
 )
 from quasiomni.scenarios import JsonOption, JunitOption, ScenarioOption, Stand, WatchedServer, open_scenario
 
@@ -83,10 +95,14 @@ def emulate(
     gui: GuiOption = False,
     video: VideoOption = None,
     video_rate: VideoRateOption = VIDEO_RATE,
+    web: WebOption = False,
+    web_host: WebHostOption = LOOPBACK,
+    web_port: WebPortOption = PORT,
 ) -> None:
     """Serve the emulated prototype on a CAN bus, for masters in other processes. Stop it with Ctrl-C."""
     film = plan_video(video, video_rate, bus)
     script = open_scenario(context, scenario, (junit, json))
+    address = plan_page(web, web_host, web_port)
     if plant is not None and simulator is not None:
         raise UserError("--from makes an emulated vehicle, --plant takes its place.", "Leave one of them out.")
     fmu, model = parse_plant(plant, force=force), read_simulator(simulator, force=force)
@@ -97,6 +113,11 @@ def emulate(
         prototype, network, seed = script.bench(prototype, network, seed)
         stand = script.stand(stand)
     if script is not None and script.drives_itself:
+        if address is not None:
+            raise UserError(
+                "A scenario with set-points drives in simulated time, which no page can follow.",
+                "Leave --web out, or let a master drive and have the scenario watch.",
+            )
         effects = parse_effects(effect)
         script.drive(prototype, network, seed, chosen, effects, model, faults, delays=bit_times, gui=gui)
         return
@@ -104,6 +125,7 @@ def emulate(
     end = None if duration is None else time.monotonic() + duration
     tell_native(fmu)
     with (
+        paging(address) as page,
         drawing(film) as drawn,
         emulation.vehicle(
             prototype, seed, gui, network_file, parse_effects(effect), fmu, chosen, drawn, model
@@ -118,6 +140,7 @@ def emulate(
         served_as, pace = plant or simulator or prototype, "in lockstep" if lockstep else "in real time"
         console.print(f"{served_as} is up on {bus}, {pace}. Ctrl-C ends it.")
         watched = None if script is None else script.watch(vehicle, load_network(network_file))
+        clients, traffic = partial(_clients, opened), Traffic() if page is not None else None
         server = emulation.server(
             vehicle,
             opened,
@@ -127,12 +150,17 @@ def emulate(
             seed=seed,
             delays=bit_times,
             storage=storage,
-            hear=None if watched is None else watched.hear,
+            hear=heard_by([one.hear for one in (watched, traffic) if one is not None]),
         )
         for one in faults:
             server.faults.add(one)
-        with _commands(control, bus, server.faults, partial(_clients, opened)) as poll:
-            _serve(server, poll, end, watched)
+        attend: Callable[[], None] = _nobody_watches
+        if page is not None and traffic is not None:
+            shown = emulation.complete_network(prototype, network_file, model)
+            attend = watching().watch_server(page, str(served_as), vehicle, server, shown, traffic, clients).attend
+            say_where(page)
+        with _commands(control, bus, server.faults, clients) as poll:
+            _serve(server, (attend, poll), end, watched)
         _say_who_has_lost_frames(opened)
     served = server.report
     console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
@@ -140,17 +168,24 @@ def emulate(
         script.end(watched.report())
 
 
-def _serve(server: VehicleServer, poll: Callable[[], None], end: float | None, watched: WatchedServer | None) -> None:
-    """Serve until Ctrl-C, an instant of the monotonic clock [s], or the end of a scenario."""
+def _serve(
+    server: VehicleServer, between: Sequence[Callable[[], None]], end: float | None, watched: WatchedServer | None
+) -> None:
+    """Serve until Ctrl-C, an instant of the monotonic clock [s], or the end of a scenario; `between` is asked often."""
     if watched is not None:
         watched.served_by(server)
 
     def stop() -> bool:
-        poll()
+        for each in between:
+            each()
         return (end is not None and time.monotonic() > end) or (watched is not None and watched.over())
 
     with contextlib.suppress(KeyboardInterrupt):
         server.serve(stop)
+
+
+def _nobody_watches() -> None:
+    """There is no page."""
 
 
 def _say_who_has_lost_frames(bus: can.BusABC) -> None:

@@ -39,6 +39,7 @@ class ErrorCode(IntEnum):
     SYNC_LENGTH = 0x8240
     RPDO_TIMEOUT = 0x8250
     FOLLOWING_ERROR = 0x8611
+    EXTERNAL = 0x9000
 
 
 class ErrorRegister(IntFlag):

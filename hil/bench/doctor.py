@@ -48,6 +48,7 @@ class CheckName(enum.StrEnum):
     CLUSTER = "cluster"
     VIDEO = "video"
     MCAP = "mcap"
+    WEB = "web"
     COMPILER = "compiler"
     SOCKETCAN = "socketcan"
     CAN_UTILS = "can-utils"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +15,11 @@ from emulator.firmware.hardware import VehicleHardware
 from emulator.firmware.storage import FolderMemory
 from emulator.vehicle import EmulatedVehicle
 from hil.bench.lockstep import LockstepBench
-from hil.bench.serving import Hear, VehicleServer
+from hil.bench.serving import VehicleServer
 from hil.bench.simulators import Simulator, load_simulated, naming
 from hil.bus.clock import Clock
 from hil.bus.opening import open_served_bus
+from hil.bus.traffic import Hear
 from hil.cosimulation.plant import FmuVehicle
 from hil.faults import Fault, parse_fault, parse_script
 from hil.faults.devices import Slippery
@@ -87,6 +88,15 @@ def assumed(prototype: str, network: Path, simulator: Simulator | None = None) -
     return load_simulated(prototype, network, simulator).assumed
 
 
+def complete_network(prototype: str, network: Path, simulator: Simulator | None = None) -> Network:
+    """The network of an emulated vehicle, with what its vehicle file owns.
+
+    Raises:
+        DataFileError: a file is missing or malformed, or two places disagree.
+    """
+    return load_simulated(prototype, network, simulator).network
+
+
 @contextmanager
 def vehicle(
     prototype: str,
@@ -137,6 +147,10 @@ def vehicle(
         yield plant
 
 
+def _leave_alone(_vehicle: Plant, _bench: LockstepBench) -> None:
+    """Nobody watches."""
+
+
 @contextmanager
 def bench(
     prototype: str,
@@ -148,12 +162,14 @@ def bench(
     engine: EngineName | None = None,
     video: Video | None = None,
     simulator: Simulator | None = None,
+    begin: Callable[[Plant, LockstepBench], object] = _leave_alone,
 ) -> Iterator[Bench]:
-    """What `vehicle` gives, behind an in-process bus in lockstep."""
+    """What `vehicle` gives, behind an in-process bus in lockstep; `begin` is called with both before anything moves."""
     with (
         vehicle(prototype, seed, gui, network, effects, fmu, engine, video, simulator) as emulated,
-        LockstepBench(emulated, network) as lockstep,
+        LockstepBench(emulated, network, ground=emulated, seed=seed) as lockstep,
     ):
+        begin(emulated, lockstep)
         yield Bench(lockstep.bus, lockstep.clock, BenchOperator(emulated))
 
 

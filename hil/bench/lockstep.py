@@ -79,6 +79,10 @@ class LockstepBench:
         """Call `hear` with a copy of every frame, as it passes."""
         self._hub.listen(hear)
 
+    def attend(self, call: Callable[[], None]) -> None:
+        """Call `call` before every move of time: the nodes may be looked at then, and changed."""
+        self._hub.attend(call)
+
     @property
     def load(self) -> BusLoad:
         """How busy the bus was."""

@@ -18,6 +18,7 @@ from emulator.firmware.storage import Memory
 from hil.bus.clock import Clock
 from hil.bus.frame_kinds import ERROR_FRAME, EXTENDED, REMOTE, STANDARD_MASK, device_frame
 from hil.bus.realtime import steady_memory
+from hil.bus.traffic import Hear
 from hil.bus.unix import UnixHub
 from hil.bus.wire import Wire
 from hil.bus.wired import Devices, WiredDevices
@@ -51,10 +52,6 @@ class ServingReport:
     syncs: int = 0
     overruns: int = 0
     worst_lag: float = 0.0
-
-
-Hear = Callable[[int, bytes], None]
-"""Called with identifier, with the flags of `can_frame`, and data of a frame."""
 
 
 class _Port(Protocol):

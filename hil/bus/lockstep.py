@@ -60,6 +60,7 @@ class LockstepHub:
         self._devices: Devices | None = None
         self._wired: WiredDevices | None = None
         self._last_sync: float | None = None
+        self._attend: Callable[[], None] | None = None
         self.clock = SimulatedClock(self._advance_devices)
 
     @property
@@ -83,6 +84,10 @@ class LockstepHub:
     def listen(self, hear: Callable[[can.Message], None]) -> None:
         """Call `hear` with a copy of every frame, as it passes; it must not touch the bus."""
         self._endpoints.append(_Listener(hear))
+
+    def attend(self, call: Callable[[], None]) -> None:
+        """Call `call` before every move of time."""
+        self._attend = call
 
     def leave(self, bus: LockstepBus) -> None:
         """Take an endpoint off the bus."""
@@ -152,6 +157,8 @@ class LockstepHub:
         self._last_sync = self.clock.now()
 
     def _advance_devices(self, instant: float) -> None:
+        if self._attend is not None:
+            self._attend()
         if self._devices is not None:
             self._devices.advance(instant)
 

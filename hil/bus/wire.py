@@ -60,6 +60,11 @@ class BusLoad:
         self.longest_wait = 0.0
 
     @property
+    def bits(self) -> int:
+        """Bit times of all frames, their stuff bits counted."""
+        return self._bits
+
+    @property
     def mean(self) -> float:
         """Load from the first frame to the last [-]."""
         if self._begin is None:

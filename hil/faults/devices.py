@@ -155,6 +155,25 @@ def _friction(fault: Fault, reach: Reach) -> Begin:
     return begin
 
 
+def _estop(fault: Fault, reach: Reach) -> Begin:
+    nodes = reach.places.vehicle(fault.place)
+
+    def drives() -> list[DriveApplication]:
+        applications = (reach.devices.nodes[node].application for node in nodes)
+        return [one for one in applications if isinstance(one, DriveApplication)]
+
+    def begin() -> End:
+        for drive in drives():
+            drive.press_stop()
+        return end
+
+    def end() -> None:
+        for drive in drives():
+            drive.release_stop()
+
+    return begin
+
+
 def _nothing() -> None:
     """A fault that leaves nothing behind to be ended."""
 
@@ -167,5 +186,6 @@ PREPARATIONS: Final[Mapping[FaultKind, Callable[[Fault, Reach], Begin]]] = {
     FaultKind.STUCK: _stuck,
     FaultKind.JUMP: _jump,
     FaultKind.FRICTION: _friction,
+    FaultKind.ESTOP: _estop,
 }
 """The kinds that act on devices; names are looked up when a fault is injected, not when it begins."""

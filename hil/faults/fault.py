@@ -34,6 +34,7 @@ class FaultKind(StrEnum):
     STUCK = "stuck"
     JUMP = "jump"
     FRICTION = "friction"
+    ESTOP = "estop"
 
 
 class Target(StrEnum):
@@ -45,6 +46,7 @@ class Target(StrEnum):
     NODE = "a node"
     DRIVE = "a drive"
     MASTER = "`master`"
+    VEHICLE = "`vehicle`"
     GROUND = "`floor`, or a wheel (wheel_fl, wheel_rl, wheel_fr, wheel_rr)"
 
 
@@ -126,6 +128,9 @@ SPECIFICATIONS: Final[Mapping[FaultKind, Specification]] = {
         "the ground is slippery",
         {"value": Parameter(0.1, 0.0, 2.0, "coefficient of friction between tyre and floor")},
     ),
+    FaultKind.ESTOP: Specification(
+        Target.VEHICLE, "the emergency stop is pressed: no drive has power until it is released (EMCY 9000h)"
+    ),
 }
 """Everything that can be injected; the parser, the help and the tests walk this table."""
 
@@ -176,7 +181,7 @@ class Fault:
 
 
 _ALWAYS: Final = {("from", 0.0), ("to", math.inf)}
-_DEFAULT_PLACES: Final = {FaultKind.DEATH: "master", FaultKind.FRICTION: "floor"}
+_DEFAULT_PLACES: Final = {FaultKind.DEATH: "master", FaultKind.FRICTION: "floor", FaultKind.ESTOP: "vehicle"}
 
 
 def parse_fault(text: str) -> Fault:

@@ -13,6 +13,7 @@ from ident.vehicle.geometry import WHEELS
 MASTER = "master"
 ALL = "all"
 FLOOR = "floor"
+VEHICLE = "vehicle"
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,16 @@ class Places:
         if node_id not in drives:
             raise _no_place(name, list(drives.values()))
         return node_id
+
+    def vehicle(self, name: str) -> tuple[int, ...]:
+        """The ids of the drives of a whole vehicle.
+
+        Raises:
+            FaultError: it is none.
+        """
+        if name != VEHICLE:
+            raise _no_place(name, [VEHICLE])
+        return tuple(node.node_id for node in self.network.drives)
 
     def selection(self, fault: Fault) -> Selection:
         """The frames that a fault of frames is about.

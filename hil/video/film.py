@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from emulator.as_built import AsBuilt
 from emulator.drive import Drive
 from emulator.encoder import Encoder
+from emulator.engine.protocol import Engine
 from emulator.vehicle import EmulatedVehicle
 
 _TOLERANCE: Final = 1e-6
@@ -74,6 +76,7 @@ class FilmedVehicle:
 
     Attributes:
         drives, encoders: the vehicle's own.
+        engine, built: the vehicle's own.
         stills: so far; one at the beginning.
     """
 
@@ -82,6 +85,8 @@ class FilmedVehicle:
 
     def __init__(self, vehicle: EmulatedVehicle, rate: int, caption: Caption) -> None:
         self.drives, self.encoders = vehicle.drives, vehicle.encoders
+        self.engine: Engine = vehicle.engine
+        self.built: AsBuilt = vehicle.built
         self.stills: list[Still] = []
         self._vehicle = vehicle
         self._rate = rate

@@ -44,6 +44,8 @@ CASES = {
     "campaign with a video": ("PIL", "video", ["campaign", "--out", "OUT", "--video", "OUT.mp4"]),
     "convert to MCAP": ("mcap", "mcap", ["convert", "record.csv", "--out", "OUT.mcap"]),
     "emulate with a video": ("av", "video", ["emulate", "--bus", "unix:OUT", "--video", "OUT.mp4"]),
+    "campaign with a page": ("viser", "web", ["campaign", "--out", "OUT", "--web"]),
+    "emulate with a page": ("viser", "web", ["emulate", "--bus", "unix:OUT", "--web"]),
     "cosim": ("fmpy", "cosim", ["cosim", "x.fmu", "--record", "x.csv"]),
     "identify from MF4": ("asammdf", "records", ["identify", "x.csv", "x.mf4"]),
     "diagnose from Parquet": ("pyarrow", "records", ["diagnose", "x.csv", "--confirm", "x.parquet"]),

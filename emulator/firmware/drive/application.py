@@ -12,6 +12,7 @@ from emulator.firmware.drive.faults import (
     NOT_OPERATIONAL,
     OF_TRIP,
     SETPOINTS_MISSING,
+    STOPPED_OUTSIDE,
     Fault,
 )
 from emulator.firmware.drive.modes import HALTING_MODES, TORQUE_MODES, Mode, Motion
@@ -48,6 +49,9 @@ _DEFERRED: Mapping[int, tuple[int, Mapping[int, StopKind]]] = {
     8: (0x605B, SHUTDOWN_OPTIONS),
 }
 """Transitions that a ramp may come before -> option code."""
+
+_POWERING = (3, 4, 15, 16)
+"""Transitions towards power, and out of a fault: none while the emergency stop is pressed."""
 
 
 class DriveApplication:
@@ -88,6 +92,7 @@ class DriveApplication:
         self.statusword = 0
         self._halted = False
         self._found_at_boot: Fault | None = None
+        self._stopped_outside = False
         hardware.watch(self._tripped)
         bind(self, node.object_dictionary)
 
@@ -194,6 +199,15 @@ class DriveApplication:
         else:
             self.fail(fault)
 
+    def press_stop(self) -> None:
+        """The emergency stop takes the supply of the power stage, which stays off (stop category 0, IEC 60204-1)."""
+        self._stopped_outside = True
+        self.trip(STOPPED_OUTSIDE)
+
+    def release_stop(self) -> None:
+        """The power may be had again; the fault stays until the master resets it."""
+        self._stopped_outside = False
+
     def _option(self, index: int) -> int:
         return self._node.object_dictionary.value(index)
 
@@ -214,6 +228,8 @@ class DriveApplication:
 
     def _ready(self, number: int) -> bool:
         """Whether a transition may be taken now; one that a ramp comes before is taken at the end of the ramp."""
+        if self._stopped_outside and number in _POWERING:
+            return False
         if number == 16:
             return QUICK_STOP_OPTIONS[self._option(0x605A)].stays
         if number == 15:

@@ -33,6 +33,8 @@ CONNECTION_LOST: Final = Fault(ErrorCode.HEARTBEAT, _R.COMMUNICATION)
 NOT_OPERATIONAL: Final = Fault(_COMMUNICATION, _R.COMMUNICATION)
 SETPOINTS_MISSING: Final = Fault(ErrorCode.RPDO_TIMEOUT, _R.COMMUNICATION)
 FOLLOWING_ERROR: Final = Fault(ErrorCode.FOLLOWING_ERROR, _R.DEVICE_PROFILE)
+STOPPED_OUTSIDE: Final = Fault(ErrorCode.EXTERNAL, _R.GENERIC, fatal=True)
+"""The emergency stop has opened the supply of the power stage."""
 
 OF_TRIP: Final[Mapping[Trip, Fault]] = {
     Trip.OVER_CURRENT: Fault(ErrorCode.OVER_CURRENT, _R.CURRENT, fatal=True),

@@ -47,6 +47,33 @@ def test_a_drive_without_supply_carries_no_torque(network) -> None:
         assert wheels.drives[1].torque == 0.0
 
 
+def test_the_emergency_stop_takes_all_power_and_keeps_it_until_it_is_released(network) -> None:
+    wheels = Flywheels()
+    with LockstepBench(wheels) as bench:
+        emergencies: list[bytes] = []
+        bench.listen(lambda frame: emergencies.append(bytes(frame.data[:3])) if frame.arbitration_id == 0x081 else None)
+        master = Master(bench.bus, bench.clock, network)
+        master.boot()
+        master.enable()
+        for _ in range(10):
+            master.exchange((0.5,) * 4)
+        pressed = bench.faults.add("estop")
+        assert [drive.enabled for drive in wheels.drives] == [False] * 4
+        assert emergencies == [b"\x00\x90\x01"]
+        with pytest.raises(BusError):
+            master.enable()
+        assert [drive.enabled for drive in wheels.drives] == [False] * 4
+        # Not even a reset of the nodes gives the power back.
+        master.boot()
+        with pytest.raises(BusError):
+            master.enable()
+        bench.faults.remove(pressed)
+        assert [drive.enabled for drive in wheels.drives] == [False] * 4
+        master.boot()
+        master.enable()
+        assert [drive.enabled for drive in wheels.drives] == [True] * 4
+
+
 def test_a_node_that_is_bus_off_leaves_error_frames_and_comes_back_with_emergency_8140(sight) -> None:
     sight.bench.faults.add("bus_off@encoder_left:to=0.2s")
     assert sum(frame.is_error_frame for frame in sight.frames) == 256 // 8
@@ -213,6 +240,7 @@ PLACES = {
     Target.NODE: ["drive_rr", "encoder_left", "node2"],
     Target.DRIVE: ["drive_fl", "node4"],
     Target.MASTER: ["master"],
+    Target.VEHICLE: ["vehicle"],
     Target.GROUND: ["floor", "wheel_fl"],
 }
 

@@ -1,0 +1,121 @@
+"""The page in a real browser: what it shows is what happens, and what is asked on it happens."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hil.bench.control import command
+from hil.bus.opening import open_bus
+
+PATIENCE = 120.0
+"""Software rendering on a computer that does other things besides [s]."""
+
+
+@contextmanager
+def running(*words: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A command with a page, and the address that it tells."""
+    command = [sys.executable, "-m", "quasiomni", *words, "--web", "--web-port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        try:
+            assert process.stdout is not None
+            said = ""
+            while (found := re.search(r"The page is (\S+)", said)) is None:
+                line = process.stdout.readline()
+                assert line, said
+                said += line
+            yield process, found.group(1)
+        finally:
+            process.kill()
+
+
+def until(holds: Callable[[], bool], page: Any) -> None:
+    end = time.monotonic() + PATIENCE
+    while not holds():
+        assert time.monotonic() < end
+        page.wait_for_timeout(100)
+
+
+def opened(browser: Any, address: str) -> tuple[Any, list[str]]:
+    """The page at an address once the nodes are shown, and everything that it has asked for."""
+    page, asked = browser.new_page(), []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(address)
+    page.wait_for_selector("#qo-nodes", state="attached")
+    return page, asked
+
+
+def test_a_fault_injected_on_the_page_is_seen_there_and_the_emergency_stop_stops_the_vehicle(
+    tmp_path: Path, browser: Any
+) -> None:
+    bus = f"unix:{tmp_path / 'bus'}"
+    control = tmp_path / "bus.control"
+    with running("emulate", "--bus", bus) as (_, address):
+        page, asked = opened(browser, address)
+        nodes, faults = page.locator("#qo-nodes"), page.locator("#qo-faults")
+        with open_bus(bus):
+            # Who listens, and has lost how much.
+            until(lambda: "lost" in page.locator("#qo-bus").inner_text(), page)
+        page.get_by_label("How").fill("")
+        page.get_by_role("button", name="Inject").click()
+        until(lambda: "power@drive_fl" in faults.inner_text(), page)
+        until(lambda: "no supply" in nodes.inner_text(), page)
+        assert "power@drive_fl" in command(control, "list")
+        page.get_by_text("all", exact=True).click()
+        until(lambda: "no supply" not in nodes.inner_text(), page)
+        assert command(control, "list") == "no faults"
+
+        page.get_by_role("button", name="EMERGENCY STOP").click()
+        headline = page.locator("#qo-headline")
+        until(lambda: "EMERGENCY STOP" in headline.inner_text(), page)
+        until(lambda: nodes.inner_text().count("9000h") == 4, page)
+        assert "estop@vehicle" in command(control, "list")
+        page.get_by_role("button", name="Release the emergency stop").click()
+        until(lambda: "EMERGENCY STOP" not in headline.inner_text(), page)
+        assert command(control, "list") == "no faults"
+        # Released is not restarted: the faults are for the master to reset.
+        assert nodes.inner_text().count("9000h") == 4
+        assert all(url.startswith((address, f"blob:{address}")) for url in asked)
+
+
+def test_a_fault_that_cannot_be_is_refused_on_the_page(tmp_path: Path, browser: Any) -> None:
+    with running("emulate", "--bus", f"unix:{tmp_path / 'bus'}") as (_, address):
+        page, _ = opened(browser, address)
+        page.get_by_label("How").fill("speed=3")
+        page.get_by_role("button", name="Inject").click()
+        page.get_by_text("power takes no 'speed'").wait_for()
+        assert command(tmp_path / "bus.control", "list") == "no faults"
+
+
+def test_a_campaign_shows_its_step_and_an_emergency_stop_ends_it(tmp_path: Path, browser: Any) -> None:
+    words = ("campaign", "--out", str(tmp_path / "run"), "--skip", "wheel_lifted", "--skip", "lane_change")
+    with running(*words) as (process, address):
+        page, _ = opened(browser, address)
+        page.get_by_text(re.compile(r"\d+ of \d+ cycles")).wait_for()
+        page.get_by_role("button", name="EMERGENCY STOP").click()
+        assert process.stdout is not None
+        said = process.stdout.read()
+        assert process.wait() == 2
+        assert "9000" in said
+        assert "Traceback" not in said
+
+
+@pytest.mark.slow
+def test_the_first_picture_is_there_three_seconds_after_the_command(tmp_path: Path, browser: Any) -> None:
+    """Up to the first frame that has been drawn; the browser is open already."""
+    page = browser.new_page()
+    begin = time.monotonic()
+    with running("emulate", "--bus", f"unix:{tmp_path / 'bus'}") as (_, address):
+        page.goto(address)
+        page.wait_for_selector("#qo-nodes", state="attached")
+        page.wait_for_function("() => document.querySelector('canvas') !== null")
+        page.evaluate("() => new Promise(requestAnimationFrame)")
+        assert time.monotonic() - begin < 3.0
