@@ -51,10 +51,19 @@ from quasiomni.paging import (
     say_where,
     watching,
 )
-from quasiomni.scenarios import JsonOption, JunitOption, ScenarioOption, Stand, WatchedServer, open_scenario
+from quasiomni.scenarios import (
+    JsonOption,
+    JunitOption,
+    ScenarioOption,
+    ScenarioRun,
+    Stand,
+    WatchedServer,
+    open_scenario,
+)
 
 if TYPE_CHECKING:
     from hil.bench.serving import VehicleServer
+    from hil.page.opening import Address
 
 
 @app.command()
@@ -103,8 +112,7 @@ def emulate(
     film = plan_video(video, video_rate, bus)
     script = open_scenario(context, scenario, (junit, json))
     address = plan_page(web, web_host, web_port)
-    if plant is not None and simulator is not None:
-        raise UserError("--from makes an emulated vehicle, --plant takes its place.", "Leave one of them out.")
+    _refuse_together(plant, simulator, script, address)
     fmu, model = parse_plant(plant, force=force), read_simulator(simulator, force=force)
     chosen = choose_engine(engine) if fmu is None else None
     emulation = load_emulation()
@@ -113,11 +121,6 @@ def emulate(
         prototype, network, seed = script.bench(prototype, network, seed)
         stand = script.stand(stand)
     if script is not None and script.drives_itself:
-        if address is not None:
-            raise UserError(
-                "A scenario with set-points drives in simulated time, which no page can follow.",
-                "Leave --web out, or let a master drive and have the scenario watch.",
-            )
         effects = parse_effects(effect)
         script.drive(prototype, network, seed, chosen, effects, model, faults, delays=bit_times, gui=gui)
         return
@@ -134,9 +137,7 @@ def emulate(
     ):
         if stand is Stand.JACK:
             vehicle.lift()
-        if assumed := emulation.assumed(prototype, network_file, model):
-            command = f"quasiomni check {prototype}"
-            console.print(Text.assemble(f"{len(assumed)} numbers of it are in no file: ", (command, "bold"), "."))
+        _say_what_is_assumed(prototype, len(emulation.assumed(prototype, network_file, model)))
         served_as, pace = plant or simulator or prototype, "in lockstep" if lockstep else "in real time"
         console.print(f"{served_as} is up on {bus}, {pace}. Ctrl-C ends it.")
         watched = None if script is None else script.watch(vehicle, load_network(network_file))
@@ -154,13 +155,14 @@ def emulate(
         )
         for one in faults:
             server.faults.add(one)
-        attend: Callable[[], None] = _nobody_watches
+        between: list[Callable[[], None]] = []
         if page is not None and traffic is not None:
             shown = emulation.complete_network(prototype, network_file, model)
-            attend = watching().watch_server(page, str(served_as), vehicle, server, shown, traffic, clients).attend
+            page_of = watching().watch_server(page, str(served_as), vehicle, server, shown, traffic, clients)
+            between.append(page_of.attend)
             say_where(page)
         with _commands(control, bus, server.faults, clients) as poll:
-            _serve(server, (attend, poll), end, watched)
+            _serve(server, (*between, poll), end, watched)
         _say_who_has_lost_frames(opened)
     served = server.report
     console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
@@ -184,8 +186,23 @@ def _serve(
         server.serve(stop)
 
 
-def _nobody_watches() -> None:
-    """There is no page."""
+def _refuse_together(
+    plant: str | None, simulator: Path | None, script: ScenarioRun | None, address: Address | None
+) -> None:
+    """Options of which each leaves no room for the other."""
+    if plant is not None and simulator is not None:
+        raise UserError("--from makes an emulated vehicle, --plant takes its place.", "Leave one of them out.")
+    if script is not None and script.drives_itself and address is not None:
+        raise UserError(
+            "A scenario with set-points drives in simulated time, which no page can follow.",
+            "Leave --web out, or let a master drive and have the scenario watch.",
+        )
+
+
+def _say_what_is_assumed(prototype: str, count: int) -> None:
+    if count:
+        command = f"quasiomni check {prototype}"
+        console.print(Text.assemble(f"{count} numbers of it are in no file: ", (command, "bold"), "."))
 
 
 def _say_who_has_lost_frames(bus: can.BusABC) -> None:
