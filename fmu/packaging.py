@@ -85,7 +85,7 @@ def build_fmu(
         UserError: a compiler is missing or fails.
     """
     model = make_model(source, order.inputs, order.contacts, order.limited)
-    interface = _interface(source, model, order)
+    interface = fmu_interface(source, model, order)
     token = _token(model, interface, order.version)
     sources = fmu_sources(model, interface, order.version, token)
     libraries = compile_libraries(sources, order.platforms, compiler, progress, cache)
@@ -95,13 +95,13 @@ def build_fmu(
     files = {
         "modelDescription.xml": description,
         **{f"sources/{name}": text for name, text in sources.items()},
-        **_binaries(libraries, order.version),
+        **fmu_binaries(libraries, order.version),
         "sources/CMakeLists.txt": (resources.files("fmu") / "data" / "CMakeLists.txt").read_bytes(),
         **{f"resources/{name}": content for name, content in reference.files().items()},
         **_documentation(source, interface, order, reference),
         **_VERSION_FILES[order.version](order.inputs, units),
     }
-    return _archive(files)
+    return fmu_archive(files)
 
 
 def fmu_sources(model: Model, interface: Interface, version: FmiVersion, token: str) -> dict[str, bytes]:
@@ -110,7 +110,8 @@ def fmu_sources(model: Model, interface: Interface, version: FmiVersion, token: 
     return core | wrapper_sources(interface.table, version, token)
 
 
-def _interface(source: ModelSource, model: Model, order: Order) -> Interface:
+def fmu_interface(source: ModelSource, model: Model, order: Order) -> Interface:
+    """An FMU of the model seen from outside, FMI 3.0 event indicators included."""
     return Interface(
         name=f"quasiomni.{_identifier(source.vehicle.name)}",
         description=f"Identified model of {source.vehicle.name}, {order.inputs} inputs, {order.contacts} contacts",
@@ -150,7 +151,7 @@ def _token(model: Model, interface: Interface, version: FmiVersion) -> str:
     return f"{{{uuid.UUID(bytes=digest.digest()[:16], version=5)}}}"
 
 
-def _binaries(libraries: Mapping[str, bytes], version: FmiVersion) -> dict[str, bytes]:
+def fmu_binaries(libraries: Mapping[str, bytes], version: FmiVersion) -> dict[str, bytes]:
     """FMI 2.0 has one folder for macOS, whose library is then for both processors."""
     if version is FmiVersion.FMI3:
         return {
@@ -169,7 +170,7 @@ def _documentation(source: ModelSource, interface: Interface, order: Order, refe
     python = ".".join(str(part) for part in sys.version_info[:3])
     versions = {"quasiomni": version("quasiomni"), "casadi": version("casadi"), "python": python}
     page = documentation_page(source, interface, order.inputs, reference, versions)
-    files = {"index.html": page.encode(), "licenses/license.txt": _LICENSE.encode(), **source.documents}
+    files = {"index.html": page.encode(), "licenses/license.txt": fmu_license(), **source.documents}
     return {f"documentation/{name}": content for name, content in files.items()}
 
 
@@ -193,7 +194,13 @@ def _picture(name: str) -> bytes:
     return (resources.files("fmu") / "data" / name).read_bytes()
 
 
-def _archive(files: Mapping[str, bytes]) -> bytes:
+def fmu_license() -> bytes:
+    """The licence of the source code, as text."""
+    return _LICENSE.encode()
+
+
+def fmu_archive(files: Mapping[str, bytes]) -> bytes:
+    """A zip archive of files by name; the same files give the same bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted(files):
