@@ -34,7 +34,7 @@ INDICATORS: Final = 4
 _TIME: Final = (1980, 1, 1, 0, 0, 0)
 """Of every file in the archive: the earliest that the format knows."""
 
-_COPYRIGHT: Final = "Whoever identified the vehicle; source code of quasiomni under the licence named"
+COPYRIGHT: Final = "Whoever identified the vehicle; source code of quasiomni under the licence named"
 
 _LICENSE: Final = """The source code of this FMU is part of quasiomni.
 
@@ -117,7 +117,7 @@ def fmu_interface(source: ModelSource, model: Model, order: Order) -> Interface:
         description=f"Identified model of {source.vehicle.name}, {order.inputs} inputs, {order.contacts} contacts",
         version=version("quasiomni"),
         tool=f"quasiomni {version('quasiomni')}",
-        copyright=_COPYRIGHT,
+        copyright=COPYRIGHT,
         license="Apache-2.0",
         table=with_indicators(model.table, INDICATORS),
         dependencies=model.dependencies,

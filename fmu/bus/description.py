@@ -14,7 +14,9 @@ from fmu.variables import Block, Variable
 NETWORK: Final = "CAN"
 """Name of the bus terminal, and first part of the names of its variables."""
 
-RX_DATA, RX_CLOCK, TX_DATA, TX_CLOCK = (f"{NETWORK}.{member}" for member in ("Rx_Data", "Rx_Clock", "Tx_Data", "Tx_Clock"))
+RX_DATA, RX_CLOCK, TX_DATA, TX_CLOCK = (
+    f"{NETWORK}.{member}" for member in ("Rx_Data", "Rx_Clock", "Tx_Data", "Tx_Clock")
+)
 
 TORQUE_NOISE: Final = "noise.torque"
 ENCODER_NOISE: Final = "noise.encoder"

@@ -29,8 +29,8 @@ from ident.plant.contact import Contacts
 from ident.vehicle.geometry import WHEELS
 
 EPSILON: Final = 3e-4
-"""ε of Coulomb friction at the start [rad/s]: how far a held joint creeps is proportional to it, and wheels off straight
-ahead slip, which a campaign would take for friction (docs/fmu.md, "In the loop")."""
+"""ε of Coulomb friction at the start [rad/s]: how far a held joint creeps is proportional to it, and wheels off
+straight ahead slip, which a campaign would take for friction (docs/fmu.md, "In the loop")."""
 
 _INCLUDED: Final = {"fmi3.c": "plant_fmi3.h"}
 """A unit of the plant alone -> the name under which the unit of the bus includes it."""

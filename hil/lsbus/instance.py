@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from fmu.bus.description import RX_CLOCK, RX_DATA, TX_CLOCK, TX_DATA
+from fmu.bus.description import RX_CLOCK, RX_DATA, SEED, TX_CLOCK, TX_DATA
 from hil.cosimulation.instance import FmuError, FmuInstance
 
 _CHANGED: Final = 2
@@ -25,12 +25,14 @@ class BusFmuInstance(FmuInstance):
     Args:
         path: of the FMU.
         start: start values by name.
+        seed: of the noise of its readings.
 
     Raises:
         FmuError: as `FmuInstance`, or the FMU has no bus terminal.
     """
 
-    def __init__(self, path: Path, start: Mapping[str, float]) -> None:
+    def __init__(self, path: Path, start: Mapping[str, float], *, seed: int = 1) -> None:
+        self._seed = seed
         super().__init__(path, start)
         try:
             self._rx, self._rx_clock, self._tx, self._tx_clock = (
@@ -74,13 +76,24 @@ class BusFmuInstance(FmuInstance):
             raise FmuError(f"{self._path} is of FMI 2.0.", "Name an FMU of `quasiomni fmu --bus`.")
         return self._instantiate(event_mode_used=True)
 
+    def _begin(self, start: Mapping[str, float]) -> None:
+        self._call(self._instance.enterInitializationMode)
+        self.write(self.port(list(start)), list(start.values()))
+        if SEED in self._variables:
+            self._call(self._instance.setInt32, [self._variables[SEED]], [self._seed])
+        self._call(self._instance.exitInitializationMode)
+
     def _update(self) -> None:
         self._call(self._instance.updateDiscreteStates)
         self._ask()
 
     def _ask(self) -> None:
         """What the countdown of Tx_Clock says now."""
-        reference, interval, qualifier = (ctypes.c_uint32 * 1)(self._tx_clock), (ctypes.c_double * 1)(), (ctypes.c_int * 1)()
+        reference, interval, qualifier = (
+            (ctypes.c_uint32 * 1)(self._tx_clock),
+            (ctypes.c_double * 1)(),
+            (ctypes.c_int * 1)(),
+        )
         self._call(self._instance.getIntervalDecimal, reference, interval, qualifier)
         if qualifier[0] == _CHANGED:
             self._next = round(self.time + interval[0], 9)

@@ -54,9 +54,7 @@ class CanFrame:
 def transmit(frame: CanFrame) -> bytes:
     """A `CAN Transmit`."""
     size = _TRANSMIT.size + len(frame.data)
-    head = _TRANSMIT.pack(
-        OpCode.CAN_TRANSMIT, size, frame.can_id, frame.extended, frame.remote, len(frame.data)
-    )
+    head = _TRANSMIT.pack(OpCode.CAN_TRANSMIT, size, frame.can_id, frame.extended, frame.remote, len(frame.data))
     return head + frame.data
 
 

@@ -1,4 +1,4 @@
-"""The emulated devices of a vehicle as tables for an FMU: object dictionaries from EDS files, data sheets as they are."""
+"""The emulated devices of a vehicle as tables for an FMU: object dictionaries from EDS files, and data sheets."""
 
 from __future__ import annotations
 
@@ -85,12 +85,12 @@ def _device(eds: Path, kind: DeviceKind) -> BusDevice:
     for (index, subindex, variable), (_, _, shifted) in zip(first.entries(), second.entries(), strict=True):
         if not is_served(kind, index):
             continue
-        access = {"readable": bool(variable.readable), "writable": bool(variable.writable)}
+        readable, writable = bool(variable.readable), bool(variable.writable)
         if not is_numeric(variable.datatype):
-            if variable.writable:
+            if writable:
                 raise _not_in_fmu(eds, index, subindex, "is a text that can be written")
             content = text.encode() if index == STORE_EDS else bytes(variable.value or b"")
-            rows.append(ObjectRow(index, subindex, text=content, **access))
+            rows.append(ObjectRow(index, subindex, text=content, readable=readable))
             continue
         code = STRUCT_CODES.get(variable.datatype, "")
         if code not in _INTEGERS or not code:
@@ -102,6 +102,8 @@ def _device(eds: Path, kind: DeviceKind) -> BusDevice:
                 index,
                 subindex,
                 size=variable.size,
+                readable=readable,
+                writable=writable,
                 signed=code.islower(),
                 receivable=key in first.receivable,
                 transmittable=key in first.transmittable,
@@ -110,7 +112,6 @@ def _device(eds: Path, kind: DeviceKind) -> BusDevice:
                 minimum=variable.minimum,
                 # Bounds of C's longest integer; the firmware compares signed.
                 maximum=min(variable.maximum, 2**63 - 1),
-                **access,
             )
         )
     return BusDevice(kind, tuple(rows), text.encode())

@@ -14,7 +14,6 @@ from fmu.variables import Inputs
 from hil.lsbus.system import vehicle_on_bus
 from hil.network import DEFAULT_NETWORK
 from ident.vehicle.description import load_vehicle
-
 from tests.hil.lsbus.twins import silent_prototype
 
 
@@ -37,7 +36,5 @@ def bus_fmu(source: ModelSource, tmp_path_factory: pytest.TempPathFactory) -> Pa
 def platform(source: ModelSource, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same vehicle alone."""
     path = tmp_path_factory.mktemp("platform") / "platform.fmu"
-    path.write_bytes(
-        build_fmu(source, Order(FmiVersion.FMI3, Inputs.TORQUE, (host_platform(),)), find_compiler())
-    )
+    path.write_bytes(build_fmu(source, Order(FmiVersion.FMI3, Inputs.TORQUE, (host_platform(),)), find_compiler()))
     return path

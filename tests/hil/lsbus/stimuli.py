@@ -94,9 +94,7 @@ def sequences(system: BusSystem, longest: int) -> st.SearchStrategy[list[Stimulu
     """Sequences of what masters do, right and wrong."""
     drives = [node for node in system.nodes if node.name.startswith("drive")]
     objects = [(node.node_id, row) for node in system.nodes for row in system.devices[node.device].objects]
-    writable = [
-        (node, row) for node, row in objects if row.text is None and row.size <= 4 and row.index not in _RISKY
-    ]
+    writable = [(node, row) for node, row in objects if row.text is None and row.size <= 4 and row.index not in _RISKY]
     node_ids = st.sampled_from([node.node_id for node in system.nodes])
     drive_ids = st.sampled_from([node.node_id for node in drives])
     words = st.one_of(
@@ -106,8 +104,11 @@ def sequences(system: BusSystem, longest: int) -> st.SearchStrategy[list[Stimulu
     one = st.one_of(
         st.sampled_from(objects).map(lambda item: read(item[0], item[1].index, item[1].subindex)),
         st.sampled_from(writable).flatmap(lambda item: _writes(*item)),
-        st.builds(nmt, st.sampled_from((START, START, STOP, PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION)),
-                  st.integers(0, 7)),
+        st.builds(
+            nmt,
+            st.sampled_from((START, START, STOP, PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION)),
+            st.integers(0, 7),
+        ),
         st.builds(command, drive_ids, words, torques),
         st.builds(command, drive_ids, words, torques),
         st.just(SYNC),
@@ -115,8 +116,12 @@ def sequences(system: BusSystem, longest: int) -> st.SearchStrategy[list[Stimulu
         st.builds(Remote, st.builds(lambda node, base: node + base, node_ids, st.sampled_from((0x180, 0x280, 0x700)))),
         st.builds(Data, st.builds(lambda node: 0x200 + node, drive_ids), st.binary(max_size=8)),
         st.builds(_segment, node_ids, st.integers(0, 0x1F), st.binary(min_size=7, max_size=7)),
-        st.builds(_raw_sdo, node_ids, st.sampled_from((0x00, 0x20, 0x21, 0x60, 0x70, 0x80, 0xE0, 0xFF)),
-                  st.sampled_from(objects)),
+        st.builds(
+            _raw_sdo,
+            node_ids,
+            st.sampled_from((0x00, 0x20, 0x21, 0x60, 0x70, 0x80, 0xE0, 0xFF)),
+            st.sampled_from(objects),
+        ),
         st.integers(1, 60).map(lambda ms: Wait(ms / 1000)),
         st.integers(1, 3).map(lambda ms: Wait(ms / 1000)),
     )
