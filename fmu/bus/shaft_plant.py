@@ -1,4 +1,4 @@
-"""The plant of a drive alone: the importer has the machine, the FMU has ports for torque, angle and speed of a shaft."""
+"""The plant of a drive alone: whoever imports it has the machine, the FMU has ports for torque, angle and speed."""
 
 from __future__ import annotations
 

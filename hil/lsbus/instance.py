@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from fmu.bus.description import RX_CLOCK, RX_DATA, SEED, TX_CLOCK, TX_DATA
+from fmu.bus.description import FRAMES_LOST, RX_CLOCK, RX_DATA, SEED, TX_CLOCK, TX_DATA
 from hil.cosimulation.instance import FmuError, FmuInstance
 
 _CHANGED: Final = 2
@@ -48,6 +48,11 @@ class BusFmuInstance(FmuInstance):
     def next_tick(self) -> float:
         """When Tx_Clock is to tick [s], infinite where that is not known."""
         return float("inf") if self._next is None else self._next
+
+    @property
+    def lost(self) -> int:
+        """Frames of the devices that found the queue full."""
+        return int(self._call(self._instance.getUInt32, [self._variables[FRAMES_LOST]])[0])
 
     def give(self, operations: bytes) -> None:
         """Put operations into Rx_Data; Rx_Clock ticks."""
