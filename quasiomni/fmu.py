@@ -10,6 +10,7 @@ import numpy as np
 import typer
 from rich.table import Table
 
+from fmu.bus.system import TxClock
 from fmu.description import FmiVersion
 from fmu.packaging import Order
 from fmu.platforms import parse_platforms
@@ -61,6 +62,9 @@ def build(
     drive: Annotated[
         str | None, typer.Option(help="With --bus: one drive alone, with ports for its shaft, e.g. `drive_fl`.")
     ] = None,
+    tx_clock: Annotated[
+        TxClock, typer.Option(help="With --bus: `triggered` for importers that know no `countdown`.")
+    ] = TxClock.COUNTDOWN,
     force: ForceOption = False,
 ) -> None:
     """Package the identified model, with its confirmed effects, as an FMU for co-simulation and model exchange."""
@@ -68,8 +72,8 @@ def build(
     if bus:
         _refuse_of_plants(context)
         from hil.lsbus.export import export_bus_fmu  # needs the emulator's tables, which other FMUs do without
-    elif drive is not None:
-        raise UserError("--drive is of an FMU on a bus.", "Add --bus, or leave it out.")
+    elif drive is not None or tx_clock is not TxClock.COUNTDOWN:
+        raise UserError("--drive and --tx-clock are of an FMU on a bus.", "Add --bus, or leave them out.")
     target = out or run / (f"{drive}.fmu" if drive else "vehicle_on_bus.fmu" if bus else "platform.fmu")
     with bars() as shown:
         task = shown.add_task("compiling", total=None)
@@ -78,7 +82,9 @@ def build(
             shown.update(task, description=f"compiling ({compiler})", completed=done, total=total)
 
         if bus:
-            written = export_bus_fmu(run, target, order.platforms, model, drive=drive, force=force, compiled=compiled)
+            written = export_bus_fmu(
+                run, target, order.platforms, model, drive=drive, tx_clock=tx_clock, force=force, compiled=compiled
+            )
         else:
             written = export_run(run, target, order, model, force=force, compiled=compiled)
     console.print(f"Written: {written.path}, {written.size / 1e3:.0f} kB, in {written.seconds:.1f} s")

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, fromstring
 
-from fmu.bus.system import BusSystem
+from fmu.bus.system import BusSystem, TxClock
 from fmu.description import FmiVersion, document, model_description
 from fmu.interface import MODEL_IDENTIFIER, Interface, number
 from fmu.variables import Block, Variable
@@ -39,6 +39,9 @@ _MAX_SIZE: Final = "16384"
 _LEFT_OUT: Final = (Block.DERIVATIVE, Block.INDICATOR, Block.CALCULATED)
 """Blocks of the plant that only solvers have a use for."""
 
+_CAUSALITY: Final = {TxClock.COUNTDOWN: "input", TxClock.TRIGGERED: "output"}
+"""Of Tx_Clock; a countdown is a wish to whoever makes the ticks."""
+
 _CO_SIMULATION: Final = {
     "canHandleVariableCommunicationStepSize": "true",
     "canGetAndSetFMUState": "true",
@@ -65,11 +68,11 @@ def bus_description(
     variables, structure = _found(root, "ModelVariables"), _found(root, "ModelStructure")
     _adapt(variables, interface, driven)
     first = len(interface.table.variables)
-    _add_terminal_variables(variables, first)
+    _add_terminal_variables(variables, system.tx_clock, first)
     _add_settings(variables, system, first)
     for element in list(structure):
         structure.remove(element)
-    _add_structure(structure, interface, driven, first)
+    _add_structure(structure, interface, driven, first, triggered=system.tx_clock is TxClock.TRIGGERED)
     return document(root)
 
 
@@ -94,7 +97,7 @@ def _adapt(variables: Element, interface: Interface, driven: Collection[str]) ->
         element.attrib.pop("intermediateUpdate", None)
 
 
-def _add_terminal_variables(variables: Element, first: int) -> None:
+def _add_terminal_variables(variables: Element, tx_clock: TxClock, first: int) -> None:
     data = {"variability": "discrete", "mimeType": MIME_TYPE, "maxSize": _MAX_SIZE}
     clock = {"variability": "discrete"}
     received = SubElement(
@@ -121,8 +124,8 @@ def _add_terminal_variables(variables: Element, first: int) -> None:
     SubElement(
         variables,
         "Clock",
-        {"name": TX_CLOCK, "valueReference": str(first + 3), "causality": "input", **clock},
-        intervalVariability="countdown",
+        {"name": TX_CLOCK, "valueReference": str(first + 3), "causality": _CAUSALITY[tx_clock], **clock},
+        intervalVariability=tx_clock.value,
         description="Ticks where a device has something to send or a timer of one is due",
     )
 
@@ -149,18 +152,22 @@ def _add_settings(variables: Element, system: BusSystem, first: int) -> None:
     )
 
 
-def _add_structure(structure: Element, interface: Interface, driven: Collection[str], first: int) -> None:
+def _add_structure(
+    structure: Element, interface: Interface, driven: Collection[str], first: int, *, triggered: bool
+) -> None:
     outputs = [str(row.value_reference) for row in interface.table.variables if _is_output(row, driven)]
     for reference in outputs:
         SubElement(structure, "Output", valueReference=reference)
     SubElement(structure, "Output", valueReference=str(first + 2), dependencies=str(first + 3))
+    if triggered:
+        SubElement(structure, "Output", valueReference=str(first + 3))
     SubElement(structure, "Output", valueReference=str(first + 7))
     calculated = [
         str(row.value_reference)
         for row in interface.table.variables
         if _is_output(row, driven) and (row.start is None or row.name in driven)
     ]
-    for reference in (*calculated, str(first + 7)):
+    for reference in (*calculated, *([str(first + 3)] if triggered else []), str(first + 7)):
         SubElement(structure, "InitialUnknown", valueReference=reference)
 
 

@@ -13,6 +13,15 @@ class DeviceKind(enum.StrEnum):
     ENCODER = "QB_ENCODER"
 
 
+class TxClock(enum.StrEnum):
+    """How an importer learns that frames are to be sent (FMI-LS-BUS, "Tx Clocks")."""
+
+    COUNTDOWN = "countdown"
+    """The instant is told in advance."""
+    TRIGGERED = "triggered"
+    """The clock is found to tick where a step ends: for importers that know no other."""
+
+
 @dataclass(frozen=True)
 class ObjectRow:
     """One entry of an object dictionary.
@@ -134,6 +143,7 @@ class BusSystem:
         gear_ratio: torque of the plant's drive inputs is that of the wheel over this.
         torque_noise: rms of torque readings, of rated torque [-].
         encoder_noise: rms ahead of the rounding to increments [increments].
+        tx_clock: of the bus terminal.
     """
 
     bit_rate: int
@@ -146,6 +156,7 @@ class BusSystem:
     gear_ratio: float
     torque_noise: float
     encoder_noise: float
+    tx_clock: TxClock = TxClock.COUNTDOWN
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
-from fmu.bus.system import BusSystem, ObjectRow, PlantPorts
+from fmu.bus.system import BusSystem, ObjectRow, PlantPorts, TxClock
 
 _FLAGS: Final = {
     "signed": "QB_SIGNED",
@@ -60,6 +60,7 @@ def _sizes(system: BusSystem) -> Mapping[str, str]:
         # An array has at least one element.
         "QB_ENCODERS_MIN": str(max(1, len(system.discs))),
         "QB_PDOS": str(pdos),
+        "QB_TRIGGERED": str(int(system.tx_clock is TxClock.TRIGGERED)),
         "QB_OBJECTS": str(max(len(device.objects) for device in system.devices)),
     }
 

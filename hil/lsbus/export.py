@@ -8,6 +8,7 @@ from pathlib import Path
 
 from fmu.bus.packaging import build_bus_fmu, vehicle_plant
 from fmu.bus.shaft_plant import shaft_plant
+from fmu.bus.system import TxClock
 from fmu.compiling import check_platforms, find_compiler
 from fmu.platforms import Platform
 from hil.bench.prototypes import load_emulated
@@ -24,6 +25,7 @@ def export_bus_fmu(
     model: Path | None = None,
     *,
     drive: str | None = None,
+    tx_clock: TxClock = TxClock.COUNTDOWN,
     force: bool = False,
     compiled: Compiled = unheard,
 ) -> Exported:
@@ -35,6 +37,7 @@ def export_bus_fmu(
         platforms: to build for.
         model: a `parameters.toml` in place of that of the run.
         drive: role of the one drive that it is to be; None: the whole vehicle.
+        tx_clock: of its bus terminal.
         force: take a model that was assessed as unusable.
         compiled: called with the progress.
 
@@ -50,9 +53,9 @@ def export_bus_fmu(
     emulated = load_emulated(opened.emulated if opened.prototype else str(opened.folder.vehicle), network)
     assumed = {"assumed.txt": "".join(f"{line}\n" for line in emulated.assumed).encode()} if emulated.assumed else {}
     if drive is None:
-        plant, system = vehicle_plant(source), vehicle_on_bus(emulated.prototype, network)
+        plant, system = vehicle_plant(source), vehicle_on_bus(emulated.prototype, network, tx_clock)
     else:
-        plant, system = shaft_plant(drive), drive_on_bus(emulated.prototype, network, drive)
+        plant, system = shaft_plant(drive), drive_on_bus(emulated.prototype, network, drive, tx_clock)
     start, done, total = time.monotonic(), count(1), len(platforms)
     compiled(compiler.name, 0, total)
     content = build_bus_fmu(

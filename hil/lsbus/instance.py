@@ -41,6 +41,8 @@ class BusFmuInstance(FmuInstance):
         except FmuError as error:
             self.close()
             raise FmuError(f"{path} has no CAN bus terminal.", "Name an FMU of `quasiomni fmu --bus`.") from error
+        clock = next(row for row in self._description.modelVariables if row.name == TX_CLOCK)
+        self._triggered = clock.causality == "output"
         self._next: float | None = None
         self._ask()
 
@@ -62,7 +64,8 @@ class BusFmuInstance(FmuInstance):
 
     def take(self) -> bytes:
         """Let Tx_Clock tick, and return Tx_Data."""
-        self._call(self._instance.setClock, [self._tx_clock], [True])
+        if not self._triggered:
+            self._call(self._instance.setClock, [self._tx_clock], [True])
         data: bytes = self._call(self._instance.getBinary, [self._tx])[0] or b""
         self._update()
         return data
@@ -93,7 +96,10 @@ class BusFmuInstance(FmuInstance):
         self._ask()
 
     def _ask(self) -> None:
-        """What the countdown of Tx_Clock says now."""
+        """What Tx_Clock says now: the time of its countdown, or whether it ticks."""
+        if self._triggered:
+            self._next = self.time if self._call(self._instance.getClock, [self._tx_clock])[0] else None
+            return
         reference, interval, qualifier = (
             (ctypes.c_uint32 * 1)(self._tx_clock),
             (ctypes.c_double * 1)(),

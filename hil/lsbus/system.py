@@ -12,7 +12,7 @@ from emulator.firmware.description import DRIVE_ROLES, ENCODER_ROLES, NodeDescri
 from emulator.firmware.dictionary import STORE_EDS, STRUCT_CODES, Dictionary
 from emulator.power_stage import PEAK_SHARE, thermal_time_constant
 from emulator.prototype import Prototype
-from fmu.bus.system import BusDevice, BusNode, BusSystem, DeviceKind, Disc, DriveSheet, Mounting, ObjectRow
+from fmu.bus.system import BusDevice, BusNode, BusSystem, DeviceKind, Disc, DriveSheet, Mounting, ObjectRow, TxClock
 from hil.lsbus.eds import CYCLIC_TORQUE_ALONE, SUPPORTED_MODES, is_served, kind_of, served_eds
 from hil.network import load_network
 from ident.errors import DataFileError
@@ -25,16 +25,16 @@ _INTEGERS: Final = "bBhHiIqQ"
 """`struct` codes that the C firmware has."""
 
 
-def vehicle_on_bus(prototype: Prototype, network: Path) -> BusSystem:
+def vehicle_on_bus(prototype: Prototype, network: Path, tx_clock: TxClock = TxClock.COUNTDOWN) -> BusSystem:
     """The four drives and two encoders of a vehicle.
 
     Raises:
         DataFileError: a file is missing or malformed, or an object cannot be in an FMU.
     """
-    return _system(prototype, network, (*DRIVE_ROLES, *ENCODER_ROLES))
+    return _system(prototype, network, (*DRIVE_ROLES, *ENCODER_ROLES), tx_clock)
 
 
-def drive_on_bus(prototype: Prototype, network: Path, role: str) -> BusSystem:
+def drive_on_bus(prototype: Prototype, network: Path, role: str, tx_clock: TxClock = TxClock.COUNTDOWN) -> BusSystem:
     """One drive alone, whose plant is its own motor shaft, in the drive's sense of rotation.
 
     Raises:
@@ -42,10 +42,10 @@ def drive_on_bus(prototype: Prototype, network: Path, role: str) -> BusSystem:
     """
     if role not in DRIVE_ROLES:
         raise DataFileError(f"There is no drive {role!r}.", f"Name one of {', '.join(DRIVE_ROLES)}.")
-    return _system(prototype, network, (role,))
+    return _system(prototype, network, (role,), tx_clock)
 
 
-def _system(prototype: Prototype, network: Path, roles: tuple[str, ...]) -> BusSystem:
+def _system(prototype: Prototype, network: Path, roles: tuple[str, ...], tx_clock: TxClock) -> BusSystem:
     described = [node for node in read_network_description(network).nodes if node.role in roles]
     alone = len(roles) == 1
     kinds = sorted({(node.eds, kind_of(node.role)) for node in described})
@@ -70,6 +70,7 @@ def _system(prototype: Prototype, network: Path, roles: tuple[str, ...]) -> BusS
         gear_ratio=1.0 if alone else ratio,
         torque_noise=prototype.noise.torque_sensor,
         encoder_noise=prototype.noise.encoder_dither,
+        tx_clock=tx_clock,
     )
 
 

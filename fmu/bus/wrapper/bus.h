@@ -63,6 +63,9 @@ int qb_is_driven(unsigned reference);
 void qb_take_operations(qb_bus *me);
 void qb_give_operations(qb_bus *me);
 
+/* Whether Tx_Clock has a reason to tick now. */
+int qb_has_news(const qb_bus *me);
+
 /* Time of Tx_Clock's next tick, QB_NEVER where nothing is to come. */
 int64_t qb_next_tick(const qb_bus *me);
 

@@ -335,6 +335,15 @@ fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueRe
     return nValues == nValueReferences ? fmi3OK : fmi3Error;
 }
 
+/* From now on Tx_Data holds what there is to send. */
+static void tick(qb_bus *bus)
+{
+    if (!bus->now.tx_ticks) {
+        qb_give_operations(bus);
+        bus->now.tx_ticks = 1;
+    }
+}
+
 fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                         fmi3Clock values[])
 {
@@ -344,6 +353,9 @@ fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueRef
     for (i = 0; i < nValueReferences; i++) {
         if (valueReferences[i] != QB_RX_CLOCK && valueReferences[i] != QB_TX_CLOCK) {
             return refuse(me, valueReferences[i], "is no clock");
+        }
+        if (QB_TRIGGERED && valueReferences[i] == QB_TX_CLOCK && qb_has_news(bus)) {
+            tick(bus);
         }
         values[i] = valueReferences[i] == QB_RX_CLOCK ? bus->now.rx_ticks : bus->now.tx_ticks;
     }
@@ -359,13 +371,13 @@ fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueRef
     for (i = 0; i < nValueReferences; i++) {
         if (valueReferences[i] == QB_RX_CLOCK) {
             bus->now.rx_ticks = values[i];
-        } else if (valueReferences[i] == QB_TX_CLOCK) {
-            if (values[i] && !bus->now.tx_ticks) {
-                qb_give_operations(bus);
+        } else if (valueReferences[i] == QB_TX_CLOCK && !QB_TRIGGERED) {
+            if (values[i]) {
+                tick(bus);
             }
             bus->now.tx_ticks = values[i];
         } else {
-            return refuse(me, valueReferences[i], "is no clock");
+            return refuse(me, valueReferences[i], "is no clock that an importer sets");
         }
     }
     return fmi3OK;
@@ -380,7 +392,7 @@ fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReferenc
     for (i = 0; i < nValueReferences; i++) {
         const int64_t due = me->now.mode == QO_INITIALIZATION ? QB_NEVER : qb_next_tick(bus);
         GIVEN(qualifiers)
-        if (valueReferences[i] != QB_TX_CLOCK) {
+        if (valueReferences[i] != QB_TX_CLOCK || QB_TRIGGERED) {
             return refuse(me, valueReferences[i], "is no countdown clock");
         }
         intervals[i] = due == QB_NEVER ? 0.0 : (double)(due - bus->now.net.now) / 1e9;
@@ -414,6 +426,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     }
     bus->now.rx_ticks = bus->now.tx_ticks = 0;
     bus->now.rx_size = 0;
+    *discreteStatesNeedUpdate = QB_TRIGGERED && qb_has_news(bus);
     return fmi3OK;
 }
 
@@ -433,9 +446,10 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     GIVEN(lastSuccessfulTime)
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = me->now.time;
-    if (!(size > 0.0 && fabs(end) < 1e9 && fabs(time - me->now.time) <= SAME_INSTANT * size + 1e-12 * fabs(time))) {
+    /* A step that takes no time does nothing: importers take one where Tx_Clock is to tick at once. */
+    if (!(size >= 0.0 && fabs(end) < 1e9 && fabs(time - me->now.time) <= SAME_INSTANT * size + 1e-12 * fabs(time))) {
         return (fmi3Status)qo_tell(me, QO_ANSWER_ERROR,
-                                   "A step must begin where the last one ended, at %.17g, take time, and end before 1e9 s.",
+                                   "A step must begin where the last one ended, at %.17g, go forward, and end before 1e9 s.",
                                    me->now.time);
     }
     model_before = me->now.model;

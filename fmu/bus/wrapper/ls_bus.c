@@ -154,11 +154,12 @@ void qb_take_operations(qb_bus *me)
     me->now.rx_size = 0;
 }
 
+int qb_has_news(const qb_bus *me)
+{
+    return me->now.net.queued > 0 || me->now.tx_size > 0 || !me->now.configured;
+}
+
 int64_t qb_next_tick(const qb_bus *me)
 {
-    const qb_network *net = &me->now.net;
-    if (net->queued > 0 || me->now.tx_size > 0 || !me->now.configured) {
-        return net->now;
-    }
-    return qb_next_event(net);
+    return qb_has_news(me) ? me->now.net.now : qb_next_event(&me->now.net);
 }
