@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Final
 
-_PEAK_SHARE: Final = 0.95
+PEAK_SHARE: Final = 0.95
 """Share of the peak torque from which on the peak-time of the power stage counts [-]."""
 
 _STALL_SPEED: Final = 1.0
@@ -85,9 +85,9 @@ class PowerStage:
         self._chopped = data.chopper_power * step
         self._rated_torque = rated_torque
         ratio = peak_torque / rated_torque
-        self._peak_torque = _PEAK_SHARE * peak_torque
+        self._peak_torque = PEAK_SHARE * peak_torque
         self._copper = 3.0 * data.phase_resistance * (rated_current / rated_torque) ** 2
-        self._heating = -math.expm1(-step / _time_constant(data.overload_time, ratio))
+        self._heating = -math.expm1(-step / thermal_time_constant(data.overload_time, ratio))
         self._limits = (data.peak_time, data.stall_time)
         self._at_peak = self._stalled = 0.0
         self._energy = self._supply_energy
@@ -159,7 +159,7 @@ class PowerStage:
         return 0.5 * self._capacitance * voltage**2
 
 
-def _time_constant(overload_time: float, ratio: float) -> float:
+def thermal_time_constant(overload_time: float, ratio: float) -> float:
     """tau of the thermal load [s]; a motor whose peak torque is about the rated one never gets too hot."""
     share = THERMAL_LIMIT / ratio**2
     return -overload_time / math.log1p(-share) if share < 1.0 else overload_time

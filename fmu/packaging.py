@@ -99,7 +99,7 @@ def build_fmu(
         UserError: a compiler is missing or fails.
     """
     model = make_model(source, order.inputs, order.contacts, order.limited, order.carried)
-    interface = _interface(source, model, order)
+    interface = fmu_interface(source, model, order)
     token = token_of(model, interface, order.version)
     sources = fmu_sources(model, interface, order.version, token)
     libraries = compile_libraries(sources, order.platforms, compiler, progress, cache)
@@ -125,7 +125,8 @@ def fmu_sources(model: Model, interface: Interface, version: FmiVersion, token: 
     return core | wrapper_sources(interface.table, version, token)
 
 
-def _interface(source: ModelSource, model: Model, order: Order) -> Interface:
+def fmu_interface(source: ModelSource, model: Model, order: Order) -> Interface:
+    """An FMU of the model seen from outside, FMI 3.0 event indicators included."""
     table = with_indicators(model.table, INDICATORS)
     return Interface(
         name=f"quasiomni.{identifier_of(source.vehicle.name)}",

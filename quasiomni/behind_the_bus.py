@@ -84,9 +84,15 @@ def drive_on_emulator(
             _drive(run, order, bench.bus, bench.clock, bench.operator, film=film, told=told)
 
 
-def drive_on_fmu(run: Run, order: Order, prototype: str, fmu: Path) -> None:
-    """On an FMU with the drives and encoders of a prototype; it is native code, which is said first."""
+def drive_on_fmu(run: Run, order: Order, prototype: str, fmu: Path, *, own_devices: bool = False) -> None:
+    """On an FMU with the drives and encoders of a prototype, or its own; it is native code, which is said first."""
     tell_native(fmu)
+    if own_devices:
+        from hil.lsbus.bench import bus_fmu_bench  # needs the emulator, which a real vehicle's computer does not have
+
+        with bus_fmu_bench(fmu, run.seed, run.network.path) as on_bus, _stop_is_no_error(order.out):
+            _drive(run, order, on_bus.bus, on_bus.clock, on_bus.operator)
+        return
     bench = load_emulation().bench(prototype, run.seed, False, run.network.path, fmu=fmu)
     with bench as opened, _stop_is_no_error(order.out):
         _drive(run, order, opened.bus, opened.clock, opened.operator)

@@ -126,7 +126,7 @@ def campaign(
     if diagnostic:
         steps = _diagnostic_steps(skip or (), payload)
     inertia = known_inertia(b_w, b_w_std)
-    effects, fmu = parse_effects(effect), parse_plant(plant, force=force)
+    effects, fmu = parse_effects(effect), parse_plant(plant, force=force, on_bus=True)
     _refuse_two_vehicles(bus, fmu, effects, engine, video, simulator, web)
     film, page = plan_video(video, video_rate, AT_REST), plan_page(web, web_host, web_port)
     read_simulator(simulator, force=force)
@@ -154,7 +154,8 @@ def campaign(
     run = _resumed(order, context) if resume else _planned(_on_engine(order))
     if fmu is not None:
         same = not resume or carries_vehicle(run.folder, find_data_file("ident.vehicle", vehicle))
-        drive_on_fmu(run, order, vehicle if same else str(run.folder.vehicle), fmu)
+        prototype = vehicle if same else str(run.folder.vehicle)
+        drive_on_fmu(run, order, prototype, fmu, own_devices=str(plant).startswith("fmu-bus:"))
     elif bus is None:
         drive_on_emulator(run, order, effects, gui, film, force=force, page=page)
     else:

@@ -10,6 +10,7 @@ import numpy as np
 import typer
 from rich.table import Table
 
+from fmu.bus.system import TxClock
 from fmu.description import FmiVersion
 from fmu.packaging import Order
 from fmu.platforms import parse_platforms
@@ -19,6 +20,7 @@ from hil.campaign.reading import read_as
 from hil.cosimulation.assessment import refuse_unusable_fmu
 from hil.cosimulation.export import export_run
 from hil.cosimulation.replay import Outcome, replay, write_plot
+from ident.errors import UserError
 from ident.extras import Extra, require
 from ident.plant.contact import Contacts
 from ident.report.digits import percent, unit_text
@@ -30,13 +32,15 @@ from quasiomni.showing import bars
 
 @app.command("fmu")
 def build(
+    context: typer.Context,
     run: Annotated[Path, typer.Argument(help="Run folder, identified.")],
     model: Annotated[
         Path | None,
         typer.Option(help="parameters.toml in place of that of RUN: what `diagnose --extended` wrote, for one."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File to write. Default: platform.fmu in RUN.")
+        Path | None,
+        typer.Option("--out", "-o", help="File to write. Default: platform.fmu in RUN, with --bus vehicle_on_bus.fmu."),
     ] = None,
     fmi: Annotated[FmiVersion, typer.Option(help="Version of FMI: 2 for 2.0, 3 for 3.0.")] = FmiVersion.FMI2,
     platforms: Annotated[
@@ -62,18 +66,51 @@ def build(
             "compliance too."
         ),
     ] = Carried.STATELESS,
+    bus: Annotated[
+        bool, typer.Option("--bus", help="With its drives and encoders as CANopen nodes, FMI-LS-BUS 1.0, FMI 3.0.")
+    ] = False,
+    drive: Annotated[
+        str | None, typer.Option(help="With --bus: one drive alone, with ports for its shaft, e.g. `drive_fl`.")
+    ] = None,
+    tx_clock: Annotated[
+        TxClock, typer.Option(help="With --bus: `triggered` for importers that know no `countdown`.")
+    ] = TxClock.COUNTDOWN,
     force: ForceOption = False,
 ) -> None:
     """Package the identified model, with its confirmed effects, as an FMU for co-simulation and model exchange."""
     order = Order(fmi, inputs, parse_platforms(platforms), contacts, limits, arrays, effects)
+    if bus:
+        _refuse_of_plants(context)
+        from hil.lsbus.export import export_bus_fmu  # needs the emulator's tables, which other FMUs do without
+    elif drive is not None or tx_clock is not TxClock.COUNTDOWN:
+        raise UserError("--drive and --tx-clock are of an FMU on a bus.", "Add --bus, or leave them out.")
+    target = out or run / (f"{drive}.fmu" if drive else "vehicle_on_bus.fmu" if bus else "platform.fmu")
     with bars() as shown:
         task = shown.add_task("compiling", total=None)
 
         def compiled(compiler: str, done: int, total: int) -> None:
             shown.update(task, description=f"compiling ({compiler})", completed=done, total=total)
 
-        written = export_run(run, out or run / "platform.fmu", order, model, force=force, compiled=compiled)
+        if bus:
+            written = export_bus_fmu(
+                run, target, order.platforms, model, drive=drive, tx_clock=tx_clock, force=force, compiled=compiled
+            )
+        else:
+            written = export_run(run, target, order, model, force=force, compiled=compiled)
     console.print(f"Written: {written.path}, {written.size / 1e3:.0f} kB, in {written.seconds:.1f} s")
+
+
+_OF_PLANTS = ("fmi", "inputs", "contacts", "limits", "arrays", "effects")
+"""Options of FMUs without devices."""
+
+
+def _refuse_of_plants(context: typer.Context) -> None:
+    """Drives decide what torque there is, and a bus needs the clocks of FMI 3.0."""
+    sources = {name: context.get_parameter_source(name) for name in _OF_PLANTS}
+    given = [name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"]
+    if given:
+        raise UserError(f"--{given[0]} is of FMUs without devices.", "Leave it out, or leave out --bus.")
+    require(Extra.EMULATOR, "--bus", ("durand",))
 
 
 @app.command()

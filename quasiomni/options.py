@@ -57,7 +57,12 @@ EffectOption = Annotated[
     ),
 ]
 PlantOption = Annotated[
-    str | None, typer.Option("--plant", help="`fmu:FILE`: an FMU with torque inputs in place of the physics engine.")
+    str | None,
+    typer.Option(
+        "--plant",
+        help="`fmu:FILE`: an FMU with torque inputs in place of the physics engine; "
+        "`fmu-bus:FILE`, campaign only: an FMU of FMI-LS-BUS with its own devices.",
+    ),
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Take a model that was assessed as unusable all the same.")]
 EngineOption = Annotated[
@@ -84,8 +89,13 @@ def parse_effects(texts: Sequence[str] | None) -> tuple[Effect, ...]:
     return tuple(map(parse_effect, texts))
 
 
-def parse_plant(text: str | None, *, force: bool) -> Path | None:
+def parse_plant(text: str | None, *, force: bool, on_bus: bool = False) -> Path | None:
     """The FMU that was asked for; what it needs is here.
+
+    Args:
+        text: `fmu:FILE`, or with `on_bus` also `fmu-bus:FILE`.
+        force: take a model that was assessed as unusable.
+        on_bus: an FMU may bring its devices along.
 
     Raises:
         UserError: the text names no FMU, or its model was assessed as unusable and is not taken by force.
@@ -98,8 +108,9 @@ def parse_plant(text: str | None, *, force: bool) -> Path | None:
         refuse_unusable_fmu,  # needs mathematics that commands around the bus do without
     )
     from hil.cosimulation.plant import plant_path  # needs the emulator, which a real vehicle's computer does not have
+    from hil.lsbus.bench import bus_plant_path, is_on_bus  # the same
 
-    path = plant_path(text)
+    path = bus_plant_path(text) if on_bus and is_on_bus(text) else plant_path(text)
     refuse_unusable_fmu(path, force=force)
     return path
 

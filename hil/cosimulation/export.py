@@ -70,7 +70,7 @@ Compiled = Callable[[str, int, int], None]
 """Called with the compiler, and the number of platforms compiled, and of all."""
 
 
-def _unheard(_compiler: str, _done: int, _total: int) -> None:
+def unheard(_compiler: str, _done: int, _total: int) -> None:
     """Nobody waits."""
 
 
@@ -81,7 +81,7 @@ def export_run(
     model: Path | None = None,
     *,
     force: bool = False,
-    compiled: Compiled = _unheard,
+    compiled: Compiled = unheard,
 ) -> Exported:
     """Build the FMU of a run and write it.
 

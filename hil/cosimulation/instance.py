@@ -123,9 +123,14 @@ class FmuInstance:
         self.close()
 
     def _open(self) -> Any:
+        return self._instantiate()
+
+    def _instantiate(self, **options: bool) -> Any:
         simulation = self._fmpy.simulation
         try:
-            return simulation.instantiate_fmu(self._folder, self._description, "CoSimulation", logger=self._hear)
+            return simulation.instantiate_fmu(
+                self._folder, self._description, "CoSimulation", logger=self._hear, **options
+            )
         except Exception as error:
             told = self._messages[-1] if self._messages else str(error)
             raise FmuError(

@@ -166,3 +166,35 @@ def test_mistakes_are_told_with_a_remedy(quasi: Quasi, run: Path, record: Path, 
     nonsense = quasi("campaign", "--plant", "bullet", "--out", tmp_path / "run", "--skip", "lane_change")
     assert nonsense.code == 2
     assert "fmu:FILE" in nonsense.error
+
+
+@pytest.mark.parametrize("drive", [None, "drive_rl"])
+def test_a_run_becomes_an_fmu_with_its_devices_on_a_bus(
+    quasi: Quasi, run: Path, tmp_path: Path, drive: str | None
+) -> None:
+    """Also that of a real vehicle: what no file says of its drives is assumed, and told inside."""
+    fmu = tmp_path / "bus.fmu"
+    alone = () if drive is None else ("--drive", drive)
+    built = quasi("fmu", run, "--bus", *alone, "-o", fmu, "--platforms", "host")
+    assert built.code == 0, built.err
+    assert fmpy.validation.validate_fmu(str(fmu)) == []
+    with zipfile.ZipFile(fmu) as archive:
+        names = set(archive.namelist())
+    assert {
+        "terminalsAndIcons/terminalsAndIcons.xml",
+        "documentation/parameters.toml",
+        "resources/drive_rl.eds",
+    } <= names
+    assert ("resources/encoder_left.eds" in names) is (drive is None)
+
+
+def test_options_that_do_not_go_with_a_bus_are_refused(quasi: Quasi, run: Path, tmp_path: Path) -> None:
+    version = quasi("fmu", run, "--bus", "--fmi", "2", "-o", tmp_path / "none.fmu")
+    alone = quasi("fmu", run, "--drive", "drive_fl", "-o", tmp_path / "none.fmu")
+    unknown = quasi("fmu", run, "--bus", "--drive", "drive_middle", "-o", tmp_path / "none.fmu", "--platforms", "host")
+    served = quasi("emulate", "--plant", "fmu-bus:bus.fmu", "--bus", "unix:nowhere")
+    told = ["--fmi", "--bus", "drive_rr", "fmu:FILE"]
+    for answer, said in zip((version, alone, unknown, served), told, strict=True):
+        assert answer.code == 1
+        assert said in answer.err
+    assert not (tmp_path / "none.fmu").exists()
