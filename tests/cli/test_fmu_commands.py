@@ -195,6 +195,6 @@ def test_options_that_do_not_go_with_a_bus_are_refused(quasi: Quasi, run: Path, 
     served = quasi("emulate", "--plant", "fmu-bus:bus.fmu", "--bus", "unix:nowhere")
     told = ["--fmi", "--bus", "drive_rr", "fmu:FILE"]
     for answer, said in zip((version, alone, unknown, served), told, strict=True):
-        assert answer.code == 1
+        assert answer.code == 2
         assert said in answer.err
     assert not (tmp_path / "none.fmu").exists()
