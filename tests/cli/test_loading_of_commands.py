@@ -48,6 +48,7 @@ def test_every_module_of_the_command_line_is_listed() -> None:
         "filming",
         "interface",
         "options",
+        "paging",
         "scenarios",
         "showing",
     }

@@ -145,7 +145,7 @@ def test_one_term_more_changes_rows_simulation_and_fmu_alike() -> None:
     inertia = dynamics.projected_regressor(Mode.ROTATION, alpha, np.zeros(9), H[:, 0], g)[0, 0] @ p
     angles, u = ca.SX.sym("angles", 7), ca.SX.sym("u", 4)
     velocity, symbols = ca.SX.sym("v"), ca.SX.sym("p", len(PARAMETER_NAMES))
-    point = Point(angles, ca.SX(0, 1), velocity, ca.SX(0))
+    point = Point(angles, ca.SX(0, 1), velocity, ca.SX(0), ca.SX(0, 1))
     torques = generator.normal(size=4)
     slower = [
         evaluated(
