@@ -26,7 +26,7 @@ ANGLES: Final = (0.01, 0.03, 0.1, 0.3)
 WIDEST: Final = 1.0
 """Followed up to that [rad]; wider is a spring, as far as wheels and steering go."""
 
-NEAREST: Final = 0.02
+NEAREST: Final = 0.1
 """Part of the rows that are nearer to a reversal than what they can bound."""
 
 
@@ -63,7 +63,7 @@ def bristle_candidate(cause: BristleCause, sources: Sequence[Source], context: C
         contribution=contribution,
         least=0.0,
         lowest=(0.0, shortest),
-        price=math.log(len(ANGLES)),
+        price=0.5 * math.log(_used(cause, sources, acting)),
     )
 
 
@@ -82,6 +82,20 @@ def _columns(
         for row, column in zip(rows.tolist(), context.filtered(torques, source).T, strict=True):
             found[row] = column
     return found
+
+
+def _used(cause: BristleCause, sources: Sequence[Source], acting: Sequence[Array | None]) -> int:
+    """Samples in which its friction shows, at least one: the angle, which is fitted, costs what a number does."""
+    joints = list(cause.joints)
+    return max(
+        sum(
+            int(source.moving[row].sum())
+            for source, lever in zip(sources, acting, strict=True)
+            if lever is not None
+            for row in np.flatnonzero(lever[:, joints].any(axis=(0, 1))).tolist()
+        ),
+        1,
+    )
 
 
 def _shortest(cause: BristleCause, sources: Sequence[Source], acting: Sequence[Array | None]) -> float:
