@@ -59,8 +59,7 @@ class Evidence:
 
     def explained(self, variant: int) -> Array:
         """What a variant explains of the whitened rows (n,), beside the baseline."""
-        place = self.directions.places[variant]
-        return np.asarray(self.directions.basis[:, place] @ self.amplitudes[place])
+        return _explained(self.directions, self.amplitudes, variant)
 
 
 def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask) -> Evidence:
@@ -108,9 +107,13 @@ def _sums(values: Array, stretch: NDArray[np.int64]) -> Array:
     return np.asarray(np.add.reduceat(values, starts, axis=0))
 
 
-def _without(found: Directions, amplitudes: Array, variant: int) -> Array:
+def _explained(found: Directions, amplitudes: Array, variant: int) -> Array:
     place = found.places[variant]
-    return np.asarray(found.residual - found.basis[:, place] @ amplitudes[place])
+    return np.asarray(found.basis[:, place] @ amplitudes[place])
+
+
+def _without(found: Directions, amplitudes: Array, variant: int) -> Array:
+    return np.asarray(found.residual - _explained(found, amplitudes, variant))
 
 
 def scatter(basis: Array, residual: Array, stretch: NDArray[np.int64]) -> float:
@@ -147,8 +150,7 @@ def _within(found: Directions, amplitudes: Array, variant: int) -> Array:
 
 def _overlap(found: Directions, amplitudes: Array, variant: int) -> Array:
     """Share (V,) of the square of what one variant explains that every other can explain too."""
-    place = found.places[variant]
-    fitted = found.basis[:, place] @ amplitudes[place]
+    fitted = _explained(found, amplitudes, variant)
     share = found.lengths(found.basis.T @ fitted) / max(float(fitted @ fitted), np.finfo(float).tiny)
     return np.asarray(np.minimum(share, 1.0))
 
