@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ident.effects.extended import ExtendedModel
 from ident.estimate.filters import differentiate, second_derivative, zero_phase
 from ident.plant import symbolic
-from ident.plant.bristles import FIRST_JOINT, bent_along, bristles_of
+from ident.plant.bristles import all_bent_along, bristles_of
 from ident.plant.kinematics import GENERALIZED_VELOCITIES
 from ident.plant.modes import Mode
 from ident.plant.springs import MOTOR_SHARE, resting_twist, stiffness_of
@@ -103,7 +103,7 @@ def feed_forward(model: ExtendedModel, course: Course, plain: Array, geometry: G
         course.accelerations,
         course.elapsed[:, None],
         plain,
-        _bent(model, course),
+        all_bent_along(model.terms, np.hstack([course.alpha, course.beta])),
         model.parameters.values,
         geometry.as_vector(),
         np.array([COULOMB_EPSILON]),
@@ -125,15 +125,6 @@ def _ahead_of_filters(torques: Array, lags: Array, sample_time: float) -> Array:
         return torques
     smooth = zero_phase(torques, TWIST_CUTOFF, sample_time)
     return np.asarray(torques + lags * differentiate(smooth, sample_time))
-
-
-def _bent(model: ExtendedModel, course: Course) -> Array:
-    """How far the bristles of joints are bent (N, m)."""
-    angles = np.hstack([course.alpha, course.beta])
-    found = [
-        bent_along(angles[:, row - FIRST_JOINT], float(angle)) for (_, row), angle in bristles_of(model.terms).items()
-    ]
-    return np.stack(found, axis=1) if found else np.zeros((len(angles), 0))
 
 
 def _twist(spring: Spring, load: Array, sample_time: float) -> Array:

@@ -17,6 +17,9 @@ LED_BACK: Final = 1000
 DAMPING: Final = 0.05
 """Of what is behind a spring, over the critical damping: that of steel and screwed joints."""
 
+RARER: Final = 1.0
+"""Log odds of a filter in a drive against a plain delay, which rows of low frequency do not tell from it."""
+
 HELD: Final = 0.55
 """Sample intervals up to which a lag is no delay: half of one is what holding a torque over the interval does."""
 

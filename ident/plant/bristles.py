@@ -69,3 +69,10 @@ def bent_along(angles: Array, angle: float) -> Array:
     kept, towards = np.exp(-np.abs(turned) / angle).tolist(), np.sign(turned).tolist()
     steps = zip(kept, towards, strict=True)
     return np.array(list(itertools.accumulate(steps, lambda z, step: step[1] + (z - step[1]) * step[0], initial=0.0)))
+
+
+def all_bent_along(terms: Sequence[Term], angles: Array) -> Array:
+    """z (N, m) of all bristles, of which the steering axes and wheels have been at some angles (N, 6) [rad]."""
+    joints = bristles_of(terms)
+    found = [bent_along(angles[:, row - FIRST_JOINT], float(angle)) for (_, row), angle in joints.items()]
+    return np.stack(found, axis=1) if found else np.zeros((len(angles), 0))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
 from ident.diagnosis.axis.reference import NEAREST
-from ident.diagnosis.delays import HELD, led
+from ident.diagnosis.delays import HELD, RARER, led
 from ident.diagnosis.law.dependence import path_since_reversal
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate, Variant
@@ -28,9 +28,6 @@ TIMES: Final = (0.1, 0.3, 1.0)
 
 WIDER: Final = 3.0
 """How far beyond those tried first a distance or a time is followed: further away a record says nothing of it."""
-
-RARER: Final = 1.0
-"""Log odds of a filter in the drive against a plain delay, which rows of low frequency do not tell from it."""
 
 
 def presliding(axis: AxisModel) -> Candidate:

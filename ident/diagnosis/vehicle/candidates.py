@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from ident.diagnosis.delays import HELD
+from ident.diagnosis.delays import HELD, RARER
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate, Variant
 from ident.diagnosis.vehicle.askew import beside_sliding, stands_askew
@@ -51,9 +51,6 @@ Array = NDArray[np.float64]
 ROUNDING: Final = 1e-12
 """Of a column, relative to what the model has in the same row."""
 
-
-RARER: Final = 1.0
-"""Log odds of a filter in a drive against a plain delay, which rows of low frequency do not tell from it."""
 
 OFFSET_STD: Final = 2.2e-5
 """Of an offset of the steering, beyond the scatter of the rows [rad].

@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel
-from ident.diagnosis.vehicle.bending import joint_angle
 from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.signals import shifted
 from ident.diagnosis.vehicle.sources import Source
 from ident.effects import make_effect
 from ident.effects.extended import ExtendedModel, simulation_of
 from ident.plant import kinematics
-from ident.plant.bristles import FIRST_JOINT, bent_along, bristles_of
+from ident.plant.bristles import all_bent_along
 from ident.plant.kinematics import GENERALIZED_VELOCITIES
 from ident.plant.modes import Mode
 from ident.plant.simulation import Motion, Readings
@@ -94,14 +93,9 @@ def _runs(source: Source, model: ExtendedModel) -> _Runs | None:
     if not len(starts):
         return None
     whole = without_encoder_errors(source.inputs, model, source.sample_time)
-    return _Runs(source, whole[starts[:, None] + np.arange(length)], _bent(whole, model)[starts], repeat, place)
-
-
-def _bent(inputs: Array, model: ExtendedModel) -> Array:
-    """How far the bristles of a model are bent along recorded angles (N, m)."""
-    joints = bristles_of(model.terms)
-    found = [bent_along(joint_angle(inputs, row - FIRST_JOINT), float(angle)) for (_, row), angle in joints.items()]
-    return np.stack(found, axis=1) if found else np.zeros((len(inputs), 0))
+    angles = np.hstack([whole[:, SLICES[name]] for name in ("alpha", "beta")])
+    bent = all_bent_along(model.terms, angles)[starts]
+    return _Runs(source, whole[starts[:, None] + np.arange(length)], bent, repeat, place)
 
 
 def _simulated(
