@@ -137,11 +137,11 @@ class Findings:
 
 
 def _ambiguity_set(cause: Cause, coverage: float) -> tuple[str, ...]:
-    """Names that the records do not tell apart, and a law among them where a free function does as well."""
+    """Names that the records do not tell apart, and a law among them where a free function does as well or better."""
     if cause.law is not None:
         return (LAW,)
     names = cause.ranked.ambiguity_set(str(cause.candidate.effect), coverage)
-    return (*names, LAW) if cause.curve is Curve.UNDECIDED else names
+    return names if cause.curve is Curve.ITS_OWN else (*names, LAW)
 
 
 def _named(cause: Cause, coverage: float) -> NamedEffect:
