@@ -133,6 +133,9 @@ def diagnose(
     without_true_candidate: Annotated[
         bool, typer.Option("--without-true-candidate", help="Open the answer; leave each true candidate out.")
     ] = False,
+    oracle: Annotated[
+        bool, typer.Option("--oracle", help="Open the answer; gather what somebody finds who knows each candidate.")
+    ] = False,
     key: KeyOption = None,
     jobs: JobsOption = 2,
     scheduler: SchedulerOption = None,
@@ -140,9 +143,18 @@ def diagnose(
     """Diagnose every case from records and nominal model alone; this process cannot import the emulator."""
     require(Extra.EXAM, "exam diagnose", ("pyarrow",))
     _require_cluster(scheduler)
+    if oracle and without_true_candidate:
+        raise UserError("An oracle knows the true candidate: it cannot be left out.", "Ask for one after the other.")
     from hil.exam.diagnosing import diagnose_exam
+    from hil.exam.oracle import ask_oracle, asked_of_oracle
 
     opened = ExamFolder(folder)
+    if oracle:
+        asked = asked_of_oracle(open_cases(opened, key))
+        with bar("asking the oracle") as shown:
+            ask_oracle(opened, asked, jobs=jobs, scheduler=scheduler, progress=shown)
+        show_next(f"quasiomni exam score {folder}")
+        return
     removed = removable(open_cases(opened, key)) if without_true_candidate else None
     with bar("diagnosing") as shown:
         diagnose_exam(opened, jobs=jobs, scheduler=scheduler, progress=shown, removed=removed)

@@ -25,10 +25,11 @@ from ident.diagnosis.findings import Findings
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
+from ident.effects.extended import ExtendedModel
 from ident.errors import UserError
 from ident.faults import sure_faults
 from ident.parameters_file import read_model
-from ident.vehicle.description import load_vehicle
+from ident.vehicle.description import VehicleDescription, load_vehicle
 from ident.writing import write_whole
 
 FORBIDDEN: Final = ("emulator", "pybullet", "mujoco")
@@ -154,22 +155,27 @@ def diagnose_case(
         removed: candidate that the library is to lack.
     """
     forbid_emulator()
-    with tempfile.TemporaryDirectory() as scratch:
-        files = [Path(scratch) / name for name in ("vehicle.toml", "model.toml")]
-        for file, text in zip(files, (vehicle, model), strict=True):
-            file.write_text(text, encoding="utf-8")
-        described, judged = load_vehicle(files[0]), read_model(files[1])
+    world = described(vehicle, model)
     effects = [name for name in EffectName if name != removed]
 
     def answer() -> dict[str, Any]:
         records = [record_from_bytes(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
-        faults = sure_faults(records, described)
+        faults = sure_faults(records, world[0])
         if faults:
             return faulty(faults).as_json()
-        found = diagnose_vehicle(records[:1], records[1:], described, judged, effects=effects)
+        found = diagnose_vehicle(records[:1], records[1:], *world, effects=effects)
         return found.diagnosis.as_json() | ({} if removed else {"alone": _alone(found.findings, found.problems)})
 
     return identifier, _timed(answer)
+
+
+def described(vehicle: str, model: str) -> tuple[VehicleDescription, ExtendedModel]:
+    """What the texts of their files say of vehicle and model."""
+    with tempfile.TemporaryDirectory() as scratch:
+        files = [Path(scratch) / name for name in ("vehicle.toml", "model.toml")]
+        for file, text in zip(files, (vehicle, model), strict=True):
+            file.write_text(text, encoding="utf-8")
+        return load_vehicle(files[0]), read_model(files[1])
 
 
 def diagnose_axis_case(identifier: str, fit: bytes, confirm: bytes, removed: str | None) -> tuple[str, bytes]:

@@ -8,6 +8,8 @@
 | `truth/answer.json` | the answer, encrypted; `exam score` opens it with the key, which lies elsewhere |
 | `truth/ID.json` | why a case could not be driven, encrypted as well |
 | `diagnoses/ID.json` | answers of the diagnosing side |
+| `diagnoses_without/ID.json` | the same with the true candidate left out of the library |
+| `oracle/ID.json` | what somebody would find who knows the true candidate |
 """
 
 from __future__ import annotations
@@ -69,6 +71,10 @@ class ExamFolder:
     def diagnosis(self, identifier: str, removed: bool = False) -> Path:
         """What the diagnosing side answered; with the true candidate removed, or with all."""
         return self.path / ("diagnoses_without" if removed else "diagnoses") / f"{identifier}.json"
+
+    def oracle(self, identifier: str) -> Path:
+        """Evidence of candidates that somebody knows, of a case."""
+        return self.path / "oracle" / f"{identifier}.json"
 
     def diagnosed(self, removed: bool = False) -> bool:
         """Whether there is any diagnosis, with the true candidate removed, or with all."""

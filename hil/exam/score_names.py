@@ -55,6 +55,7 @@ WITHOUT_MODEST: Final = "- no confident wrong name"
 WITHOUT_MODEST_ALL: Final = "- no confident wrong name, cases with an identical candidate left included"
 WITHOUT_UNKNOWN: Final = "- `unknown`"
 WITHOUT_NONE: Final = "- `none`: no gap found"
+ORACLE: Final = "found by an oracle that knows the candidate, as many false alarms allowed, size"
 PERMUTED: Final = "answers permuted: right, all sizes"
 
 ASKED: Final[Mapping[str, str]] = MappingProxyType(

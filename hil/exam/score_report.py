@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -16,10 +17,14 @@ from hil.exam.answer_sets import chance, permuted, read_answers
 from hil.exam.answers import Answer
 from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.identity import exam_identities
+from hil.exam.oracle import oracle_rates
 from hil.exam.recalibration import LeftOut, each_left_out
-from hil.exam.score_names import ASKED, PERMUTED, RIGHT
+from hil.exam.score_names import ASKED, FALSE_ALARMS, ORACLE, PERMUTED, RIGHT
 from hil.exam.scoring import Group, Score, missing_cases, removal_rates, score
 from hil.exam.statistics import Rate
+
+ALLOWED: Final = 0.05
+"""Rate of false alarms that is asked of a diagnosis, and granted to an oracle that would do with fewer."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +36,7 @@ class ScoreReport:
         permuted: of the same answers beside other truths.
         chance: share that is expected of them, over all permutations.
         without: rates of the run without the true candidate; empty where there was none.
+        oracle: what somebody finds who knows the candidate, by size; empty where nobody was asked.
         worlds: vehicle and engine that the cases were driven with, in words, of every exam.
         first_seeds: that the cases follow from, of exams that are not sealed.
         sources: score of each world by itself, where there are several.
@@ -41,6 +47,7 @@ class ScoreReport:
     permuted: Rate
     chance: float
     without: Mapping[str, Rate]
+    oracle: Mapping[str, Rate]
     worlds: tuple[str, ...]
     first_seeds: tuple[int, ...] = ()
     sources: Mapping[str, Score] = field(default_factory=dict)
@@ -58,7 +65,7 @@ class ScoreReport:
     @property
     def rates(self) -> dict[str, Rate]:
         """All of them, by name."""
-        return {**self.score.rates, **self.without, PERMUTED: self.permuted}
+        return {**self.score.rates, **self.without, **self.oracle, PERMUTED: self.permuted}
 
     def asked(self, name: str) -> str:
         """What is asked of a number, empty where nothing is."""
@@ -89,6 +96,7 @@ def score_exams(folders: Sequence[ExamFolder], generator: np.random.Generator, k
         permuted=score(permuted(answers, generator)).rates[RIGHT],
         chance=chance(answers),
         without=removal_rates(without) if without else {},
+        oracle=_summed([one.oracle for one in opened]),
         worlds=worlds,
         first_seeds=tuple(one.first_seed for one in opened if one.first_seed is not None),
         sources={world: score(own) for world, own in by_world.items()} if len(opened) > 1 else {},
@@ -100,12 +108,13 @@ def score_exams(folders: Sequence[ExamFolder], generator: np.random.Generator, k
 
 @dataclass(frozen=True)
 class _Opened:
-    """One exam with its answers, those without the true candidate, and the cases that have none."""
+    """One exam with its answers, those without the true candidate, what an oracle finds, and what has no answer."""
 
     world: str
     first_seed: int | None
     answers: Sequence[Answer]
     without: Sequence[Answer]
+    oracle: Mapping[float, Rate]
     missing: Mapping[str, int]
 
 
@@ -115,7 +124,19 @@ def _opened(folder: ExamFolder, keys: Sequence[Path]) -> _Opened:
     known = exam_identities(folder)
     without = read_answers(folder, cases, known, removed=True) if folder.diagnosed(removed=True) else []
     answers = read_answers(folder, cases, known)
-    return _Opened(exam.world, exam.first_seed, answers, without, missing_cases(folder, cases))
+    alarms = score(answers).rates[FALSE_ALARMS]
+    allowed = max(alarms.value, ALLOWED) if alarms.cases else ALLOWED
+    oracle = oracle_rates(folder, cases, allowed)
+    return _Opened(exam.world, exam.first_seed, answers, without, oracle, missing_cases(folder, cases))
+
+
+def _summed(rates: Sequence[Mapping[float, Rate]]) -> dict[str, Rate]:
+    sizes = sorted({size for one in rates for size in one})
+    found = {size: [one[size] for one in rates if size in one] for size in sizes}
+    return {
+        f"{ORACLE} {size:g}": Rate(sum(one.hits for one in each), sum(one.cases for one in each))
+        for size, each in found.items()
+    }
 
 
 def summary_lines(report: ScoreReport) -> list[str]:

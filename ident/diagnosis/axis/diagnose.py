@@ -50,9 +50,7 @@ def diagnose_axis(
     reference = axis_reference(fit, cutoff, confirm)
 
     def judged(reference: Reference) -> Findings:
-        fitted = _without(axis_problem(fit, reference), lacking)
-        pair = (fitted, _without(axis_problem(confirm, reference), lacking)) if confirm else split_problem(fitted)
-        return judge(*pair, seed=seed, limits=LIMITS, stage=stage)
+        return judge(*pose_axis(fit, confirm, reference, lacking), seed=seed, limits=LIMITS, stage=stage)
 
     findings = judged(reference)
     scales = tuple(_on_second_thought(reference.scales, findings, fit[0].axes))
@@ -60,6 +58,14 @@ def diagnose_axis(
         return findings
     stage("again, an axis being late, or not")
     return judged(replace(reference, scales=scales))
+
+
+def pose_axis(
+    fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord], reference: Reference, lacking: Collection[str] = ()
+) -> tuple[Problem, Problem]:
+    """The rows of records to fit and to confirm, and the candidates; arguments of `diagnose_axis`."""
+    fitted = _without(axis_problem(fit, reference), lacking)
+    return (fitted, _without(axis_problem(confirm, reference), lacking)) if confirm else split_problem(fitted)
 
 
 def _on_second_thought(scales: Sequence[Scale], findings: Findings, axes: Sequence[AxisSignals]) -> Iterator[Scale]:

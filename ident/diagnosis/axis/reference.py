@@ -26,8 +26,8 @@ from ident.diagnosis.axis.reversals import Sticking, Untold, untold_while_sticki
 from ident.diagnosis.delays import delayed
 from ident.errors import EstimationError, RecordError
 from ident.estimate.axis.cutoff import LARGEST_CUTOFF, position_cutoff
-from ident.estimate.axis.processing import PARAMETERS, smoothed
-from ident.estimate.filters import SEVEN, differentiate, zero_phase
+from ident.estimate.axis.processing import BUTTERWORTH_ORDER, PARAMETERS
+from ident.estimate.filters import FILTER_ORDER, SEVEN, differentiate, mirrored
 from ident.records.axis_record import AxisRecord, AxisSignals
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ class Signals:
     def filtered(self, values: Array) -> Array:
         """The filter of the positions and that of the rows, on everything alike."""
         dt = self.record.sample_time
-        return zero_phase(smoothed(values, self.cutoff, dt), self.bandwidth, dt)
+        return mirrored(mirrored(values, BUTTERWORTH_ORDER, self.cutoff, dt), FILTER_ORDER, self.bandwidth, dt)
 
     @cached_property
     def _untold(self) -> list[Untold]:
@@ -163,7 +163,7 @@ def axis_reference(
     signals = [axis_signals(record, chosen, ROWS_CUTOFF * chosen) for record in records]
     scales = tuple(_scale(signals, index) for index in range(len(records[0].axes)))
     limits = [
-        noise_limit(axis, scale.values[0], chosen, record.sample_time)
+        noise_limit(axis, scale.values[0], chosen, repeat_duration(record), record.sample_time)
         for record in records
         for axis, scale in zip(record.axes, scales, strict=True)
     ]

@@ -16,7 +16,7 @@ from ident.diagnosis.problem import Problem
 from ident.diagnosis.split import split_problem
 from ident.diagnosis.vehicle.belonging import refuse_other_vehicle
 from ident.diagnosis.vehicle.build import build_problem
-from ident.diagnosis.vehicle.experiments import driven_steps, hidden_effects, next_experiment
+from ident.diagnosis.vehicle.experiments import Driven, driven_steps, hidden_effects, next_experiment
 from ident.diagnosis.vehicle.visibility import Visibility
 from ident.effects.extended import ExtendedModel
 from ident.errors import DataFileError, RecordError
@@ -75,6 +75,42 @@ def diagnose_vehicle(
             diagnosis, or the confirming records hold none of those fitted.
         DataFileError: a parameter of the model is zero.
     """
+    stage("rows of the records")
+    question = pose_vehicle(fit, confirm, vehicle, model, effects)
+    findings = judge(*question.problems, seed=seed, stage=stage)
+    invisible = tuple(str(name) for name in effects if name in question.hidden or name in findings.invisible)
+    findings = replace(findings, invisible=invisible)
+    stage("the next experiment")
+    steps = {block.step for block in question.problems[0].blocks}
+    advice = next_experiment(findings, question.driven.only(steps), question.visibility)
+    return VehicleDiagnosis(findings, advice, question.problems)
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of the records.
+
+    Attributes:
+        problems: to fit and to confirm, with all candidates.
+        driven: steps of the records to fit.
+        visibility: of every effect in every step.
+        hidden: effects that these steps do not show.
+    """
+
+    problems: tuple[Problem, Problem]
+    driven: Driven
+    visibility: Visibility
+    hidden: frozenset[EffectName]
+
+
+def pose_vehicle(
+    fit: Sequence[Record],
+    confirm: Sequence[Record],
+    vehicle: VehicleDescription,
+    model: ExtendedModel | Parameters | None = None,
+    effects: Sequence[EffectName] = tuple(EffectName),
+) -> Question:
+    """The rows of the records and the candidates, before anything is looked for; arguments of `diagnose_vehicle`."""
     if isinstance(model, Parameters):
         model = ExtendedModel(model)
     if model is not None:
@@ -85,19 +121,12 @@ def diagnose_vehicle(
     visibility = Visibility(vehicle)
     hidden = hidden_effects(driven, visibility)
     shown = [name for name in effects if name not in hidden]
-    stage("rows of the records")
     fitted = _problem(fit, vehicle, model, shown)
-    if confirm:
-        confirming = _problem(confirm, vehicle, model, shown)
-        _refuse_strangers(fitted, confirming)
-    else:
-        fitted, confirming = split_problem(fitted)
-    findings = judge(fitted, confirming, seed=seed, stage=stage)
-    invisible = tuple(str(name) for name in effects if name in hidden or name in findings.invisible)
-    findings = replace(findings, invisible=invisible)
-    stage("the next experiment")
-    advice = next_experiment(findings, driven.only({block.step for block in fitted.blocks}), visibility)
-    return VehicleDiagnosis(findings, advice, (fitted, confirming))
+    if not confirm:
+        return Question(split_problem(fitted), driven, visibility, hidden)
+    confirming = _problem(confirm, vehicle, model, shown)
+    _refuse_strangers(fitted, confirming)
+    return Question((fitted, confirming), driven, visibility, hidden)
 
 
 def _problem(

@@ -1,0 +1,138 @@
+"""What somebody would find who knows which cause to look for, and where: the most that can be asked of a diagnosis.
+
+The evidence of the true candidate alone is gathered for every case with one effect, and that of the same candidates for
+every case without any. How large the latter are by chance says from where on a candidate counts as found, at whatever
+rate of false alarms. Of axes and of vehicles alike; nothing is searched, nothing else is believed to be there.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hil.exam.axes.record_bytes import axis_record_of
+from hil.exam.cases import SIZES, Case, Kind
+from hil.exam.diagnosing import Progress, described, forbid_emulator, refuse_undiagnosed
+from hil.exam.folder import RECORDS, ExamFolder, read_exam
+from hil.exam.record_bytes import record_from_bytes
+from hil.exam.statistics import Rate, rate
+from hil.exam.workers import run_all
+from ident.diagnosis.axis.diagnose import pose_axis
+from ident.diagnosis.axis.reference import axis_reference
+from ident.diagnosis.known import NOTHING, log_evidence_of
+from ident.diagnosis.problem import Problem
+from ident.diagnosis.vehicle.diagnose import pose_vehicle
+from ident.errors import UserError
+from ident.writing import write_whole
+
+
+def asked_of_oracle(cases: Sequence[Case]) -> dict[str, tuple[str, ...]]:
+    """Candidates that the oracle looks for, by case: the true one, or where there is none each of those."""
+    single = {case.identifier: (_key(case),) for case in cases if case.kind is Kind.EFFECT}
+    known = tuple(sorted({key for (key,) in single.values()}))
+    return single | {case.identifier: known for case in cases if case.kind is Kind.NONE}
+
+
+def ask_oracle(
+    folder: ExamFolder,
+    asked: Mapping[str, Sequence[str]],
+    *,
+    jobs: int,
+    scheduler: str | None,
+    progress: Progress,
+) -> None:
+    """Gather the evidence of known candidates, of all cases that have records and no such answer yet.
+
+    Args:
+        folder: of the exam.
+        asked: candidates by case.
+        jobs: processes on this machine.
+        scheduler: of a Dask cluster, None for this machine.
+        progress: called with cases done and in all.
+
+    Raises:
+        UserError: there is no exam, or cases of a sealed one have not been diagnosed yet.
+    """
+    forbid_emulator()
+    exam = read_exam(folder)
+    if exam.sealed:
+        refuse_undiagnosed(folder, [one for one in exam.identifiers if folder.complete(one)])
+    there = [identifier for identifier in asked if folder.complete(identifier)]
+    left = [identifier for identifier in there if not folder.oracle(identifier).is_file()]
+    texts = None if exam.of_axes else tuple(path.read_text(encoding="utf-8") for path in (folder.vehicle, folder.model))
+    tasks = (
+        (one, *(folder.record(one, which).read_bytes() for which in RECORDS), texts, tuple(asked[one])) for one in left
+    )
+    progress(len(there) - len(left), len(there))
+    for done, (identifier, content) in enumerate(
+        run_all(evidence_of_case, tasks, jobs=jobs, scheduler=scheduler), len(there) - len(left) + 1
+    ):
+        write_whole(content, folder.oracle(identifier))
+        progress(done, len(there))
+
+
+def evidence_of_case(
+    identifier: str, fit: bytes, confirm: bytes, texts: tuple[str, str] | None, keys: Sequence[str]
+) -> tuple[str, bytes]:
+    """Log evidence of known candidates by key, as JSON, null for none; runs in a worker.
+
+    Args:
+        identifier: of the case.
+        fit, confirm: its records, as Parquet.
+        texts: of the files of vehicle and model; None: an axis.
+        keys: of the candidates.
+    """
+    forbid_emulator()
+    try:
+        problems = _axis(fit, confirm) if texts is None else _vehicle(fit, confirm, *texts)
+        found = log_evidence_of(*problems, keys, seed=1)
+    except (ArithmeticError, ValueError, UserError):
+        # A record that the diagnosis refuses shows an oracle nothing either.
+        found = dict.fromkeys(keys, NOTHING)
+    return identifier, json.dumps({key: value if np.isfinite(value) else None for key, value in found.items()}).encode()
+
+
+def _axis(fit: bytes, confirm: bytes) -> tuple[Problem, Problem]:
+    records = [axis_record_of(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
+    return pose_axis(records[:1], records[1:], axis_reference(records[:1], None, records[1:]))
+
+
+def _vehicle(fit: bytes, confirm: bytes, vehicle: str, model: str) -> tuple[Problem, Problem]:
+    records = [record_from_bytes(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
+    return pose_vehicle(records[:1], records[1:], *described(vehicle, model)).problems
+
+
+def oracle_rates(folder: ExamFolder, cases: Sequence[Case], false_alarms: float) -> dict[float, Rate]:
+    """What the oracle finds, by size in noise units; empty where it was not asked.
+
+    Args:
+        folder: of the exam.
+        cases: from its answer.
+        false_alarms: rate at which candidates of cases without any effect shall count as found.
+    """
+    said = {
+        case.identifier: json.loads(path.read_text(encoding="utf-8"))
+        for case in cases
+        if (path := folder.oracle(case.identifier)).is_file()
+    }
+    chance = [value for case in cases if case.kind is Kind.NONE for value in _values(said.get(case.identifier, {}))]
+    if not chance:
+        return {}
+    least = max(float(np.quantile(chance, 1 - false_alarms)), 0.0)
+    asked = [case for case in cases if case.kind is Kind.EFFECT and case.identifier in said]
+    return {
+        size: rate([_values(said[case.identifier])[0] > least for case in asked if case.noise_units == size])
+        for size in SIZES
+    }
+
+
+def _values(said: Mapping[str, float | None]) -> list[float]:
+    """Log evidence; of what is invisible the least there is."""
+    return [np.finfo(float).min if value is None else value for value in said.values()]
+
+
+def _key(case: Case) -> str:
+    (effect,) = case.effects
+    return f"{effect.name}@{effect.where}"
