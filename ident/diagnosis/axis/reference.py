@@ -22,7 +22,7 @@ from ident.diagnosis.axis.motion import (
     repeat_duration,
     sample_noise,
 )
-from ident.diagnosis.axis.reversals import Sticking, Untold, untold_while_sticking
+from ident.diagnosis.axis.reversals import Sticking, Untold, turned_round, untold_while_sticking
 from ident.diagnosis.delays import delayed
 from ident.errors import EstimationError, RecordError
 from ident.estimate.axis.cutoff import LARGEST_CUTOFF, position_cutoff
@@ -111,6 +111,7 @@ class Signals:
                 friction=float(scale.values[PARAMETERS.index("Fc")]),
                 noise=sample_noise(motion.effort, dt),
                 blur=1 / (self.cutoff * dt),
+                ends=turned_round(motion.position_noise, float(scale.values[PARAMETERS.index("M")]), dt),
             )
             found.append(untold_while_sticking(sticking, motion.moving, self.filtered, 1 / (self.bandwidth * dt)))
         return found

@@ -5,6 +5,9 @@ there are left out. But rows are filtered, and of a filter of fourth order a fif
 of its time constants: a friction that turns half a millisecond early, between two samples, is seen from there and looks
 like a spring. How early or late it may turn is known: as long as the axis may stick. So an impulse when that begins,
 and one when it ends, are random effects of a known size, and what rows have of them is weighed down accordingly.
+
+So is an impulse at either end of the record: beyond it the terms of the equation go on as in a mirror, in which the
+speed turns round. What is measured of the speed there is noisy, and its inertia's part of the turn is not in the terms.
 """
 
 from __future__ import annotations
@@ -55,12 +58,14 @@ class Sticking:
         friction: that turns there [N or Nm].
         noise: of the effort, of a sample [N or Nm].
         blur: samples over which the velocity that says where has been smoothed.
+        ends: deviation of an impulse at either end of the record [N or Nm, times samples].
     """
 
     where: Mask
     friction: float
     noise: float
     blur: float
+    ends: float
 
 
 def untold_while_sticking(
@@ -78,20 +83,36 @@ def untold_while_sticking(
     unit = np.zeros(2 * reach + 1)
     unit[reach] = 1.0
     response = filtered(unit)
+    # Uniform over the time that it may turn in, half of it at either end.
+    turns = [
+        (at, 2 * abs(sticking.friction) * (samples + sticking.blur) / math.sqrt(24))
+        for at, samples in _ends(sticking.where)
+    ]
     found = []
-    for at, samples in _ends(sticking.where):
+    for at, deviation in [*turns, (0, sticking.ends), (len(moving) - 1, sticking.ends)]:
         first, last = max(at - reach, 0), min(at + reach + 1, len(moving))
         seen = np.where(moving[first:last], response[first - at + reach : last - at + reach], 0.0)
-        # Uniform over the time that it may turn in, half of it at either end.
-        deviation = 2 * abs(sticking.friction) * (samples + sticking.blur) / math.sqrt(24)
         found.append((np.arange(first, last), seen * deviation / sticking.noise))
-    if not found:
-        return Untold()
     rows = np.concatenate([places for places, _ in found])
     columns = np.repeat(np.arange(len(found)), [len(places) for places, _ in found])
     values = np.concatenate([seen for _, seen in found])
     impulses = sparse.csr_matrix((values, (rows, columns)), shape=(len(moving), len(found)))
     return Untold(impulses, linalg.factorized((impulses.T @ impulses + sparse.identity(len(found))).tocsc()))
+
+
+def turned_round(position_noise: float, inertia: float, sample_time: float) -> float:
+    """Deviation of the impulse at an end of a record, over which the speed turns round: twice that speed's, times inertia.
+
+    Args:
+        position_noise: of a sample [m or rad].
+        inertia: [kg or kg m²].
+        sample_time: [s].
+
+    Returns:
+        Force or torque times samples [N or Nm].
+    """
+    speed_noise = math.sqrt(2) * position_noise / sample_time
+    return 2 * abs(inertia) * speed_noise / sample_time
 
 
 def _ends(where: Mask) -> Iterator[tuple[int, int]]:

@@ -43,7 +43,7 @@ def sticking_at(*stretches: tuple[int, int]) -> tuple[NDArray[np.bool_], NDArray
 
 def untold(*stretches: tuple[int, int], friction: float = 30.0) -> tuple[Untold, NDArray[np.bool_]]:
     where, moving = sticking_at(*stretches)
-    sticking = Sticking(where, friction, noise=1e-3, blur=2.0)
+    sticking = Sticking(where, friction, noise=1e-3, blur=2.0, ends=0.0)
     return untold_while_sticking(sticking, moving, filtered, 1 / (CUTOFF * SAMPLE_TIME)), moving
 
 
