@@ -114,16 +114,11 @@ class Judgement:
     def worthwhile(self) -> tuple[int, ...]:
         """The effects without one that widens the held-out gap, is of no size itself, or closes next to nothing.
 
-        Where nothing repeats and the gap is within what such a record tells of its noise, only the rows that took no
-        part in the fit can speak for an effect, and must do so clearly.
+        A gap within the accidents of the noise can seem to be widened by what the rows are for.
         """
         closed = self.fitted.closed
-        if not self._repeats.sizes and not self._measurable():
-            weak = [index for index in range(self.fitted.count) if self._log_predictive(index) < self.limits.sure]
-            if weak:
-                return self.fitted.others(min(weak, key=self._log_predictive))
         widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
-        refuted = [index for index in widened if self._measurable() or self._log_predictive(index) < self.limits.sure]
+        refuted = widened if self._measurable() else []
         laws = [index for index in range(self.fitted.count) if self._law(index)]
         bent = [index for index in laws if self.fitted.closed_where_it_acts(index) < self.limits.law]
         for superfluous in (refuted, bent):

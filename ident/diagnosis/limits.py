@@ -31,7 +31,6 @@ class Limits:
         law: share of the held-out gap that a law must close, and log of it that a law costs where explanations compete.
         name: log of it that a name costs there (several of them bend to a curve as well), and must gain beside others.
         blur: part of the noise's power that no explanation is asked to come nearer to than another, where they compete.
-        sure: log Bayes factor of the confirming rows from which an effect stands although it seems to, by accident.
         unsteady: log evidence, for other sizes of the effects in some steps, from which they are not what they seem.
         bent: the same as a share of the evidence for the effects: columns are not quite what a large effect does.
         sized: standard deviations that an effect must have in size where something else comes along with it.
@@ -60,7 +59,6 @@ class Limits:
     law: float = 0.12
     name: float = 0.05
     blur: float = 0.5
-    sure: float = 2.5
     unsteady: float = 5.0
     bent: float = 1e-3
     sized: float = 2.0

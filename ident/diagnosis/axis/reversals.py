@@ -101,7 +101,7 @@ def untold_while_sticking(
 
 
 def turned_round(position_noise: float, inertia: float, sample_time: float) -> float:
-    """Deviation of the impulse at an end of a record, over which the speed turns round: twice that speed's, times inertia.
+    """Deviation of the impulse at an end of a record, where the speed turns round: twice its own, times inertia.
 
     Args:
         position_noise: of a sample [m or rad].
