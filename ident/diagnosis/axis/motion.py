@@ -77,22 +77,26 @@ class AxisMotion:
     moving: NDArray[np.bool_]
 
 
-def noise_limit(axis: AxisSignals, inertia: float, cutoff: float, duration: float, sample_time: float) -> float:
+def noise_limit(
+    axis: AxisSignals, inertia: float, left: float, cutoff: float, duration: float, sample_time: float
+) -> float:
     """Frequency [rad/s] below which the noise of the acceleration, times the inertia, is well below that of the effort.
 
     Beyond it, errors of the regressor look like an elastic drive, or like a law of the acceleration: what is measured
     of it where there is little is noise, and the best prediction of the effort from that is none. Rows below it are
-    fewer, LEAST_ROWS at least, and none are beyond the position's cutoff.
+    fewer, LEAST_ROWS at least, and none are beyond the position's cutoff. An effort may hold more than noise where its
+    noise is looked for, and so may what a model leaves: the smaller of the two is taken.
 
     Args:
         axis: with its noise.
         inertia: of it [kg or kg m²].
+        left: power density of what a first estimate leaves of the effort in the rows [per Hz].
         cutoff: of the position filter [rad/s].
         duration: of a repeat, or of the record without any [s].
         sample_time: [s].
     """
     position, effort = (_noise_power(series, sample_time) for series in (axis.position, axis.effort))
-    level = NOISE_SHARE * effort / max(inertia**2 * position, np.finfo(float).tiny)
+    level = NOISE_SHARE * min(effort, left) / max(inertia**2 * position, np.finfo(float).tiny)
     fewest = min(2 * math.pi * LEAST_ROWS / (ROWS_PER_CUTOFF * duration), ROWS_CUTOFF * cutoff)
     return float(np.clip(level**0.25, fewest, min(cutoff, LARGEST_ROWS_CUTOFF / sample_time)))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -35,6 +36,9 @@ Array = NDArray[np.float64]
 NEAREST: Final = 0.02
 """Of the rows, that are nearest to a reversal, or slowest."""
 
+PASSED: Final = 3 * np.pi / (8 * math.sqrt(2))
+"""Noise bandwidth of the filter of the rows over its cutoff: the integral of 1 / (1 + x⁴)² over x."""
+
 LARGEST_HOLD: Final = 1.0
 """Sample intervals up to which a first estimate of the lag may be what sampling does; other effects shift it."""
 
@@ -51,6 +55,7 @@ class Scale:
         hold: sample intervals by which its motion follows its effort as recorded, if sampling can be why: an effort
             that is held over the interval acts half of one late. None: longer, and a cause of its own.
         lag: the same as a time, a first estimate [s].
+        noise: power density of what the first estimate leaves of the rows, one-sided [N² or (Nm)², per Hz].
     """
 
     values: Array
@@ -59,6 +64,7 @@ class Scale:
     reach: float
     hold: float | None
     lag: float
+    noise: float
 
 
 @dataclass(frozen=True)
@@ -164,7 +170,7 @@ def axis_reference(
     signals = [axis_signals(record, chosen, ROWS_CUTOFF * chosen) for record in records]
     scales = tuple(_scale(signals, index) for index in range(len(records[0].axes)))
     limits = [
-        noise_limit(axis, scale.values[0], chosen, repeat_duration(record), record.sample_time)
+        noise_limit(axis, scale.values[0], scale.noise, chosen, repeat_duration(record), record.sample_time)
         for record in records
         for axis, scale in zip(record.axes, scales, strict=True)
     ]
@@ -241,6 +247,7 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
     slowest = float(np.quantile(np.concatenate([np.abs(one.velocity[one.moving]) for one in motions]), NEAREST))
     reach = float(np.ptp(np.concatenate([motion.position for motion in motions])))
     sampled = abs(lag) <= LARGEST_HOLD
+    rest = right - np.column_stack([left, bend]) @ [*refined, lag]
     return Scale(
         np.array(refined) if sampled else values,
         speed,
@@ -248,6 +255,7 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
         reach,
         float(lag) if sampled else None,
         lag * record.sample_time,
+        float(rest @ rest) / len(rest) / (PASSED * signals[0].bandwidth / (2 * np.pi)),
     )
 
 
