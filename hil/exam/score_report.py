@@ -36,22 +36,22 @@ class ScoreReport:
         permuted: of the same answers beside other truths.
         chance: share that is expected of them, over all permutations.
         without: rates of the run without the true candidate; empty where there was none.
-        oracle: what somebody finds who knows the candidate, by size; empty where nobody was asked.
         worlds: vehicle and engine that the cases were driven with, in words, of every exam.
         first_seeds: that the cases follow from, of exams that are not sealed.
         sources: score of each world by itself, where there are several.
         left_out: each of them with probabilities calibrated on the others.
+        oracle: what somebody finds who knows the candidate, by size; empty where nobody was asked.
     """
 
     score: Score
     permuted: Rate
     chance: float
     without: Mapping[str, Rate]
-    oracle: Mapping[str, Rate]
     worlds: tuple[str, ...]
     first_seeds: tuple[int, ...] = ()
     sources: Mapping[str, Score] = field(default_factory=dict)
     left_out: Mapping[str, LeftOut] = field(default_factory=dict)
+    oracle: Mapping[str, Rate] = field(default_factory=dict)
 
     @property
     def origin(self) -> str:

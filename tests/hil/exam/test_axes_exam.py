@@ -17,7 +17,12 @@ from hil.exam.axes.sizes import Ruler
 from hil.exam.cases import Kind
 from hil.exam.drawing import Composition, composition_of
 from hil.exam.lots import lots_of_seed
+from hil.exam.score_names import ORACLE
 from hil.exam.sources import Source
+from hil.exam.sources.machine import Machine
+from ident.diagnosis.axis.diagnose import pose_axis
+from ident.diagnosis.axis.reference import axis_reference
+from ident.diagnosis.known import NOTHING, log_evidence_of
 from ident.errors import UserError
 
 SEED = 6100001
@@ -82,13 +87,40 @@ def test_it_is_sealed_diagnosed_and_scored(tmp_path: Path) -> None:
     kinds = ("--effects", "1", "--pairs", "0", "--none", "1", "--laws", "1", "--jobs", "1")
     sealed = quasiomni("exam", "seal", "--source", "axes", "--out", out, *key, *kinds)
     assert sealed.returncode == 0, sealed.stderr
-    for option in ([], ["--without-true-candidate", *key]):
+    early = quasiomni("exam", "diagnose", out, "--oracle", *key)
+    assert early.returncode == 2
+    assert "not diagnosed yet" in " ".join(early.stderr.split())
+    for option in ([], ["--without-true-candidate", *key], ["--oracle", *key]):
         diagnosed = quasiomni("exam", "diagnose", out, "--jobs", "1", *option)
         assert diagnosed.returncode == 0, diagnosed.stderr
     scored = quasiomni("exam", "score", out, *key)
     assert scored.returncode == 0, scored.stderr
     score = json.loads((tmp_path / "exam" / "score.json").read_text())
     assert (score["cases"], score["sealed"], score["missing"]) == (3, True, {})
+    assert sum(name.startswith(ORACLE) for name in score["rates"]) == 1
+
+
+def test_an_oracle_that_knows_the_truth_is_not_asked_without_it(tmp_path: Path) -> None:
+    refused = quasiomni("exam", "diagnose", str(tmp_path), "--oracle", "--without-true-candidate")
+    assert refused.returncode == 2
+    assert "cannot be left out" in " ".join(refused.stderr.split())
+
+
+def test_an_oracle_finds_a_cause_that_is_there_and_hardly_one_that_is_not() -> None:
+    """Evidence of the true candidate, against that of the same one in the same machine without it."""
+    case = sized_case(Question(Kind.EFFECT, ("asymmetric_viscous",), 1.0, (1.0,)), "case", SEED)
+    machine, _ = machine_of(case.seed, case.excitation)
+    key = f"{case.effects[0].name}@{case.effects[0].where}"
+
+    def evidence(lacking: Machine) -> float:
+        records = [lacking.drive(seed) for seed in (case.seed, case.seed + 1)]
+        problems = pose_axis(records[:1], records[1:], axis_reference(records[:1], None, records[1:]))
+        found = log_evidence_of(*problems, (key, "backlash@nowhere"), seed=1)
+        assert found["backlash@nowhere"] == NOTHING
+        return found[key]
+
+    assert evidence(machine_with(machine, case.effects)) > 10
+    assert evidence(machine) < 3
 
 
 @pytest.mark.parametrize(
