@@ -40,8 +40,6 @@ class Evidence:
         scale: (V,) how much more than white noise the ratio scatters, at least 1; the variant itself taken away before.
             Variants that point where the best one does have its scale: what tells them apart is the fit, not the noise.
         log_evidence: (V,) half the scaled ratio, less the price of its coefficients; -inf where nothing is visible.
-        log_fitted: (V,) half the scaled ratio in the fitted rows alone; of all rows, where in those the parameters
-            absorb what is there.
         log_predictive: (V,) log Bayes factor of the confirming rows, given the fitted ones; 0 without any.
         confirming: (V,) share of the confirming rows in the power of what each variant adds, as it was fitted.
         significance: probability of so large a maximum over all variants without any effect.
@@ -52,7 +50,6 @@ class Evidence:
     surrogates: Array
     scale: Array
     log_evidence: Array
-    log_fitted: Array
     log_predictive: Array
     confirming: Array
     significance: float
@@ -88,15 +85,13 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
     tested = np.where(competing, 0.5 * ratios / spread - price, -np.inf)
     by_chance = np.where((sizes > 0) & ~excluded, 0.5 * found.ratios(surrogates) / spread - price, -np.inf)
     competing &= own / scale > 0.5 * (sizes - beside) * math.log(len(white.target))
-    log_fitted, log_predictive = _in_turn(white, layout, found, amplitudes, scale)
     return Evidence(
         directions=found,
         amplitudes=amplitudes,
         surrogates=surrogates,
         scale=scale,
         log_evidence=np.where(competing, 0.5 * ratios / scale - price, -np.inf),
-        log_fitted=log_fitted,
-        log_predictive=log_predictive,
+        log_predictive=_in_turn(white, layout, found, amplitudes, scale),
         confirming=np.array([_confirming(white, column, found, amplitudes, v) for v, column in enumerate(layout)]),
         significance=significance(tested.max(initial=-np.inf), by_chance.max(axis=1, initial=-np.inf)),
     )
@@ -155,24 +150,18 @@ def _overlap(found: Directions, amplitudes: Array, variant: int) -> Array:
     return np.asarray(np.minimum(share, 1.0))
 
 
-def _in_turn(
-    white: White, layout: Sequence[Column], found: Directions, amplitudes: Array, scale: Array
-) -> tuple[Array, Array]:
-    """Half the scaled ratio of the fitted rows, and the log Bayes factor that the confirming rows add to it.
+def _in_turn(white: White, layout: Sequence[Column], found: Directions, amplitudes: Array, scale: Array) -> Array:
+    """What the confirming rows add (V,) to half the scaled ratio of the fitted ones.
 
     The coefficients are known from the fit as well as it shows them. For Gaussian noise and flat priors the factor is
     half the gain of the likelihood ratio less half the gain of the log-determinant: a coefficient that the fit got
     wrong predicts the confirming rows worse than none.
     """
-    whole = 0.5 * found.ratios(amplitudes) / scale
     if not white.confirming.any():
-        return whole, np.zeros(len(layout))
+        return np.zeros(len(layout))
     fitted = directions(white, layout, ~white.confirming)
-    before = 0.5 * fitted.ratios(fitted.basis.T @ fitted.residual) / scale
-    factor = whole - before - 0.5 * (found.volume - fitted.volume)
-    there = np.any(white.columns[~white.confirming] != 0, axis=0)
-    absorbed = (fitted.sizes == 0) & np.array([bool(there[column.place].any()) for column in layout])
-    return np.where(absorbed, whole, before), np.asarray(factor)
+    gained = found.ratios(amplitudes) - fitted.ratios(fitted.basis.T @ fitted.residual)
+    return np.asarray(0.5 * gained / scale - 0.5 * (found.volume - fitted.volume))
 
 
 def _confirming(white: White, column: Column, found: Directions, amplitudes: Array, variant: int) -> float:

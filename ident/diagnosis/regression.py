@@ -253,7 +253,7 @@ def in_both(evidence: Evidence, settings: Settings) -> Mask:
     """Variants (V,) that the fitted rows show and the confirming ones confirm."""
     whole = evidence.directions.ratios(evidence.amplitudes) / evidence.scale
     fitted, confirming = 1 - evidence.confirming, evidence.confirming
-    shown = (evidence.log_fitted >= settings.fitted) & _enough(fitted, whole, settings)
+    shown = _enough(fitted, whole, settings)
     confirmed = (evidence.log_predictive >= settings.confirmation) & _enough(confirming, whole, settings)
     return np.asarray(shown & confirmed)
 

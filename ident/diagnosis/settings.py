@@ -14,7 +14,6 @@ class Settings:
         pair_level: the same over all pairs.
         least: smallest log evidence of an effect alone, price paid: noise is never quite what surrogates make of it.
         beside: the same of one of several, for what their columns miss is no noise at all.
-        fitted: smallest log likelihood ratio of the fitted rows alone: what they do not show, nothing can confirm.
         confirmation: smallest log Bayes factor of the confirming rows.
         part: of what a cause does, that the fitted rows must show, and the confirming ones.
         plain: likelihood ratio of such a part from which it counts however small it is beside the other one.
@@ -30,7 +29,6 @@ class Settings:
     pair_level: float = 0.01
     least: float = 2.0
     beside: float = 2.5
-    fitted: float = 1.0
     confirmation: float = 0.0
     part: float = 0.01
     plain: float = 100.0
