@@ -190,10 +190,10 @@ class Judgement:
     def _short(self) -> bool:
         """Whether the model with all effects, refitted exactly, is further from the held-out rows than without any.
 
-        Or hardly nearer, where nothing repeats that would tell noise from what is left.
+        Or hardly nearer, where nothing repeats and what is left is too large to be called noise.
         """
-        least = -self.limits.widening if self._repeats.sizes else self.limits.most
-        return self._measurable() and self.fitted.exactly.closed < least
+        closed, hardly = self.fitted.exactly.closed, not self._repeats.sizes and self._far_off()
+        return self._measurable() and closed < (self.limits.most if hardly else -self.limits.widening)
 
     def _foreign(self) -> bool:
         """Whether something lasts in rows that the model itself says nothing of: what shows there is all of a cause.
