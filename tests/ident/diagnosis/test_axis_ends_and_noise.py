@@ -1,0 +1,72 @@
+"""Where the rows of an axis begin and end, in time and in frequency: noise of its position is no law of its effort."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hil.exam.sources.axes import Lacking, draw_axis
+from hil.exam.sources.machine import Machine
+from ident.diagnosis.axis.diagnose import diagnose_axis, pose_axis
+from ident.diagnosis.axis.reference import axis_reference
+from ident.diagnosis.diagnosis import Verdict
+from ident.diagnosis.problem import Problem
+
+Make = Callable[..., Any]
+
+
+@pytest.fixture
+def coarse(machine: Make) -> Machine:
+    """Heavy, with little noise of the effort and much of the position."""
+    made: Machine = machine(
+        mass=50.0, coulomb=16.0, viscous=33.0, noise=0.095, encoder=2.7e-6, rate=500.0, substeps=8, repeats=1,
+        duration=32.0, strokes=24, speeds=(0.06, 0.13, 0.19, 0.26, 0.32),
+    )  # fmt: skip
+    return made
+
+
+def _problems(machine: Machine, seed: int) -> tuple[Problem, Problem, float]:
+    records = [machine.drive(seed), machine.drive(seed + 1)]
+    reference = axis_reference(records[:1], None, records[1:])
+    return *pose_axis(records[:1], records[1:], reference), reference.bandwidth
+
+
+@pytest.mark.parametrize("seed", [71, 81])
+def test_the_noise_of_a_position_is_no_law_of_the_acceleration(coarse: Machine, seed: int) -> None:
+    assert diagnose_axis([coarse.drive(seed)], [coarse.drive(seed + 1)], seed=1).verdict is Verdict.NONE
+
+
+def test_rows_end_where_the_noise_of_the_acceleration_has_a_tenth_of_the_power_of_the_effort_s(coarse: Machine) -> None:
+    """Or not much beyond: what the effort's noise is taken from holds some of that of the acceleration."""
+    *_, bandwidth = _problems(coarse, 71)
+    wanted = (0.1 * coarse.noise**2 / (coarse.mass * coarse.encoder) ** 2) ** 0.25
+    assert 0.95 * wanted < bandwidth < 1.5 * wanted
+
+
+@pytest.mark.parametrize("seed", [9023, 9035, 9055])
+def test_rows_at_the_ends_of_a_record_are_as_near_to_the_model_as_all_others(seed: int) -> None:
+    """Machines whose records begin in mid-motion, their true parameters given."""
+    machine = draw_axis(seed, Lacking.NOTHING).machine
+    for problem in _problems(machine, seed)[:2]:
+        (block,) = problem.blocks
+        true = np.array([machine.mass, machine.viscous, machine.coulomb, machine.offset])
+        lag = block.baseline[block.moving, 4:]
+        left = (block.target - block.baseline[:, :4] @ true)[block.moving]
+        left = left - lag @ np.linalg.lstsq(lag, left, rcond=None)[0]
+        first = np.flatnonzero(block.moving) * block.sample_time
+        near = (first < 1.0) | (first > first[-1] - 1.0)
+        assert math.sqrt(np.mean(left[near] ** 2)) < 2 * math.sqrt(np.mean(left[~near] ** 2))
+
+
+@pytest.mark.parametrize("seed", [91, 93, 95, 97])
+def test_a_small_cause_is_named_where_the_gap_alone_would_be_called_noise(machine: Make, seed: int) -> None:
+    """Viscous friction that differs by half a hundredth from one way to the other: a tenth above the noise, which nothing repeated tells."""
+    made = machine(asymmetry=0.15, repeats=1, strokes=24, duration=16.0)
+    findings = diagnose_axis([made.drive(seed)], [made.drive(seed + 1)], seed=1)
+    assert findings.gap.before < 1.15
+    assert [str(cause.candidate.effect) for cause in findings.causes] == ["asymmetric_viscous"]
+    assert findings.verdict is Verdict.EFFECT
