@@ -64,7 +64,7 @@ def test_rows_at_the_ends_of_a_record_are_as_near_to_the_model_as_all_others(see
 
 @pytest.mark.parametrize("seed", [91, 93, 95, 97])
 def test_a_small_cause_is_named_where_the_gap_alone_would_be_called_noise(machine: Make, seed: int) -> None:
-    """Viscous friction that differs by half a hundredth from one way to the other: a tenth above the noise, which nothing repeated tells."""
+    """Viscous friction of 60 N s/m that differs by 0.15 from one way to the other."""
     made = machine(asymmetry=0.15, repeats=1, strokes=24, duration=16.0)
     findings = diagnose_axis([made.drive(seed)], [made.drive(seed + 1)], seed=1)
     assert findings.gap.before < 1.15
