@@ -10,18 +10,20 @@
  * on as the system does for a socket of its own. Its plain reads must ask for no more than a frame.
  *
  * In other files: which interfaces there are (interfaces.c), what is sent (sending.c), descriptors that come and go
- * (descriptors.c), the sending half of CAN_BCM (broadcast.c).
+ * (descriptors.c), the sending half of CAN_BCM (broadcast.c), CAN_ISOTP (isotp.c).
  *
- * Not here: CAN FD, CAN_ISOTP, netlink. "any" (interface index 0) is the first interface.
+ * Not here: CAN FD, CAN_J1939, netlink. "any" (interface index 0) is the first interface.
  */
 #define _GNU_SOURCE
 #include "interfaces.h"
+#include "isotp.h"
 #include "real.h"
 #include "sockets.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/can.h>
+#include <linux/can/isotp.h>
 #include <linux/can/raw.h>
 #include <poll.h>
 #include <stdarg.h>
@@ -35,7 +37,6 @@
 #include <unistd.h>
 
 #define SOCKETS 4096
-#define HELLO_MAGIC 0x4e414351u /* "QCAN" */
 #define OWN_FRAMES 1u
 #define JOIN_FILTERS 2u
 #define ACKNOWLEDGE 4u
@@ -95,12 +96,14 @@ int socket(int domain, int type, int protocol) {
     int flags = type & (SOCK_CLOEXEC | SOCK_NONBLOCK);
     int raw = (type & ~flags) == SOCK_RAW && protocol == CAN_RAW;
     int broadcast = (type & ~flags) == SOCK_DGRAM && protocol == CAN_BCM;
+    int messages = (type & ~flags) == SOCK_DGRAM && protocol == CAN_ISOTP;
+    struct isotp *isotp = NULL;
     if (domain != PF_CAN || interfaces_known() == 0) return real(domain, type, protocol);
-    if (!raw && !broadcast) {
-        errno = EPROTONOSUPPORT; /* As a kernel without the module: CAN_ISOTP and CAN_J1939 are state machines in it. */
+    if (!raw && !broadcast && !messages) {
+        errno = EPROTONOSUPPORT; /* As a kernel without the module: CAN_J1939. */
         return -1;
     }
-    int fd = real(AF_UNIX, SOCK_SEQPACKET | flags, 0);
+    int fd = messages ? isotp_open(flags, &isotp) : real(AF_UNIX, SOCK_SEQPACKET | flags, 0);
     if (fd < 0) return fd;
     struct can_socket *entry = fd < SOCKETS ? calloc(1, sizeof *entry) : NULL;
     if (!entry) {
@@ -111,6 +114,7 @@ int socket(int domain, int type, int protocol) {
     if (sockets[fd]) socket_release(fd);
     entry->references = 1;
     entry->broadcast = broadcast;
+    entry->isotp = isotp;
     entry->count = raw ? 1 : 0; /* One filter of zeros: everything, as the kernel has it. */
     entry->hello.magic = HELLO_MAGIC;
     sockets[fd] = entry;
@@ -139,8 +143,7 @@ int socket_reach(int fd, int interface) {
     return -1;
 }
 
-/* Connects a socket to the hub of the interface in an address. */
-static int join(int fd, struct can_socket *entry, const struct sockaddr_can *wanted) {
+int socket_join(int fd, struct can_socket *entry, const struct sockaddr_can *wanted) {
     int chosen = wanted->can_ifindex ? interface_of_index(wanted->can_ifindex) : 0;
     if (socket_reach(fd, chosen) < 0) return -1;
     entry->interface = chosen;
@@ -155,19 +158,21 @@ int bind(int fd, const struct sockaddr *address, socklen_t length) {
     typedef int (*bind_t)(int, const struct sockaddr *, socklen_t);
     struct can_socket *entry = socket_of(fd);
     if (!entry || address->sa_family != AF_CAN) return REAL(bind_t, "bind")(fd, address, length);
-    return join(fd, entry, (const struct sockaddr_can *)address);
+    if (entry->isotp) return isotp_bind(entry->isotp, (const struct sockaddr_can *)address, length);
+    return socket_join(fd, entry, (const struct sockaddr_can *)address);
 }
 
 int connect(int fd, const struct sockaddr *address, socklen_t length) {
     typedef int (*connect_t)(int, const struct sockaddr *, socklen_t);
     struct can_socket *entry = address && address->sa_family == AF_CAN ? socket_of(fd) : NULL;
     if (!entry) return REAL(connect_t, "connect")(fd, address, length);
-    return join(fd, entry, (const struct sockaddr_can *)address);
+    return socket_join(fd, entry, (const struct sockaddr_can *)address);
 }
 
 static void write_address(const struct can_socket *entry, void *address, socklen_t *length) {
     struct sockaddr_can sender = {.can_family = AF_CAN, .can_ifindex = interface_index(entry->interface)};
     if (!address || !length) return;
+    if (entry->isotp) sender = *isotp_address(entry->isotp);
     memcpy(address, &sender, *length < sizeof sender ? *length : sizeof sender);
     *length = sizeof sender;
 }
@@ -212,10 +217,13 @@ static int set_option(struct can_socket *entry, int name, const void *value, soc
 
 int setsockopt(int fd, int level, int name, const void *value, socklen_t size) {
     typedef int (*setsockopt_t)(int, int, int, const void *, socklen_t);
-    int drops = level == SOL_SOCKET && name == SO_RXQ_OVFL;
-    struct can_socket *entry = level == SOL_CAN_RAW || drops ? socket_of(fd) : NULL;
+    int drops = level == SOL_SOCKET && name == SO_RXQ_OVFL, messages = level == SOL_CAN_ISOTP;
+    struct can_socket *entry = level == SOL_CAN_RAW || drops || messages ? socket_of(fd) : NULL;
     if (!entry) return REAL(setsockopt_t, "setsockopt")(fd, level, name, value, size);
-    int error = drops ? set_flag(entry, DROPS, value, size) : set_option(entry, name, value, size);
+    int error = drops              ? set_flag(entry, DROPS, value, size)
+                : messages != !!entry->isotp ? ENOPROTOOPT
+                : messages         ? isotp_set(entry->isotp, name, value, size)
+                                   : set_option(entry, name, value, size);
     if (error) {
         errno = error;
         return -1;
@@ -235,16 +243,22 @@ static int copy_out(void *value, socklen_t *size, const void *from, size_t lengt
 
 int getsockopt(int fd, int level, int name, void *value, socklen_t *size) {
     typedef int (*getsockopt_t)(int, int, int, void *, socklen_t *);
-    struct can_socket *entry = level == SOL_CAN_RAW || level == SOL_SOCKET ? socket_of(fd) : NULL;
+    int can = level == SOL_CAN_RAW || level == SOL_CAN_ISOTP;
+    struct can_socket *entry = can || level == SOL_SOCKET ? socket_of(fd) : NULL;
     int answer = 0;
     if (entry && level == SOL_SOCKET && (name == SO_DOMAIN || name == SO_TYPE || name == SO_PROTOCOL)) {
-        int type = entry->broadcast ? SOCK_DGRAM : SOCK_RAW, protocol = entry->broadcast ? CAN_BCM : CAN_RAW;
+        int type = entry->broadcast || entry->isotp ? SOCK_DGRAM : SOCK_RAW;
+        int protocol = entry->broadcast ? CAN_BCM : entry->isotp ? CAN_ISOTP : CAN_RAW;
         answer = name == SO_DOMAIN ? AF_CAN : name == SO_TYPE ? type : protocol;
         return copy_out(value, size, &answer, sizeof answer);
     }
     if (entry && level == SOL_SOCKET && name == SO_RXQ_OVFL) {
         answer = (entry->hello.flags & DROPS) != 0;
         return copy_out(value, size, &answer, sizeof answer);
+    }
+    if (entry && can && (level == SOL_CAN_ISOTP || entry->isotp)) {
+        errno = level == SOL_CAN_ISOTP && entry->isotp ? isotp_get(entry->isotp, name, value, size) : ENOPROTOOPT;
+        return errno ? -1 : 0;
     }
     if (!entry || level != SOL_CAN_RAW) return REAL(getsockopt_t, "getsockopt")(fd, level, name, value, size);
     switch (name) {
@@ -261,9 +275,9 @@ int getsockopt(int fd, int level, int name, void *value, socklen_t *size) {
 }
 
 /* Whether a frame is the receiver's own, as the hub has marked it; the mark is taken away. */
-static int take_mark(void *data, ssize_t received) {
+static int take_mark(const struct can_socket *entry, void *data, ssize_t received) {
     struct can_frame *frame = data;
-    if (received != (ssize_t)sizeof *frame || frame->__pad != OWN_MARK) return 0;
+    if (entry->isotp || received != (ssize_t)sizeof *frame || frame->__pad != OWN_MARK) return 0;
     frame->__pad = 0;
     return 1;
 }
@@ -275,7 +289,7 @@ ssize_t recvfrom(int fd, void *data, size_t size, int flags, struct sockaddr *ad
     if (!entry) return real(fd, data, size, flags, address, length);
     ssize_t received = real(fd, data, size, flags, NULL, NULL);
     if (received >= 0) write_address(entry, address, length);
-    take_mark(data, received);
+    take_mark(entry, data, received);
     return received;
 }
 
@@ -342,7 +356,7 @@ ssize_t recvmsg(int fd, struct msghdr *message, int flags) {
     }
     write_address(entry, address, &length);
     message->msg_namelen = address ? length : 0;
-    if (message->msg_iovlen == 1 && take_mark(message->msg_iov[0].iov_base, received))
+    if (message->msg_iovlen == 1 && take_mark(entry, message->msg_iov[0].iov_base, received))
         message->msg_flags |= MSG_CONFIRM | MSG_DONTROUTE;
     return received;
 }
