@@ -114,8 +114,11 @@ struct option {
 #define OPTION(member) {offsetof(struct isotp, member), sizeof ((struct isotp *)0)->member}
 
 static const struct option options[] = {
-    [CAN_ISOTP_OPTS] = OPTION(options),      [CAN_ISOTP_RECV_FC] = OPTION(flow),  [CAN_ISOTP_TX_STMIN] = OPTION(tx_stmin),
-    [CAN_ISOTP_RX_STMIN] = OPTION(rx_stmin), [CAN_ISOTP_LL_OPTS] = OPTION(link),
+    [CAN_ISOTP_OPTS] = OPTION(options),
+    [CAN_ISOTP_RECV_FC] = OPTION(flow),
+    [CAN_ISOTP_TX_STMIN] = OPTION(tx_stmin),
+    [CAN_ISOTP_RX_STMIN] = OPTION(rx_stmin),
+    [CAN_ISOTP_LL_OPTS] = OPTION(link),
 };
 
 static const struct option *option(int name) {
