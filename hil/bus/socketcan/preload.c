@@ -164,6 +164,10 @@ int connect(int fd, const struct sockaddr *address, socklen_t length) {
     typedef int (*connect_t)(int, const struct sockaddr *, socklen_t);
     struct can_socket *entry = address && address->sa_family == AF_CAN ? socket_of(fd) : NULL;
     if (!entry) return REAL(connect_t, "connect")(fd, address, length);
+    if (entry->isotp) {
+        errno = EOPNOTSUPP; /* Its two identifiers are given to bind(). */
+        return -1;
+    }
     return socket_join(fd, entry, (const struct sockaddr_can *)address);
 }
 
@@ -218,10 +222,10 @@ int setsockopt(int fd, int level, int name, const void *value, socklen_t size) {
     int drops = level == SOL_SOCKET && name == SO_RXQ_OVFL, messages = level == SOL_CAN_ISOTP;
     struct can_socket *entry = level == SOL_CAN_RAW || drops || messages ? socket_of(fd) : NULL;
     if (!entry) return REAL(setsockopt_t, "setsockopt")(fd, level, name, value, size);
-    int error = drops              ? set_flag(entry, DROPS, value, size)
-                : messages != !!entry->isotp ? ENOPROTOOPT
-                : messages         ? isotp_set(entry->isotp, name, value, size)
-                                   : set_option(entry, name, value, size);
+    int error = ENOPROTOOPT;
+    if (drops) error = set_flag(entry, DROPS, value, size);
+    else if (messages && entry->isotp) error = isotp_set(entry->isotp, name, value, size);
+    else if (!messages && !entry->isotp) error = set_option(entry, name, value, size);
     if (error) {
         errno = error;
         return -1;

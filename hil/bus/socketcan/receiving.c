@@ -73,7 +73,7 @@ static ssize_t receive_with_drops(int fd, struct msghdr *message, int flags) {
 }
 
 static int wants_drops(const struct can_socket *entry, const struct msghdr *message) {
-    return entry->hello.flags & DROPS && message->msg_iovlen == 1 &&
+    return !entry->isotp && entry->hello.flags & DROPS && message->msg_iovlen == 1 &&
            message->msg_iov->iov_len >= sizeof(struct can_frame);
 }
 

@@ -261,6 +261,7 @@ def refused(call):
 print(refused(lambda: s.send(b'x')))
 print(refused(lambda: s.setsockopt(106, 1, struct.pack('=IIBBBB', 0x002, 0, 0, 0, 0, 0))))
 print(refused(lambda: s.setsockopt(106, 5, struct.pack('=BBB', 72, 64, 0))))
+s.setsockopt(socket.SOL_SOCKET, 40, 1)  # SO_RXQ_OVFL
 s.setsockopt(106, 2, struct.pack('=BBB', 4, 0, 0))
 print(s.getsockopt(106, 2, 3).hex(), s.type == socket.SOCK_DGRAM, s.proto)
 s.bind(('can0', {ECU}, {TESTER}))
@@ -268,6 +269,7 @@ print(refused(lambda: s.setsockopt(106, 2, struct.pack('=BBB', 4, 0, 0))))
 print(refused(lambda: s.send(b'')), refused(lambda: s.send(bytes(4096))))
 print(select.select([s], [s], [], 0.0)[0] == [], flush=True)
 ready, _, _ = select.select([s], [], [], 30.0)
+print(s.recvmsg(4095)[0].hex(' '))
 print(s.recvfrom(4095))
 """
 
@@ -281,13 +283,18 @@ def test_a_socket_of_python_has_options_limits_and_select(bench: Bench) -> None:
     assert bench.hear() == "30 04 00"
     bench.send("21 " + message[24:44])
     bench.send("22 " + message[45:])
+    bench.send(message[:23])
+    assert bench.hear() == "30 04 00"
+    bench.send("21 " + message[24:44])
+    bench.send("22 " + message[45:])
     said = bench.end(program).splitlines()
     names = [errno.errorcode[code] for code in (errno.EADDRNOTAVAIL, errno.EOPNOTSUPP, errno.EISCONN)]
     assert said[:3] == [names[0], names[1], names[1]]
     assert said[3:6] == ["040000 True 6", names[2], "EINVAL EMSGSIZE"]
     assert said[6] == "True"
-    # Sixteen bytes, the size of a frame: none of them is taken for the mark of one.
-    assert said[7].startswith("(b'\\x00\\x01\\x02\\x03\\x01\\x05\\x06\\x07\\x08\\t\\n\\x0b\\x0c\\r\\x0e\\x0f', ('can0'")
+    # Sixteen bytes, the size of a frame: none of them is taken for the mark of one, or cut off for a count of drops.
+    assert said[7] == message[6:]
+    assert said[8].startswith("(b'\\x00\\x01\\x02\\x03\\x01\\x05\\x06\\x07\\x08\\t\\n\\x0b\\x0c\\r\\x0e\\x0f', ('can0'")
 
 
 def test_a_hub_that_ends_ends_the_waiting(bench: Bench) -> None:
