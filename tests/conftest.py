@@ -44,6 +44,7 @@ LONGEST = (
     "cli/test_campaigns_in_processes.py",
     "ident/diagnosis/test_axis_diagnosis.py",
     "cli/test_describing_a_vehicle.py",
+    "recipes/test_recipes.py",
     "hil/campaign/test_repeatability.py",
     "cli/test_printed_examples.py",
     "ident/diagnosis/vehicle/test_unseen.py",

@@ -16,6 +16,7 @@ from hil.frames.table import FrameTable
 from hil.network import MappedObject, Network, Node, Pdo, PdoDirection
 from hil.network.cia import Index
 from ident.errors import RecordError
+from ident.records.checks import ALONE, UNJUDGED
 
 LONGEST_GAP: Final = 5
 """Cycles in a row that a master short of time may leave out: 10 ms, over which samples can be interpolated."""
@@ -138,10 +139,25 @@ class _Decoder:
         counts = self._sampled(node, index)
         half = node.counter_modulus // 2
         steps = np.diff(counts, prepend=np.int64(node.zero_counts))
-        return _scaled(np.cumsum((steps + half) % node.counter_modulus - half), node.angle_unit)
+        unwrapped = np.cumsum((steps + half) % node.counter_modulus - half)
+        self._refuse_lone(node, index, unwrapped)
+        return _scaled(unwrapped, node.angle_unit)
 
     def _torque(self, node: Node) -> FloatArray:
-        return _scaled(self._sampled(node, Index.TORQUE_ACTUAL), node.torque_unit)
+        counts = self._sampled(node, Index.TORQUE_ACTUAL)
+        self._refuse_lone(node, Index.TORQUE_ACTUAL, counts)
+        return _scaled(counts, node.torque_unit)
+
+    def _refuse_lone(self, node: Node, index: int, counts: NDArray[np.int64]) -> None:
+        """Refuse the only sample that is not as all others: records do not know the resolution of what rests."""
+        away = np.abs(counts - int(np.median(counts)))
+        (others,) = np.nonzero(away)
+        if len(others) == 1 and UNJUDGED <= others[0] < len(counts) - UNJUDGED and away[others[0]] > ALONE:
+            raise RecordError(
+                f"{self._path}: {index:04X}h of {node.label} is {away[others[0]]} counts off at sample {others[0]}, "
+                "and rests in all others: that is no motion.",
+                "It was damaged, in the file or in the sensor: cut that part out, or record again.",
+            )
 
     def _sampled(self, node: Node, index: int) -> NDArray[np.int64]:
         pdo, item, offset = _locate(node, PdoDirection.TRANSMIT, index)

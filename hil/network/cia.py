@@ -64,6 +64,11 @@ class NmtState(IntEnum):
     OPERATIONAL = 0x05
     PRE_OPERATIONAL = 0x7F
 
+    @property
+    def label(self) -> str:
+        """The state in words, `pre-operational`."""
+        return self.name.lower().replace("_", "-")
+
 
 SDO_ABORT: Final = 0x80
 """Command of an SDO that ends a transfer (CiA 301, abort SDO transfer)."""

@@ -70,6 +70,7 @@ _STRUCT_CODES: Mapping[int, str] = {
 
 _ENTRIES = re.compile(r"^\s*NrOfEntries\s*=\s*(\d+)", re.IGNORECASE | re.MULTILINE)
 _SUBINDICES = 254
+_DEVICE_INFO = re.compile(r"^\s*\[DeviceInfo\]", re.IGNORECASE | re.MULTILINE)
 
 
 def load_network(path: Path = DEFAULT_NETWORK) -> Network:
@@ -193,6 +194,9 @@ def _parse(suffix: str, content: str, node_id: int) -> canopen.ObjectDictionary:
         # canopen makes as many subindices as are asked for, and there are no more than these.
         if int(number) > _SUBINDICES:
             raise ValueError(f"NrOfEntries is {number}")
+    if not _DEVICE_INFO.search(content):
+        # canopen goes on without it, and prints that it misses it.
+        raise ValueError("it has no section [DeviceInfo]")
     file = io.StringIO(content, newline=None)
     file.name = f"dictionary{suffix}"
     return canopen.import_od(file, node_id=node_id)

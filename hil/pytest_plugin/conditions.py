@@ -15,7 +15,7 @@ from hil.network.cia import NMT_STATE, DriveState, NmtState, Service
 from hil.pytest_plugin.world import Observed
 from ident.errors import UserError
 
-_NMT_STATES: Final = {int(state): state.name.lower().replace("_", "-") for state in NmtState}
+_NMT_STATES: Final = {int(state): state.label for state in NmtState}
 ANY_ERROR: Final = 0xFFFF
 """Stands for every error code but "error reset"."""
 STANDSTILL: Final = 0.002

@@ -17,8 +17,8 @@ from hil.bus.clock import SimulatedClock
 from hil.faults import FaultInjector
 from hil.faults.injector import Injected
 from hil.master.drive_states import decode_state
-from hil.network import DRIVES, Network, Role
-from hil.network.cia import DriveState, Index
+from hil.network import DRIVES, Network, Node, Role
+from hil.network.cia import DriveState, Index, NmtState
 from ident.errors import UserError
 
 _SAMPLE_PERIOD: Final = 0.01
@@ -35,11 +35,13 @@ class Sample:
         time: [s].
         speed: of the chassis centre over the floor [m/s].
         states: of the drives fl, rl, fr, rr; None for a pattern that CiA 402 does not know.
+        nmt: of all nodes, in the order of the network file; None for one that neither hears nor sends.
     """
 
     time: float
     speed: float
     states: tuple[DriveState | None, ...]
+    nmt: tuple[NmtState | None, ...]
 
 
 @dataclass(frozen=True)
@@ -249,5 +251,12 @@ class World:
 
     def _sample(self) -> None:
         self._next_sample = self.now + _SAMPLE_PERIOD
-        self.samples.append(Sample(self.now, self.speed(), tuple(self.drive_state(role) for role in DRIVES)))
+        states = tuple(self.drive_state(role) for role in DRIVES)
+        nmt = tuple(self._nmt_state(node) for node in self.network.nodes)
+        self.samples.append(Sample(self.now, self.speed(), states, nmt))
         self._look()
+
+    def _nmt_state(self, node: Node) -> NmtState | None:
+        """As the node has it, whether it sends heartbeats or not."""
+        emulated = self._bench.devices.nodes[node.node_id]
+        return NmtState(emulated.nmt.state) if emulated.network.connected else None

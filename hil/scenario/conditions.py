@@ -24,13 +24,13 @@ from hil.scenario.values import Key, choice, integer, number, role, text
 from ident.errors import UserError
 
 _DRIVE_STATE: Final = Key(choice(state.label for state in DriveState))
-_NMT_STATE: Final = Key(choice(state.name.lower().replace("_", "-") for state in NmtState))
+_NMT_STATE: Final = Key(choice(state.label for state in NmtState))
 _NODE: Final = Key(role)
 _SPEED: Final = number(0.0, 100.0)
 _VALUE: Final = number(-(2.0**32), 2.0**32)
 
 Build = Callable[..., Condition]
-"""Makes a condition of the values of its keys."""
+"""Makes a condition of the values of its keys, in their order."""
 
 
 def _frame(id: int, data: str | None) -> Condition:
@@ -48,16 +48,13 @@ def _value(node: str, object: int, subindex: int, at_least: float | None, at_mos
 
 CONDITIONS: Final[Mapping[str, tuple[Mapping[str, Key], Build]]] = {
     "frame": ({"id": Key(integer(0, HIGHEST_CAN_ID)), "data": Key(text, None)}, _frame),
-    "emergency": (
-        {"node": _NODE, "code": Key(integer(0, ANY_ERROR), ANY_ERROR)},
-        lambda node, code: emergency(node, code),
-    ),
-    "heartbeat": ({"node": _NODE, "state": _NMT_STATE}, lambda node, state: heartbeat_state(node, state)),
-    "drive": ({"node": _NODE, "state": _DRIVE_STATE}, lambda node, state: drive(node, state)),
-    "all_drives": ({"state": _DRIVE_STATE}, lambda state: all_drives(state)),
-    "at_rest": ({"speed": Key(_SPEED, STANDSTILL)}, lambda speed: at_rest(speed)),
-    "moving": ({"faster_than": Key(_SPEED)}, lambda faster_than: moving(faster_than)),
-    "travelled": ({"distance": Key(number(0.0, 1e4))}, lambda distance: travelled(distance)),
+    "emergency": ({"node": _NODE, "code": Key(integer(0, ANY_ERROR), ANY_ERROR)}, emergency),
+    "heartbeat": ({"node": _NODE, "state": _NMT_STATE}, heartbeat_state),
+    "drive": ({"node": _NODE, "state": _DRIVE_STATE}, drive),
+    "all_drives": ({"state": _DRIVE_STATE}, all_drives),
+    "at_rest": ({"speed": Key(_SPEED, STANDSTILL)}, at_rest),
+    "moving": ({"faster_than": Key(_SPEED)}, moving),
+    "travelled": ({"distance": Key(number(0.0, 1e4))}, travelled),
     "value": (
         {
             "node": _NODE,

@@ -120,7 +120,7 @@ def _expected(table: Mapping[str, Any], where: str) -> Expected:
     if len(spans) > 1:
         raise DataFileError(f"{where} has {' and '.join(spans)}.", "Keep one, and write another [[expect]].")
     try:
-        condition = build(**{name: found[name] for name in keys})
+        condition = build(*(found[name] for name in keys))
     except UserError as error:
         raise DataFileError(f"{where}: {error.what}", error.remedy) from error
     if not spans:

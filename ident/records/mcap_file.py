@@ -232,9 +232,10 @@ def _refuse_changed_summary(content: bytes, footer: Any) -> None:
 def _unpack_zstd(data: bytes, size: int) -> bytes:
     import zstandard
 
-    if zstandard.get_frame_parameters(data).content_size not in (size, zstandard.CONTENTSIZE_UNKNOWN):
-        raise ValueError(f"a chunk holds other than the {size} bytes that it states")
     try:
+        stated = zstandard.get_frame_parameters(data).content_size
+        if stated not in (size, zstandard.CONTENTSIZE_UNKNOWN):
+            raise ValueError(f"a chunk holds other than the {size} bytes that it states")
         return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
     except zstandard.ZstdError as error:
         raise ValueError(f"a chunk cannot be unpacked: {error}") from error

@@ -16,6 +16,7 @@ from hil.bench.lockstep import LockstepBench
 from hil.campaign.creating import create_run
 from hil.campaign.folder import Run, RunFolder
 from hil.campaign.reading import read_logs
+from hil.frames.mcap_log import McapFrames
 from hil.frames.recorder import Recorder
 from hil.master import Master
 from hil.network import DEFAULT_NETWORK, load_network
@@ -73,7 +74,7 @@ def _logs(folder: Path) -> Iterator[Material]:
     save_truth(read_logs([recorded], load_network()), folder / "log.npz")
     with can.BLFReader(recorded) as reader:
         messages = list(reader)
-    writers: dict[str, tuple[str, Callable[[Path], can.io.generic.MessageWriter]]] = {
+    writers: dict[str, tuple[str, Callable[[Path], can.io.generic.MessageWriter | McapFrames]]] = {
         "blf packed": (".blf", lambda path: can.BLFWriter(path, max_container_size=16384)),
         "blf stored": (".blf", lambda path: can.BLFWriter(path, compression_level=0, max_container_size=16384)),
         "blf with error frames": (".blf", can.BLFWriter),
@@ -81,6 +82,7 @@ def _logs(folder: Path) -> Iterator[Material]:
         "candump": (".log", can.CanutilsLogWriter),
         "mf4 frames": (".mf4", can.MF4Writer),
         "mf4 frames, stored": (".mf4", lambda path: can.MF4Writer(path, compression_level=0)),
+        "mcap frames": (".mcap", McapFrames),
     }
     for name, (suffix, make) in writers.items():
         material = Material(name, "log", folder / name, f"000_straight{suffix}", suffix not in (".asc", ".log"))
@@ -120,7 +122,7 @@ def _records(folder: Path) -> Iterator[Material]:
     )
     record = Record([make_segment(segment, "material")])
     save_truth(record, folder / "record.npz")
-    for suffix in (".csv", ".parquet", ".mf4"):
+    for suffix in (".csv", ".parquet", ".mf4", ".mcap"):
         material = Material(
             f"{suffix[1:]} record", "record", folder / f"record{suffix}", f"record{suffix}", suffix != ".csv"
         )

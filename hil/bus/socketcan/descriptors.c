@@ -1,6 +1,7 @@
 /* Descriptors that come and go: a duplicate is the same CAN socket, with its options, filters and broadcasts. */
 #define _GNU_SOURCE
 #include "broadcast.h"
+#include "isotp.h"
 #include "real.h"
 #include "sockets.h"
 
@@ -10,12 +11,14 @@
 
 /* Before a descriptor is closed. */
 static void forget(int fd) {
-    struct can_socket *entry = socket_remembered(fd);
+    struct can_socket *entry = socket_remembered(fd) ? socket_of(fd) : NULL;
     if (!entry) return;
-    int broadcast = entry->broadcast && socket_of(fd);
-    int other = socket_remembered(fd) ? socket_release(fd) : -1;
+    int broadcast = entry->broadcast;
+    struct isotp *isotp = entry->isotp;
+    int other = socket_release(fd);
     if (broadcast && other >= 0) broadcast_move(fd, other);
     if (broadcast && other < 0) broadcast_close(fd);
+    if (isotp && other < 0) isotp_close(fd, isotp);
 }
 
 static int shared(int from, int to) {

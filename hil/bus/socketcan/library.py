@@ -18,8 +18,8 @@ from platformdirs import user_cache_path
 
 from ident.errors import BusError
 
-_UNITS: Final = ("preload", "interfaces", "sending", "descriptors", "broadcast")
-_HEADERS: Final = ("real", "interfaces", "sockets", "broadcast")
+_UNITS: Final = ("preload", "interfaces", "sending", "receiving", "descriptors", "broadcast", "isotp", "isotp_transfer")
+_HEADERS: Final = ("real", "interfaces", "sockets", "broadcast", "isotp", "isotp_transfer")
 
 SOURCES: Final = tuple(Path(__file__).with_name(f"{name}.c") for name in _UNITS)
 """The library's sources; their headers stand beside them."""

@@ -9,19 +9,21 @@
  * A socket with SO_RXQ_OVFL gets packets of a frame and, once frames were dropped, their number, which recvmsg passes
  * on as the system does for a socket of its own. Its plain reads must ask for no more than a frame.
  *
- * In other files: which interfaces there are (interfaces.c), what is sent (sending.c), descriptors that come and go
- * (descriptors.c), the sending half of CAN_BCM (broadcast.c).
+ * In other files: which interfaces there are (interfaces.c), what is sent (sending.c) and received (receiving.c),
+ * descriptors that come and go (descriptors.c), the sending half of CAN_BCM (broadcast.c), CAN_ISOTP (isotp.c).
  *
- * Not here: CAN FD, CAN_ISOTP, netlink. "any" (interface index 0) is the first interface.
+ * Not here: CAN FD, CAN_J1939, netlink. "any" (interface index 0) is the first interface.
  */
 #define _GNU_SOURCE
 #include "interfaces.h"
+#include "isotp.h"
 #include "real.h"
 #include "sockets.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/can.h>
+#include <linux/can/isotp.h>
 #include <linux/can/raw.h>
 #include <poll.h>
 #include <stdarg.h>
@@ -35,13 +37,10 @@
 #include <unistd.h>
 
 #define SOCKETS 4096
-#define HELLO_MAGIC 0x4e414351u /* "QCAN" */
 #define OWN_FRAMES 1u
 #define JOIN_FILTERS 2u
 #define ACKNOWLEDGE 4u
-#define DROPS 16u
 #define ACKNOWLEDGE_TIMEOUT_MS 20000
-#define OWN_MARK 1
 
 static struct can_socket *sockets[SOCKETS];
 
@@ -95,12 +94,14 @@ int socket(int domain, int type, int protocol) {
     int flags = type & (SOCK_CLOEXEC | SOCK_NONBLOCK);
     int raw = (type & ~flags) == SOCK_RAW && protocol == CAN_RAW;
     int broadcast = (type & ~flags) == SOCK_DGRAM && protocol == CAN_BCM;
+    int messages = (type & ~flags) == SOCK_DGRAM && protocol == CAN_ISOTP;
+    struct isotp *isotp = NULL;
     if (domain != PF_CAN || interfaces_known() == 0) return real(domain, type, protocol);
-    if (!raw && !broadcast) {
-        errno = EPROTONOSUPPORT; /* As a kernel without the module: CAN_ISOTP and CAN_J1939 are state machines in it. */
+    if (!raw && !broadcast && !messages) {
+        errno = EPROTONOSUPPORT; /* As a kernel without the module: CAN_J1939. */
         return -1;
     }
-    int fd = real(AF_UNIX, SOCK_SEQPACKET | flags, 0);
+    int fd = messages ? isotp_open(flags, &isotp) : real(AF_UNIX, SOCK_SEQPACKET | flags, 0);
     if (fd < 0) return fd;
     struct can_socket *entry = fd < SOCKETS ? calloc(1, sizeof *entry) : NULL;
     if (!entry) {
@@ -111,6 +112,7 @@ int socket(int domain, int type, int protocol) {
     if (sockets[fd]) socket_release(fd);
     entry->references = 1;
     entry->broadcast = broadcast;
+    entry->isotp = isotp;
     entry->count = raw ? 1 : 0; /* One filter of zeros: everything, as the kernel has it. */
     entry->hello.magic = HELLO_MAGIC;
     sockets[fd] = entry;
@@ -139,8 +141,7 @@ int socket_reach(int fd, int interface) {
     return -1;
 }
 
-/* Connects a socket to the hub of the interface in an address. */
-static int join(int fd, struct can_socket *entry, const struct sockaddr_can *wanted) {
+int socket_join(int fd, struct can_socket *entry, const struct sockaddr_can *wanted) {
     int chosen = wanted->can_ifindex ? interface_of_index(wanted->can_ifindex) : 0;
     if (socket_reach(fd, chosen) < 0) return -1;
     entry->interface = chosen;
@@ -155,19 +156,25 @@ int bind(int fd, const struct sockaddr *address, socklen_t length) {
     typedef int (*bind_t)(int, const struct sockaddr *, socklen_t);
     struct can_socket *entry = socket_of(fd);
     if (!entry || address->sa_family != AF_CAN) return REAL(bind_t, "bind")(fd, address, length);
-    return join(fd, entry, (const struct sockaddr_can *)address);
+    if (entry->isotp) return isotp_bind(entry->isotp, (const struct sockaddr_can *)address, length);
+    return socket_join(fd, entry, (const struct sockaddr_can *)address);
 }
 
 int connect(int fd, const struct sockaddr *address, socklen_t length) {
     typedef int (*connect_t)(int, const struct sockaddr *, socklen_t);
     struct can_socket *entry = address && address->sa_family == AF_CAN ? socket_of(fd) : NULL;
     if (!entry) return REAL(connect_t, "connect")(fd, address, length);
-    return join(fd, entry, (const struct sockaddr_can *)address);
+    if (entry->isotp) {
+        errno = EOPNOTSUPP; /* Its two identifiers are given to bind(). */
+        return -1;
+    }
+    return socket_join(fd, entry, (const struct sockaddr_can *)address);
 }
 
-static void write_address(const struct can_socket *entry, void *address, socklen_t *length) {
+void socket_tell_address(const struct can_socket *entry, void *address, socklen_t *length) {
     struct sockaddr_can sender = {.can_family = AF_CAN, .can_ifindex = interface_index(entry->interface)};
     if (!address || !length) return;
+    if (entry->isotp) sender = *isotp_address(entry->isotp);
     memcpy(address, &sender, *length < sizeof sender ? *length : sizeof sender);
     *length = sizeof sender;
 }
@@ -176,7 +183,7 @@ int getsockname(int fd, struct sockaddr *address, socklen_t *length) {
     typedef int (*getsockname_t)(int, struct sockaddr *, socklen_t *);
     struct can_socket *entry = socket_of(fd);
     if (!entry) return REAL(getsockname_t, "getsockname")(fd, address, length);
-    write_address(entry, address, length);
+    socket_tell_address(entry, address, length);
     return 0;
 }
 
@@ -212,10 +219,13 @@ static int set_option(struct can_socket *entry, int name, const void *value, soc
 
 int setsockopt(int fd, int level, int name, const void *value, socklen_t size) {
     typedef int (*setsockopt_t)(int, int, int, const void *, socklen_t);
-    int drops = level == SOL_SOCKET && name == SO_RXQ_OVFL;
-    struct can_socket *entry = level == SOL_CAN_RAW || drops ? socket_of(fd) : NULL;
+    int drops = level == SOL_SOCKET && name == SO_RXQ_OVFL, messages = level == SOL_CAN_ISOTP;
+    struct can_socket *entry = level == SOL_CAN_RAW || drops || messages ? socket_of(fd) : NULL;
     if (!entry) return REAL(setsockopt_t, "setsockopt")(fd, level, name, value, size);
-    int error = drops ? set_flag(entry, DROPS, value, size) : set_option(entry, name, value, size);
+    int error = ENOPROTOOPT;
+    if (drops) error = set_flag(entry, DROPS, value, size);
+    else if (messages && entry->isotp) error = isotp_set(entry->isotp, name, value, size);
+    else if (!messages && !entry->isotp) error = set_option(entry, name, value, size);
     if (error) {
         errno = error;
         return -1;
@@ -235,16 +245,22 @@ static int copy_out(void *value, socklen_t *size, const void *from, size_t lengt
 
 int getsockopt(int fd, int level, int name, void *value, socklen_t *size) {
     typedef int (*getsockopt_t)(int, int, int, void *, socklen_t *);
-    struct can_socket *entry = level == SOL_CAN_RAW || level == SOL_SOCKET ? socket_of(fd) : NULL;
+    int can = level == SOL_CAN_RAW || level == SOL_CAN_ISOTP;
+    struct can_socket *entry = can || level == SOL_SOCKET ? socket_of(fd) : NULL;
     int answer = 0;
     if (entry && level == SOL_SOCKET && (name == SO_DOMAIN || name == SO_TYPE || name == SO_PROTOCOL)) {
-        int type = entry->broadcast ? SOCK_DGRAM : SOCK_RAW, protocol = entry->broadcast ? CAN_BCM : CAN_RAW;
+        int type = entry->broadcast || entry->isotp ? SOCK_DGRAM : SOCK_RAW;
+        int protocol = entry->broadcast ? CAN_BCM : entry->isotp ? CAN_ISOTP : CAN_RAW;
         answer = name == SO_DOMAIN ? AF_CAN : name == SO_TYPE ? type : protocol;
         return copy_out(value, size, &answer, sizeof answer);
     }
     if (entry && level == SOL_SOCKET && name == SO_RXQ_OVFL) {
         answer = (entry->hello.flags & DROPS) != 0;
         return copy_out(value, size, &answer, sizeof answer);
+    }
+    if (entry && can && (level == SOL_CAN_ISOTP || entry->isotp)) {
+        errno = level == SOL_CAN_ISOTP && entry->isotp ? isotp_get(entry->isotp, name, value, size) : ENOPROTOOPT;
+        return errno ? -1 : 0;
     }
     if (!entry || level != SOL_CAN_RAW) return REAL(getsockopt_t, "getsockopt")(fd, level, name, value, size);
     switch (name) {
@@ -258,93 +274,6 @@ int getsockopt(int fd, int level, int name, void *value, socklen_t *size) {
     default: errno = ENOPROTOOPT; return -1;
     }
     return copy_out(value, size, &answer, sizeof answer);
-}
-
-/* Whether a frame is the receiver's own, as the hub has marked it; the mark is taken away. */
-static int take_mark(void *data, ssize_t received) {
-    struct can_frame *frame = data;
-    if (received != (ssize_t)sizeof *frame || frame->__pad != OWN_MARK) return 0;
-    frame->__pad = 0;
-    return 1;
-}
-
-ssize_t recvfrom(int fd, void *data, size_t size, int flags, struct sockaddr *address, socklen_t *length) {
-    typedef ssize_t (*recvfrom_t)(int, void *, size_t, int, struct sockaddr *, socklen_t *);
-    recvfrom_t real = REAL(recvfrom_t, "recvfrom");
-    struct can_socket *entry = socket_of(fd);
-    if (!entry) return real(fd, data, size, flags, address, length);
-    ssize_t received = real(fd, data, size, flags, NULL, NULL);
-    if (received >= 0) write_address(entry, address, length);
-    take_mark(data, received);
-    return received;
-}
-
-ssize_t __recvfrom_chk(int fd, void *data, size_t size, size_t room, int flags, struct sockaddr *address,
-                       socklen_t *length) {
-    if (size > room) abort();
-    return recvfrom(fd, data, size, flags, address, length);
-}
-
-/* Puts a number of dropped frames behind the control messages of a message, as the system does for SO_RXQ_OVFL. */
-static void add_drops(struct msghdr *message, size_t room, uint32_t dropped) {
-    size_t used = message->msg_control ? message->msg_controllen : 0;
-    if (!message->msg_control || used + CMSG_SPACE(sizeof dropped) > room) {
-        message->msg_flags |= MSG_CTRUNC;
-        return;
-    }
-    struct cmsghdr *control = (struct cmsghdr *)((char *)message->msg_control + used);
-    memset(control, 0, CMSG_SPACE(sizeof dropped));
-    control->cmsg_level = SOL_SOCKET;
-    control->cmsg_type = SO_RXQ_OVFL;
-    control->cmsg_len = CMSG_LEN(sizeof dropped);
-    memcpy(CMSG_DATA(control), &dropped, sizeof dropped);
-    message->msg_controllen = used + CMSG_SPACE(sizeof dropped);
-}
-
-/* A frame into the caller's memory, and the number of dropped frames that may follow it into its control messages. */
-static ssize_t receive_with_drops(int fd, struct msghdr *message, int flags) {
-    typedef ssize_t (*recvmsg_t)(int, struct msghdr *, int);
-    uint32_t dropped = 0;
-    size_t room = message->msg_controllen;
-    struct iovec *asked = message->msg_iov;
-    struct iovec parts[2] = {{.iov_base = asked->iov_base, .iov_len = sizeof(struct can_frame)},
-                             {.iov_base = &dropped, .iov_len = sizeof dropped}};
-    message->msg_iov = parts;
-    message->msg_iovlen = 2;
-    ssize_t received = REAL(recvmsg_t, "recvmsg")(fd, message, flags);
-    message->msg_iov = asked;
-    message->msg_iovlen = 1;
-    if (received <= (ssize_t)sizeof(struct can_frame)) return received;
-    add_drops(message, room, dropped);
-    return sizeof(struct can_frame);
-}
-
-static int wants_drops(const struct can_socket *entry, const struct msghdr *message) {
-    return entry->hello.flags & DROPS && message->msg_iovlen == 1 &&
-           message->msg_iov->iov_len >= sizeof(struct can_frame);
-}
-
-ssize_t recvmsg(int fd, struct msghdr *message, int flags) {
-    typedef ssize_t (*recvmsg_t)(int, struct msghdr *, int);
-    recvmsg_t real = REAL(recvmsg_t, "recvmsg");
-    struct can_socket *entry = socket_of(fd);
-    if (!entry) return real(fd, message, flags);
-    void *address = message->msg_name;
-    socklen_t length = message->msg_namelen;
-    message->msg_name = NULL;
-    message->msg_namelen = 0;
-    int with_drops = wants_drops(entry, message);
-    ssize_t received = with_drops ? receive_with_drops(fd, message, flags) : real(fd, message, flags);
-    message->msg_name = address;
-    if (received < 0) {
-        message->msg_namelen = length;
-        return received;
-    }
-    write_address(entry, address, &length);
-    message->msg_namelen = address ? length : 0;
-    if (message->msg_iovlen == 1 && take_mark(message->msg_iov[0].iov_base, received))
-        message->msg_flags |= MSG_CONFIRM | MSG_DONTROUTE;
-    return received;
 }
 
 int ioctl(int fd, unsigned long request, ...) {

@@ -7,6 +7,7 @@
 #define _GNU_SOURCE
 #include "broadcast.h"
 #include "interfaces.h"
+#include "isotp.h"
 #include "real.h"
 #include "sockets.h"
 
@@ -17,7 +18,7 @@
 #include <unistd.h>
 
 #define PASSES 0
-#define LARGEST 4096
+#define LARGEST 4608 /* a command of CAN_BCM with all its frames, a message of CAN_ISOTP */
 
 static int is_frame(const void *data, size_t size) {
     const struct can_frame *frame = data;
@@ -36,9 +37,14 @@ static int check(int fd, const struct can_socket *entry, const void *data, size_
     return is_frame(data, size) ? ENXIO : EINVAL;
 }
 
-static int takes_commands(int fd) {
+/* Whether what is written is more than a frame: a command to a broadcast manager, a message of CAN_ISOTP. */
+static int takes_more(int fd) {
     struct can_socket *entry = socket_remembered(fd);
-    return entry && entry->broadcast && socket_of(fd);
+    return entry && (entry->broadcast || entry->isotp) && socket_of(fd);
+}
+
+static ssize_t take_more(int fd, const struct can_socket *entry, const void *data, size_t size, int flags) {
+    return entry->isotp ? isotp_write(fd, entry->isotp, data, size, flags) : broadcast_command(fd, data, size);
 }
 
 /* A packet to the hub. One that is gone is an interface that is down, and no reason to end the program by a signal. */
@@ -52,7 +58,7 @@ static ssize_t hand_over(int fd, const void *data, size_t size, int flags) {
 ssize_t write(int fd, const void *data, size_t size) {
     typedef ssize_t (*write_t)(int, const void *, size_t);
     struct can_socket *entry = socket_remembered(fd);
-    if (entry && takes_commands(fd)) return broadcast_command(fd, data, size);
+    if (entry && takes_more(fd)) return take_more(fd, entry, data, size, 0);
     int error = entry ? check(fd, entry, data, size) : PASSES;
     if (error) return refuse(error);
     ssize_t sent = entry ? hand_over(fd, data, size, 0) : -1;
@@ -63,7 +69,7 @@ ssize_t write(int fd, const void *data, size_t size) {
 ssize_t send(int fd, const void *data, size_t size, int flags) {
     typedef ssize_t (*send_t)(int, const void *, size_t, int);
     struct can_socket *entry = socket_remembered(fd);
-    if (entry && takes_commands(fd)) return broadcast_command(fd, data, size);
+    if (entry && takes_more(fd)) return take_more(fd, entry, data, size, flags);
     int error = entry ? check(fd, entry, data, size) : PASSES;
     if (error) return refuse(error);
     return entry ? hand_over(fd, data, size, flags) : REAL(send_t, "send")(fd, data, size, flags);
@@ -98,7 +104,7 @@ ssize_t sendto(int fd, const void *data, size_t size, int flags, const struct so
     typedef ssize_t (*sendto_t)(int, const void *, size_t, int, const struct sockaddr *, socklen_t);
     if (!socket_remembered(fd) || !socket_of(fd))
         return REAL(sendto_t, "sendto")(fd, data, size, flags, address, length);
-    if (!address) return send(fd, data, size, flags);
+    if (!address || socket_of(fd)->isotp) return send(fd, data, size, flags);
     if (address->sa_family != AF_CAN) return refuse(EINVAL);
     return send_to_address(fd, data, size, flags, (const struct sockaddr_can *)address, length);
 }

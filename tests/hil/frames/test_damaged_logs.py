@@ -194,6 +194,27 @@ def test_a_bit_that_flipped_in_a_position_is_refused_or_no_more_than_noise(
         assert 0 < np.max(np.abs(off)) <= 2**bit * abs(network.drives[1].angle_unit) * 1.001
 
 
+@pytest.mark.parametrize("counts", [1, 16, 17, 512])
+def test_a_lone_sample_of_an_encoder_that_rests_is_refused_beyond_the_flicker_of_its_counts(
+    tmp_path: Path, network: Network, messages: Messages, counts: int
+) -> None:
+    """Steering stands still in all of it: a record of channels would take that sample itself for the resolution."""
+    frames = list(messages)
+    positions = [number for number, frame in enumerate(frames) if frame.arbitration_id == 0x186]
+    assert len({bytes(frames[number].data) for number in positions}) == 1
+    hit = frames[positions[70]]
+    off = (int.from_bytes(hit.data, "little") - counts) % 2**17
+    frames[positions[70]] = can.Message(
+        hit.timestamp, hit.arbitration_id, is_extended_id=False, data=off.to_bytes(4, "little")
+    )
+    path = written(tmp_path / "000_straight.log", frames)
+    if counts > 16:
+        with pytest.raises(RecordError, match=rf"6004h of .* is {counts} counts off at sample 70, .* no motion"):
+            read_logs([path], network)
+    else:
+        read_logs([path], network)
+
+
 @pytest.mark.parametrize(
     "line",
     [

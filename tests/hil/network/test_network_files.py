@@ -44,6 +44,8 @@ def test_every_pdo_fits_into_a_frame_and_uses_the_predefined_identifiers(network
             assert sum(item.bits for item in pdo.objects) <= 64
 
 
+EDS_FILES = sorted(DEFAULT_NETWORK.parent.glob("*.eds"))
+
 MISTAKES = {
     "a role that is not there": ('role = "drive_rr"', 'role = "drive_xx"', "drive_xx"),
     "a role given twice": ('role = "drive_rr"', 'role = "drive_fr"', "drive_fr"),
@@ -85,6 +87,17 @@ def test_a_mistake_in_the_file_is_named(rewritten_network, old: str, new: str, n
     assert caught.value.remedy
 
 
+def test_an_eds_without_its_device_is_refused_and_nothing_is_printed(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    for path in (DEFAULT_NETWORK, *EDS_FILES):
+        text = path.read_text(encoding="utf-8")
+        (tmp_path / path.name).write_text(text.replace("[DeviceInfo]", "[Device]"), encoding="utf-8")
+    with pytest.raises(DataFileError, match=r"drive\.eds is not an EDS file: .*DeviceInfo"):
+        load_network(tmp_path / DEFAULT_NETWORK.name)
+    assert caplog.records == []
+
+
 def test_a_pdo_of_more_than_eight_bytes_is_refused(rewritten_network) -> None:
     with pytest.raises(DataFileError, match="8 bytes"):
         rewritten_network(
@@ -103,9 +116,6 @@ def test_the_default_cycle_takes_sixty_per_cent_of_the_bus_at_worst() -> None:
 def test_a_cycle_that_cannot_fit_on_the_bus_is_refused(rewritten_network) -> None:
     with pytest.raises(DataFileError, match="116% of the bus"):
         rewritten_network(("bit_rate = { value = 1e6", "bit_rate = { value = 5e5"))
-
-
-EDS_FILES = sorted(DEFAULT_NETWORK.parent.glob("*.eds"))
 
 
 @pytest.mark.parametrize("path", EDS_FILES, ids=lambda path: path.stem)

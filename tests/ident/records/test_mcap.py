@@ -170,6 +170,21 @@ def test_files_that_were_packed_by_others_are_read(tmp_path: Path, compression: 
     assert read_topics(path)[0]["/x"].messages == [{}]
 
 
+MAGIC_NUMBERS = {CompressionType.ZSTD: b"\x28\xb5\x2f\xfd", CompressionType.LZ4: b"\x04\x22\x4d\x18"}
+
+
+@pytest.mark.parametrize("compression", MAGIC_NUMBERS)
+@pytest.mark.parametrize("place", [0, 4])
+def test_a_chunk_that_is_packed_by_no_rule_is_refused(tmp_path: Path, compression: CompressionType, place: int) -> None:
+    """The magic number of its packing, or the descriptor behind it, is another one."""
+    path = foreign(tmp_path / "bag.mcap", "/x", "json", "X", compression=compression)
+    content = bytearray(path.read_bytes())
+    content[content.index(MAGIC_NUMBERS[compression]) + place] ^= 0xFF
+    path.write_bytes(content)
+    with pytest.raises(RecordError, match=r"bag\.mcap"):
+        read_channels(path)
+
+
 def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
     path = tmp_path / "bomb.mcap"
     with path.open("wb") as file:

@@ -648,22 +648,6 @@ def test_two_buses_are_two_interfaces_of_one_program(served: Served, tmp_path: P
         second.close()
 
 
-def test_isotp_says_that_it_is_not_there(served: Served) -> None:
-    """A state machine with timers in the kernel, which no client of a hub can have."""
-    needs("isotpsend")
-    done = subprocess.run(
-        ["isotpsend", "-s", "601", "-d", "581", "can0"],
-        env=served.environ,
-        input="01 02",
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert done.returncode != 0
-    assert "Protocol not supported" in done.stderr
-
-
 def test_other_sockets_of_the_program_stay_what_they_are(served: Served) -> None:
     code = (
         "import socket; a, b = socket.socketpair(); a.send(b'x'); print(b.recvfrom(1)[0], a.getsockname());"
