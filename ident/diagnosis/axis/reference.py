@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
@@ -54,6 +54,8 @@ class Scale:
         reach: range of its position [m or rad].
         hold: sample intervals by which its motion follows its effort as recorded, if sampling can be why: an effort
             that is held over the interval acts half of one late. None: longer, and a cause of its own.
+        holds: the same of records that confirm at another rate, by sample time [s]: a position may be read at another
+            part of those intervals.
         lag: the same as a time, a first estimate [s].
         noise: power density of what the first estimate leaves of the rows, one-sided [N² or (Nm)², per Hz].
     """
@@ -65,6 +67,11 @@ class Scale:
     hold: float | None
     lag: float
     noise: float
+    holds: Mapping[float, float] = field(default_factory=dict)
+
+    def hold_at(self, sample_time: float) -> float | None:
+        """The hold of records of a sample time [s], in such intervals."""
+        return None if self.hold is None else self.holds.get(sample_time, self.hold)
 
 
 @dataclass(frozen=True)
@@ -168,7 +175,14 @@ def axis_reference(
     everyone = [*records, *others]
     chosen = cutoff or min(largest_cutoff(everyone), *(position_cutoff(record, LEAST_BAND) for record in records))
     signals = [axis_signals(record, chosen, ROWS_CUTOFF * chosen) for record in records]
-    scales = tuple(_scale(signals, index) for index in range(len(records[0].axes)))
+    known = {record.sample_time for record in records}
+    strange = [record for record in others if record.sample_time not in known]
+    apart = [axis_signals(record, chosen, ROWS_CUTOFF * chosen) for record in strange]
+    scales = tuple(
+        replace(scale, holds=_holds(apart, index, scale.values))
+        for index in range(len(records[0].axes))
+        for scale in (_scale(signals, index),)
+    )
     limits = [
         noise_limit(axis, scale.values[0], scale.noise, chosen, repeat_duration(record), record.sample_time)
         for record in records
@@ -211,9 +225,8 @@ def axis_signals(record: AxisRecord, cutoff: float, bandwidth: float, scales: Se
 
 def _on_time(axis: AxisSignals, scale: Scale, sample_time: float) -> AxisSignals:
     """The axis with its effort when it acts, where sampling can be why that is not when it is recorded."""
-    if scale.hold is None:
-        return axis
-    return replace(axis, effort=delayed(axis.effort, scale.hold * sample_time, sample_time))
+    hold = scale.hold_at(sample_time)
+    return axis if hold is None else replace(axis, effort=delayed(axis.effort, hold * sample_time, sample_time))
 
 
 def refuse_other_axes(records: Sequence[AxisRecord]) -> None:
@@ -257,6 +270,18 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
         lag * record.sample_time,
         float(rest @ rest) / len(rest) / (PASSED * signals[0].bandwidth / (2 * np.pi)),
     )
+
+
+def _holds(signals: Sequence[Signals], index: int, values: Array) -> dict[float, float]:
+    """Lag of an axis at every sample time [s] in such intervals, its parameters (p,) given."""
+    sums: dict[float, Array] = {}
+    for one in signals:
+        moving = one.motions[index].moving
+        left, right = one.equations(index)
+        bend = _lagging(one, index, values)[moving]
+        added = np.array([bend @ (right - left @ values), bend @ bend])
+        sums[one.record.sample_time] = sums.get(one.record.sample_time, np.zeros(2)) + added
+    return {time: float(product / power) for time, (product, power) in sums.items() if power > 0}
 
 
 def _lagging(signals: Signals, index: int, values: Array) -> Array:

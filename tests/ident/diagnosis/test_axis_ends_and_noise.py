@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -70,3 +71,15 @@ def test_a_small_cause_is_named_where_the_gap_alone_would_be_called_noise(machin
     assert findings.gap.before < 1.15
     assert [str(cause.candidate.effect) for cause in findings.causes] == ["asymmetric_viscous"]
     assert findings.verdict is Verdict.EFFECT
+
+
+@pytest.mark.parametrize("factor", [2, 4])
+def test_a_position_may_be_read_at_another_part_of_the_interval_where_the_rate_is_another(
+    machine: Make, factor: int
+) -> None:
+    """The same machine, the position read at the beginning of an interval, and at three quarters of a longer one."""
+    fast = machine(mass=43.0, encoder=7e-7, rate=2000.0, substeps=4, read=0.0, repeats=1, strokes=8, duration=6.0)
+    slow = replace(fast, rate=fast.rate / factor, substeps=4 * factor, read=0.75)
+    findings = diagnose_axis([fast.drive(61)], [slow.drive(62)], seed=1)
+    assert findings.verdict is Verdict.NONE
+    assert findings.gap.before < 1.05
