@@ -82,8 +82,8 @@ _WORDS: Final[Mapping[Grant, str]] = MappingProxyType(
     }
 )
 _REMEDY: Final = (
-    "Lines `USER - rtprio 49` and `USER - memlock unlimited` in /etc/security/limits.conf permit it from the next login "
-    "on (a container: --cap-add SYS_NICE --ulimit memlock=-1); `sudo chrt -R -f -p 49 PID` gives it to a running program."
+    "Lines `USER - rtprio 49` and `USER - memlock unlimited` in /etc/security/limits.conf permit it from the next "
+    "login on (a container: --cap-add SYS_NICE --ulimit memlock=-1); `sudo chrt -R -f -p 49 PID` gives it to what runs."
 )
 
 
