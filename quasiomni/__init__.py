@@ -113,7 +113,10 @@ COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
         "safety": "Let the master die at speed: is the vehicle at rest, after what time and distance? Exit code 1 if "
         "not as set.",
     },
-    "installation": {"doctor": "What is installed here, and what is missing for what. Exit code 1 if something is."},
+    "installation": {
+        "doctor": "What is installed here, and what is missing for what. Exit code 1 if something is, or cycles are "
+        "too late.",
+    },
     "exam": {"exam": "The withheld exam of the gap diagnosis."},
 }
 """Module -> the commands and groups of commands that it adds to `app`, each with the first line of its help.

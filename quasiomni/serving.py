@@ -20,8 +20,7 @@ from hil.bus.stamps import Stamps, write_stamps
 from hil.bus.traffic import Traffic, heard_by
 from hil.bus.unix import UnixHub
 from hil.bus.urgency import urgent
-from hil.campaign.folder import network_file_of
-from hil.network import load_network
+from hil.network import load_network, network_file_of
 from ident.errors import UserError
 from ident.writing import refuse_folder, write_by
 from quasiomni.application import app, console

@@ -14,9 +14,9 @@ from emulator.vehicle import EmulatedVehicle
 from hil.bench.emulation import BenchOperator
 from hil.bench.lockstep import LockstepBench
 from hil.bench.simulators import Simulator, load_simulated, naming, read_simulator
-from hil.campaign.folder import Run, RunFolder, network_file_of, open_run
+from hil.campaign.folder import Run, RunFolder, open_run
 from hil.campaign.runner import check_network
-from hil.network import Network
+from hil.network import Network, network_file_of
 from hil.replay.commissioning import boots, commission, first_sample
 from hil.replay.comparing import Compared, compare
 from hil.replay.hands import Hands, is_lifted
