@@ -27,13 +27,13 @@ from hil.faults import Fault, parse_fault, parse_script
 from hil.faults.devices import Slippery
 from hil.faults.fault import FaultError
 from hil.network import Network
-from ident.effects import Effect
 from ident.errors import UserError
 from ident.extras import EngineName, default_engine
 from ident.reading import read_bounded
 
 if TYPE_CHECKING:
     from hil.video.film import Video
+    from ident.effects import Effect
 
 
 class Plant(VehicleHardware, Slippery, Protocol):
