@@ -11,8 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from hil.bench.control import command
 from hil.bus.opening import open_bus
 
@@ -111,16 +109,3 @@ def test_a_campaign_shows_its_step_and_an_emergency_stop_ends_it(tmp_path: Path,
         assert process.wait() == 2
         assert "9000" in said
         assert "Traceback" not in said
-
-
-@pytest.mark.slow
-def test_the_first_picture_is_there_three_seconds_after_the_command(tmp_path: Path, browser: Any) -> None:
-    """Up to the first frame that has been drawn; the browser is open already."""
-    page = browser.new_page()
-    begin = time.monotonic()
-    with running("emulate", "--bus", f"unix:{tmp_path / 'bus'}") as (_, address):
-        page.goto(address)
-        page.wait_for_selector("#qo-nodes", state="attached")
-        page.wait_for_function("() => document.querySelector('canvas') !== null")
-        page.evaluate("() => new Promise(requestAnimationFrame)")
-        assert time.monotonic() - begin < 3.0
