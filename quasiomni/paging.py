@@ -111,6 +111,26 @@ def watching_bench(page: Page | None, title: str, told: Told, network: Network) 
     return begin
 
 
+def watching_replay(page: Page | None, title: str, told: Told, pace: float) -> Callable[[Any, Any, Network], None]:
+    """What to call with a vehicle, its bench and its network before anything moves; does nothing without a page.
+
+    Args:
+        page: that shows them.
+        title: of it.
+        told: is told the log that is played.
+        pace: simulated seconds a second at most; 0: as many as it gets.
+    """
+
+    def begin(vehicle: Any, bench: Any, network: Network) -> None:
+        if page is None:
+            return
+        shown = watching().watch_bench(page, title, vehicle, bench, network, told.doing)
+        if pace > 0:
+            bench.attend(watching().Pace(bench.clock.now, pace, shown.attend).attend)
+
+    return begin
+
+
 @dataclass
 class Told:
     """The step that a campaign drives, as it was told last."""
