@@ -15,9 +15,6 @@ from ident.errors import RecordError
 _FAULT: Final = 1e-4
 """Longest that the kernel takes to fetch a page that it has [s]; on a virtual machine some tens of microseconds."""
 
-_ASLEEP: Final = 2e-5
-"""Longest time in which a frame that is there already is taken [s]."""
-
 
 @dataclass(frozen=True)
 class _Party:
@@ -40,17 +37,46 @@ _PHYSICS: Final = _Party(Reason.SERVER_NOT_RUNNING, Reason.SERVER_COLLECTING, Re
 
 @dataclass(frozen=True)
 class _Work:
-    """Time in which a thread wanted to run.
+    """What a thread did between two instants, cycle by cycle (n,).
 
     Attributes:
-        wall, cpu, collecting: how long it took, ran, and collected garbage [s].
-        faults: pages it waited for.
+        busy: time for which it was not waiting for anything [s].
+        ran: time for which it had a processor [s].
+        collecting: time for which it collected garbage [s].
+        faults: pages that it waited for.
     """
 
-    wall: Floats
-    cpu: Floats
+    busy: Floats
+    ran: Floats
     collecting: Floats
     faults: Floats
+
+
+class _Doings:
+    """What a thread has done up to any instant; between two stamps evenly.
+
+    Args:
+        table: its stamps.
+        waits: where it begins and ends to wait.
+    """
+
+    def __init__(self, table: Stamped, waits: tuple[Moment, tuple[Moment, ...]]) -> None:
+        begin, ends = waits
+        # What is due is stamped with an instant that is not the one of the stamp.
+        here = table.moment != Moment.DUE
+        table = Stamped(table.moment[here], table.wall[here], table.cpu[here], table.faults[here])
+        self._wall = table.wall
+        waited = _summed(table, (begin,), ends)
+        collecting = _summed(table, (Moment.COLLECTS,), (Moment.COLLECTED,))
+        self._totals = (waited, table.cpu, collecting, table.faults)
+
+    def between(self, begin: Floats, end: Floats) -> _Work:
+        """From instants to instants (n,) [s]; nothing where they are in the other order."""
+        end = np.maximum(begin, end)
+        waited, ran, collecting, faults = (
+            np.interp(end, self._wall, total) - np.interp(begin, self._wall, total) for total in self._totals
+        )
+        return _Work(np.maximum(end - begin - waited, 0.0), ran, collecting, faults)
 
 
 def explain(master: Stamped, server: Stamped) -> Lateness:
@@ -81,117 +107,84 @@ class _Cycles:
     """Both sides' stamps by cycle."""
 
     def __init__(self, master: Stamped, server: Stamped) -> None:
-        self._master, self._server = master, server
+        self._server = server
         heard = master.where(Moment.HEARD)
         if len(heard) < 2:
             raise RecordError("The master's stamps hold no two cycles.", "Let it drive for longer.")
         before, heard = heard[:-1], heard[1:]
-        self._before, self._heard = before, heard
         # A master that left cycles out has waited twice: what counts is the instant that it missed.
-        self._rests = _next(master.where(Moment.RESTS), before)
-        self._due = _next(master.where(Moment.DUE), before)
-        self._awake = _last(master.where(Moment.AWAKE), heard)
-        self._sent = _last(master.where(Moment.SYNC_SENT), heard)
+        self.due, self.rests = (master.wall[_next(master.where(one), before)] for one in (Moment.DUE, Moment.RESTS))
+        self.awake, self.sent = (
+            master.wall[_last(master.where(one), heard)] for one in (Moment.AWAKE, Moment.SYNC_SENT)
+        )
+        self.before, self.heard = master.wall[before], master.wall[heard]
         syncs = server.where(Moment.SYNC_TAKEN)
         # On another processor the SYNC may be taken before the master has returned from sending it.
-        answers = np.searchsorted(server.wall[syncs], master.wall[heard]) - 1
-        if len(syncs) == 0 or (answers < 0).any() or (server.wall[syncs[answers]] < master.wall[self._rests]).any():
+        answers = np.searchsorted(server.wall[syncs], self.heard) - 1
+        if len(syncs) == 0 or (answers < 0).any() or (server.wall[syncs[answers]] < self.rests).any():
             raise RecordError(
                 "The server's stamps are not of the cycles of the master's.", "Take those of one run on one computer."
             )
         self._taken = syncs[answers]
         self._moved = _next(server.where(Moment.MOVED), self._taken)
-        listens = server.where(Moment.LISTENS)
-        self._answered = _next(listens, self._moved)
-        self._listened = _last(listens, self._taken)
-        self.due, self.heard = master.wall[self._due], master.wall[heard]
+        self._answered = _next(server.where(Moment.LISTENS), self._moved)
+        self.taken, self.moved, self.answered = (server.wall[one] for one in (self._taken, self._moved, self._answered))
+        self._masters = _Doings(master, (Moment.RESTS, (Moment.AWAKE,)))
+        self._servers = _Doings(server, (Moment.LISTENS, (Moment.ROUSED, Moment.SYNC_TAKEN)))
 
     def charges(self) -> dict[Reason, Floats]:
         """What each reason has to answer for, cycle by cycle (n,) [s]."""
-        wall, theirs = self._master.wall, self._server.wall
-        carried = np.maximum(wall[self._before] - self.due, 0.0)
-        began = np.maximum(wall[self._before], self.due)
-        charges = {
-            Reason.CYCLE_BEFORE: carried,
-            Reason.MASTER_WOKE_LATE: _excess(wall[self._awake] - np.maximum(self.due, wall[self._rests])),
-            Reason.MASTER_HEARD_LATE: _excess(self.heard - np.maximum(theirs[self._answered], wall[self._sent])),
-            Reason.SERVER_WOKE_LATE: _excess(self._slept_on()),
-        }
-        for reason in Reason:
-            charges.setdefault(reason, np.zeros(len(self.due)))
-        overdue = np.maximum(wall[self._rests] - began, 0.0)
-        self._charge(charges, _MASTER, self._work(self._master, self._before, self._rests), overdue)
-        self._charge(charges, _MASTER, self._work(self._master, self._awake, self._sent))
-        # Before it listened for the SYNC, the server may have been at other frames, or away.
-        waited = np.maximum(theirs[self._listened] - np.maximum(wall[self._sent], theirs[self._woken()]), 0.0)
-        self._charge(charges, _SERVER, self._work(self._server, self._woken(), self._listened), waited)
-        self._charge(charges, _PHYSICS, self._work(self._server, self._taken, self._moved))
-        self._charge(charges, _SERVER, self._work(self._server, self._moved, self._answered))
+        charges = {reason: np.zeros(len(self.due)) for reason in Reason}
+        charges[Reason.CYCLE_BEFORE] = np.maximum(self.before - self.due, 0.0)
+        charges[Reason.MASTER_WOKE_LATE] = _excess(self.awake - np.maximum(self.due, self.rests))
+        charges[Reason.MASTER_HEARD_LATE] = _excess(self.heard - np.maximum(self.answered, self.sent))
+        before_sync = self._servers.between(self.sent, self.taken)
+        slept = np.maximum(self.taken - self.sent, 0.0) - before_sync.busy
+        charges[Reason.SERVER_WOKE_LATE] = _excess(slept)
+        for party, work in (
+            (_MASTER, self._masters.between(np.maximum(self.before, self.due), self.rests)),
+            (_MASTER, self._masters.between(self.awake, self.sent)),
+            (_SERVER, before_sync),
+            (_PHYSICS, self._servers.between(self.taken, self.moved)),
+            (_SERVER, self._servers.between(self.moved, self.answered)),
+        ):
+            _charge(charges, party, work)
         return charges
 
     def one(self, k: int, late: float, reason: Reason, share: float) -> LateCycle:
         """A cycle that is late."""
-        due, ours, theirs = float(self.due[k]), self._master, self._server
-
-        def ran(begin: NDArray[np.intp], end: NDArray[np.intp]) -> float:
-            return float(theirs.cpu[end[k]] - theirs.cpu[begin[k]])
-
-        def at(table: Stamped, positions: NDArray[np.intp]) -> float:
-            return float(table.wall[positions[k]]) - due
-
+        due, cpu = float(self.due[k]), self._server.cpu
+        taken, moved, answered = int(self._taken[k]), int(self._moved[k]), int(self._answered[k])
         return LateCycle(
             k + 1,
             due,
             late,
             reason,
             share,
-            rests=at(ours, self._rests),
-            awake=at(ours, self._awake),
-            sent=at(ours, self._sent),
-            taken=at(theirs, self._taken),
-            moved=at(theirs, self._moved),
-            answered=at(theirs, self._answered),
-            heard=at(ours, self._heard),
-            ran=(ran(self._taken, self._moved), ran(self._moved, self._answered)),
+            rests=float(self.rests[k]) - due,
+            awake=float(self.awake[k]) - due,
+            sent=float(self.sent[k]) - due,
+            taken=float(self.taken[k]) - due,
+            moved=float(self.moved[k]) - due,
+            answered=float(self.answered[k]) - due,
+            heard=float(self.heard[k]) - due,
+            ran=(float(cpu[moved] - cpu[taken]), float(cpu[answered] - cpu[moved])),
         )
 
-    def _woken(self) -> NDArray[np.intp]:
-        """When the server last began to do something before it listened for the SYNC and after it had nothing to do.
 
-        Frames that arrive together are taken one by one without waiting; the turns of all of them are looked at.
-        """
-        server = self._server
-        awake = server.where(Moment.ROUSED, Moment.SYNC_TAKEN)
-        slept = server.wall[awake] - server.wall[np.maximum(awake - 1, 0)]
-        return _last(awake[slept > _ASLEEP], self._listened, default=int(awake[0]))
-
-    def _slept_on(self) -> Floats:
-        """How long the server slept on (n,) [s] although the SYNC, or the command before it, was there."""
-        theirs, sent = self._server.wall, self._master.wall[self._sent]
-        last = np.maximum(theirs[self._taken] - np.maximum(sent, theirs[self._listened]), 0.0)
-        woken = self._woken()
-        before = np.where(theirs[woken] > sent, theirs[woken] - np.maximum(sent, theirs[np.maximum(woken - 1, 0)]), 0.0)
-        return np.asarray(last + before)
-
-    def _charge(self, charges: dict[Reason, Floats], party: _Party, work: _Work, delay: Floats | None = None) -> None:
-        """Charge a party's work, or what of it made the cycle wait, to what held it up."""
-        excess = _excess(work.wall if delay is None else np.minimum(delay, work.wall))
-        away = work.wall - work.cpu >= excess / 2
-        collecting = ~away & (work.collecting >= excess / 2)
-        fetching = ~(away | collecting) & (_excess(work.faults) * _FAULT >= excess)
-        for reason, mine in zip(
-            (party.not_running, party.collecting, party.fetching, party.computing),
-            (away, collecting, fetching, ~(away | collecting | fetching)),
-            strict=True,
-        ):
-            charges[reason] = charges[reason] + np.where(mine, excess, 0.0)
-
-    def _work(self, table: Stamped, begin: NDArray[np.intp], end: NDArray[np.intp]) -> _Work:
-        total = _collected(table)
-        wall, cpu, collecting, faults = (
-            column[end] - column[begin] for column in (table.wall, table.cpu, total, table.faults)
-        )
-        return _Work(wall, cpu, collecting, faults)
+def _charge(charges: dict[Reason, Floats], party: _Party, work: _Work) -> None:
+    """Charge what a party's work took beyond the usual to what held it up."""
+    excess = _excess(work.busy)
+    away = work.busy - work.ran >= excess / 2
+    collecting = ~away & (work.collecting >= excess / 2)
+    fetching = ~(away | collecting) & (_excess(work.faults) * _FAULT >= excess)
+    for reason, mine in (
+        (party.not_running, away),
+        (party.collecting, collecting),
+        (party.fetching, fetching),
+        (party.computing, ~(away | collecting | fetching)),
+    ):
+        charges[reason] = charges[reason] + np.where(mine, excess, 0.0)
 
 
 def _excess(values: Floats) -> Floats:
@@ -199,13 +192,13 @@ def _excess(values: Floats) -> Floats:
     return np.maximum(values - np.median(values), 0.0)
 
 
-def _collected(table: Stamped) -> Floats:
-    """Time in collections of garbage up to each stamp (n,) [s]."""
+def _summed(table: Stamped, begins: tuple[Moment, ...], ends: tuple[Moment, ...]) -> Floats:
+    """Time spent between moments and those that end them, up to each stamp (n,) [s]."""
     spent = np.zeros(len(table.wall))
-    ends = table.where(Moment.COLLECTED)
-    begins = _last(table.where(Moment.COLLECTS), ends, default=-1)
-    whole = begins >= 0
-    spent[ends[whole]] = table.wall[ends[whole]] - table.wall[begins[whole]]
+    end = table.where(*ends)
+    begin = _last(table.where(*begins), end, default=-1)
+    whole = begin >= 0
+    spent[end[whole]] = table.wall[end[whole]] - table.wall[begin[whole]]
     return np.cumsum(spent)
 
 
@@ -217,7 +210,7 @@ def _next(positions: NDArray[np.intp], after: NDArray[np.intp]) -> NDArray[np.in
 
 
 def _last(positions: NDArray[np.intp], before: NDArray[np.intp], default: int | None = None) -> NDArray[np.intp]:
-    """Of each position `before`, the last of some that precedes it; `default` where none does."""
+    """Of each position `before`, the last of some that precedes it; `default`, or the first, where none does."""
     if not len(positions):
         if default is None:
             raise RecordError("A moment is missing in the stamps.", "Take those of a whole run.")

@@ -191,3 +191,24 @@ def test_late_cycles_are_written_instant_by_instant(tmp_path: Path) -> None:
     assert float(first["late_ms"]) > 1e3 * LATE
     assert float(first["moved_ms"]) - float(first["taken_ms"]) == pytest.approx(3.2, abs=0.01)
     assert float(first["server_moving_ran_ms"]) == pytest.approx(3.2, abs=0.01)
+
+
+def test_where_a_server_has_slept_and_then_worked_both_are_counted_and_the_longer_is_the_reason() -> None:
+    """Frames that have queued up meanwhile are taken one by one before the SYNC: none of them alone is long."""
+    master, server = played(Disturbance(Moment.LISTENS, 0.0042))
+    sync = int(server.where(Moment.SYNC_TAKEN)[NUMBER])
+    slept_until = float(server.wall[sync])
+    begin = float(server.wall[sync - 1])
+    for share, reason in ((0.3, Reason.SERVER_COMPUTING), (0.8, Reason.SERVER_WOKE_LATE)):
+        turns = np.linspace(begin + share * (slept_until - begin), slept_until - 1e-5, 9)
+        moments = [Moment.ROUSED if k % 2 == 0 else Moment.LISTENS for k in range(len(turns))]
+        moments[-1] = Moment.LISTENS
+        ran = np.cumsum([0.0, *(np.diff(turns) * (np.arange(len(turns) - 1) % 2 == 0))]) * (share < 0.5)
+        more = float(ran[-1])
+        dense = Stamped(
+            np.concatenate([server.moment[:sync], moments, server.moment[sync:]]).astype(np.int8),
+            np.concatenate([server.wall[:sync], turns, server.wall[sync:]]),
+            np.concatenate([server.cpu[:sync], server.cpu[sync - 1] + ran, server.cpu[sync:] + more]),
+            np.concatenate([server.faults[:sync], np.full(len(turns), server.faults[sync]), server.faults[sync:]]),
+        )
+        assert explain(master, dense).cycles[0].reason is reason
