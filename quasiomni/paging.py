@@ -133,11 +133,12 @@ def watching_replay(page: Page | None, title: str, told: Told, pace: float) -> C
 
 @dataclass
 class Told:
-    """The step that a campaign drives, as it was told last."""
+    """The step that is driven, or the log that is played, as it was told last; progress is in what `unit` names."""
 
     step: str = ""
     done: int = 0
     total: int = 0
+    unit: str = "cycles"
     follow: Callable[[str, int, int], None] = field(default=lambda *_: None)
 
     def __call__(self, step: str, done: int, total: int) -> None:
@@ -149,4 +150,4 @@ class Told:
         """As the page takes it."""
         from hil.page.shown import Doing
 
-        return Doing(self.step, self.done, self.total)
+        return Doing(self.step, self.done, self.total, self.unit)

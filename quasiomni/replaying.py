@@ -94,7 +94,7 @@ def replay(
     with paging(address) as page:
         say_where(page)
         with bar("replaying") as shown:
-            told = Told(follow=lambda _, done, total: shown(done, total))
+            told = Told(unit="frames", follow=lambda _, done, total: shown(done, total))
             begin = watching_replay(page, f"replay of {', '.join(map(str, logs))}", told, web_pace)
             answer = replaying.replay(order, told, begin)
     say(reports.summary_lines(answer))

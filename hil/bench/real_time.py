@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -47,12 +47,14 @@ class Trial:
         cycles: of the bench and of the bare loop, each [-].
         rounds: by turns, so that both meet the same computer.
         priority: whether loop and master may have real-time priority; for the server the command says so.
+        beside: called with what the server has said when it is up; what it gives is open while the master drives.
     """
 
     server: Sequence[str]
     cycles: int
     rounds: int = 2
     priority: bool = True
+    beside: Callable[[str], AbstractContextManager[object]] = nullcontext
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,8 @@ def drive_bench(trial: Trial, cycles: int) -> Lateness:
     """
     with tempfile.TemporaryDirectory() as folder:
         bus, trace = f"unix:{folder}/bus", Path(folder, "server.csv")
-        with _serving([*trial.server, "--bus", bus, "--trace", str(trace)]):
+        command = [*trial.server, "--bus", bus, "--trace", str(trace)]
+        with _serving(command) as said, trial.beside(said):
             master = _drive(bus, cycles, trial.priority)
         return explain(master, read_stamps(trace))
 
@@ -165,7 +168,8 @@ def _drive(name: str, cycles: int, priority: bool) -> Stamped:
 
 
 @contextmanager
-def _serving(command: Sequence[str]) -> Iterator[None]:
+def _serving(command: Sequence[str]) -> Iterator[str]:
+    """A server that is up; gives what it has said so far."""
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         try:
             assert process.stdout is not None
@@ -175,7 +179,7 @@ def _serving(command: Sequence[str]) -> Iterator[None]:
                 if not line:
                     raise BusError(f"The server does not come up: {said.strip()}", "Try `quasiomni doctor emulator`.")
                 said += line
-            yield
+            yield said
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=_FAREWELL)
         finally:

@@ -180,11 +180,12 @@ class CyclesNow:
 
 @dataclass(frozen=True)
 class Doing:
-    """The step that is driven, and how far it is; nothing where nobody says."""
+    """The step that is driven, and how far it is, in what `unit` names; nothing where nobody says."""
 
     step: str = ""
     done: int = 0
     total: int = 0
+    unit: str = "cycles"
 
 
 @dataclass(frozen=True)

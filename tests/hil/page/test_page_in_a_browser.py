@@ -135,7 +135,7 @@ def test_a_replay_shows_its_log_and_its_vehicle_can_be_stopped(tmp_path: Path, b
             writer.on_message_received(frame)
     with running("replay", str(log), "--emulations", "1", "--web-pace", "0.01") as (process, address):
         page, _ = opened(browser, address)
-        page.get_by_text(re.compile(r"drive: \d+ of \d+|\d+ of \d+ cycles")).first.wait_for()
+        page.get_by_text(re.compile(r"\d+ of \d+ frames")).first.wait_for()
         page.get_by_role("button", name="EMERGENCY STOP").click()
         until(lambda: page.locator("#qo-nodes").inner_text().count("9000h") == 4, page)
         assert process.poll() is None
