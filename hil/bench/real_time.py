@@ -31,7 +31,7 @@ from ident.errors import BusError
 _TORQUE: Final = (0.05,) * 4
 """[Nm]; the wheels turn slowly."""
 
-_FAREWELL: Final = 30.0
+_FAREWELL: Final = 120.0
 """Longest wait for the end of a server, which writes its stamps then [s]."""
 
 QUANTILES: Final = (0.5, 0.99, 0.999, 1.0)
@@ -139,7 +139,7 @@ def drive_bench(trial: Trial, cycles: int) -> Lateness:
     """A server in a process of its own, and a master in this one, that leave stamps.
 
     Raises:
-        BusError: the server does not come up.
+        BusError: the server does not come up, or does not end.
     """
     with tempfile.TemporaryDirectory() as folder:
         bus, trace = f"unix:{folder}/bus", Path(folder, "server.csv")
@@ -181,6 +181,9 @@ def _serving(command: Sequence[str]) -> Iterator[str]:
                 said += line
             yield said
             process.send_signal(signal.SIGINT)
-            process.communicate(timeout=_FAREWELL)
+            try:
+                process.communicate(timeout=_FAREWELL)
+            except subprocess.TimeoutExpired as error:
+                raise BusError("The server does not end.", "Close other programs, and measure again.") from error
         finally:
             process.kill()
