@@ -18,6 +18,12 @@ BUSY = 0.7
 """Load of the machine, in processes that want a core, from which on lateness says nothing about us."""
 
 
+def refuse_busy() -> None:
+    load = os.getloadavg()[0]
+    if load > BUSY:
+        pytest.skip(f"the machine is busy (load {load:.1f}): lateness would be that of other programs")
+
+
 def shown(measured: Measured) -> str:
     """Figures of a run, on some lines."""
     bare, bench = measured.shares
@@ -36,9 +42,7 @@ def test_at_500_hz_with_physics_hardly_a_cycle_is_late_that_a_bare_loop_would_no
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """A cycle is late when its last TPDO comes more than 1 ms after the instant at which it comes undisturbed."""
-    load = os.getloadavg()[0]
-    if load > BUSY:
-        pytest.skip(f"the machine is busy (load {load:.1f}): lateness would be that of other programs")
+    refuse_busy()
     measured = measure(Trial((sys.executable, "-m", "quasiomni", "emulate"), CYCLES))
     with capsys.disabled():
         print(shown(measured))
@@ -49,6 +53,7 @@ def test_at_500_hz_with_physics_hardly_a_cycle_is_late_that_a_bare_loop_would_no
 
 def test_without_priority_every_late_cycle_has_a_reason_too(capsys: pytest.CaptureFixture[str]) -> None:
     """For the comparison: how many there are is the machine's."""
+    refuse_busy()
     command = (sys.executable, "-m", "quasiomni", "emulate", "--no-priority")
     measured = measure(Trial(command, CYCLES // 3, priority=False))
     with capsys.disabled():
