@@ -21,7 +21,7 @@ import numpy as np
 from hil.bench import emulation
 from hil.bench.truth import truth_of
 from hil.campaign.creating import create_run
-from hil.campaign.folder import Run, RunFolder, network_file_of
+from hil.campaign.folder import Run, RunFolder
 from hil.campaign.reading import read_run
 from hil.campaign.runner import CampaignRunner
 from hil.campaign.study import (
@@ -38,7 +38,7 @@ from hil.campaign.study import (
     outcome_of,
 )
 from hil.frames.recorder import Recorder
-from hil.network import load_network
+from hil.network import load_network, network_file_of
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import ORDER, PERIODS
 from ident.estimate.identify import identify

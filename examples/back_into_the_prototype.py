@@ -23,12 +23,12 @@ from hil.bench import emulation
 from hil.campaign.asked import DiagnosisOrder
 from hil.campaign.creating import create_run
 from hil.campaign.diagnosing import diagnose_records, write_answer
-from hil.campaign.folder import Run, RunFolder, network_file_of
+from hil.campaign.folder import Run, RunFolder
 from hil.campaign.results import identify_run, write_result
 from hil.campaign.runner import CampaignRunner
 from hil.cosimulation.simulator_gap import SimulatorOrder, judge_simulator, write_simulator_gap
 from hil.frames.recorder import Recorder
-from hil.network import load_network
+from hil.network import load_network, network_file_of
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import ORDER, PERIODS
 from ident.diagnosis.vehicle.closing import extended_model

@@ -18,9 +18,8 @@ import numpy as np
 
 from hil.bench.closed_loop import Tracking, track_lane_change
 from hil.bench.truth import truth_of
-from hil.campaign.folder import network_file_of
 from hil.exam.worlds import world_of
-from hil.network import load_network
+from hil.network import load_network, network_file_of
 from ident.campaign.plan import Plan, make_plan
 from ident.diagnosis.vehicle.closing import channel_gaps, extended_model, plain_model
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle

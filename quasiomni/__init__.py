@@ -6,7 +6,9 @@ loaded when they are first asked for.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
@@ -113,7 +115,10 @@ COMMANDS: Final[Mapping[str, Mapping[str, str]]] = {
         "safety": "Let the master die at speed: is the vehicle at rest, after what time and distance? Exit code 1 if "
         "not as set.",
     },
-    "installation": {"doctor": "What is installed here, and what is missing for what. Exit code 1 if something is."},
+    "installation": {
+        "doctor": "What is installed here, and what is missing for what. Exit code 1 if something is, or cycles are "
+        "too late.",
+    },
     "exam": {"exam": "The withheld exam of the gap diagnosis."},
 }
 """Module -> the commands and groups of commands that it adds to `app`, each with the first line of its help.
@@ -136,7 +141,25 @@ def load_commands(words: Sequence[str]) -> None:
     """
     asked = [module for module, commands in COMMANDS.items() if words and words[0] in commands]
     for module in asked or COMMANDS:
-        import_module(f"quasiomni.{module}")
+        if asked == ["serving"]:
+            # python-can loads it for logs in MF4, and pandas with it: longer than it takes to load the emulator.
+            with _left_out("asammdf"):
+                import_module(f"quasiomni.{module}")
+        else:
+            import_module(f"quasiomni.{module}")
+
+
+@contextmanager
+def _left_out(package: str) -> Iterator[None]:
+    """Inside, a package seems not to be installed."""
+    if package in sys.modules:
+        yield
+        return
+    sys.modules[package] = None  # type: ignore[assignment]  # as the documentation of `import` has it
+    try:
+        yield
+    finally:
+        del sys.modules[package]
 
 
 def __getattr__(name: str) -> Any:

@@ -15,6 +15,7 @@ from rich.text import Text
 from hil.bus.clock import Clock, FreeRunningClock, WallClock
 from hil.bus.opening import open_bus
 from hil.bus.unix import UnixBus
+from hil.bus.urgency import urgent
 from hil.campaign.driving import drive_run, keep_unusable_aside
 from hil.campaign.folder import Run
 from hil.campaign.lock import driving
@@ -30,6 +31,7 @@ from quasiomni.options import (
     choose_engine,
     load_emulation,
     read_simulator,
+    say_urgency,
     tell_native,
 )
 from quasiomni.paging import Told, paging, watching_bench
@@ -98,8 +100,9 @@ def drive_on_fmu(run: Run, order: Order, prototype: str, fmu: Path, *, own_devic
         _drive(run, order, opened.bus, opened.clock, opened.operator)
 
 
-def drive_on_bus(run: Run, order: Order, name: str, *, ask: bool, lockstep: bool) -> None:
-    """On what answers on a bus, after a question where `ask` is set; in lockstep where an emulator sits there.
+def drive_on_bus(run: Run, order: Order, name: str, *, ask: bool, lockstep: bool, priority: bool) -> None:
+    """On what answers on a bus, after a question where `ask` is set; in lockstep where an emulator sits there, else in
+    real time and, with `priority`, before other programs.
 
     Raises:
         UserError: the run was driven on the emulator, or its log format is too slow.
@@ -119,8 +122,15 @@ def drive_on_bus(run: Run, order: Order, name: str, *, ask: bool, lockstep: bool
         return not ask or typer.confirm("The vehicle will move. Is the floor free, a hand at the emergency stop?")
 
     clock = FreeRunningClock() if lockstep else WallClock()
+    in_haste = priority and not lockstep
+    if not lockstep:
+        # Tried now, so that it is said before anything moves.
+        with urgent(in_haste) as urgency:
+            pass
+        say([f"The master drives {urgency.what}."])
+        say_urgency(urgency)
     with _opened(name, run.network.bit_rate) as bus, _stop_is_no_error(order.out):
-        _drive(run, order, bus, clock, HumanOperator(), may_move, lockstep=lockstep)
+        _drive(run, order, bus, clock, HumanOperator(), may_move, lockstep=lockstep, priority=in_haste)
         lost = bus.dropped if isinstance(bus, UnixBus) else 0
         if lost:
             console.print(f"{lost} frames of the bus were lost: this program did not read in time.", style="yellow")
@@ -135,6 +145,7 @@ def _drive(
     may_move: Callable[[], bool] = lambda: True,
     *,
     lockstep: bool = False,
+    priority: bool = False,
     film: Video | None = None,
     told: Told | None = None,
 ) -> None:
@@ -156,7 +167,7 @@ def _drive(
             progress = captioned(film, _bar_per_step(shown))
             if told is not None:
                 told.follow, progress = progress, told
-            overruns = drive_run(run, order, bus, clock, operator, progress, lockstep=lockstep)
+            overruns = drive_run(run, order, bus, clock, operator, progress, lockstep=lockstep, priority=priority)
     if overruns:
         console.print(f"{overruns} cycles began late: close other programs on this computer.", style="yellow")
 

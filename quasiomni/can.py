@@ -115,8 +115,7 @@ def load(
         _show_clients(control.clients(at or control.control_path(bus or DEFAULT_BUS)))
         return
     from hil.bus.schedule import schedule
-    from hil.campaign.folder import network_file_of
-    from hil.network import load_network
+    from hil.network import load_network, network_file_of
     from ident.vehicle.description import load_vehicle
 
     if network is None:

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from hil.campaign.folder import network_file_of
 from hil.descriptions import write_dbc, write_device_files
-from hil.network import DEFAULT_NETWORK, load_network
+from hil.network import DEFAULT_NETWORK, load_network, network_file_of
 from hil.network.described import load_described
 from ident.extras import Extra, require
 from ident.writing import refuse_inputs, write_whole

@@ -33,6 +33,7 @@ from quasiomni.options import (
     InertiaStdOption,
     NetworkOption,
     PlantOption,
+    PriorityOption,
     SeedOption,
     VehicleOption,
     choose_engine,
@@ -103,6 +104,7 @@ def campaign(
     lockstep: Annotated[
         bool, typer.Option("--lockstep", help="With --bus: the other side is an emulator that SYNC moves.")
     ] = False,
+    priority: PriorityOption = True,
     engine: EngineOption = None,
     effect: EffectOption = None,
     plant: PlantOption = None,
@@ -159,7 +161,7 @@ def campaign(
     elif bus is None:
         drive_on_emulator(run, order, effects, gui, film, force=force, page=page)
     else:
-        drive_on_bus(run, order, bus, ask=not yes, lockstep=lockstep)
+        drive_on_bus(run, order, bus, ask=not yes, lockstep=lockstep, priority=priority)
     show_next(f"quasiomni identify {out}")
 
 

@@ -20,8 +20,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hil.campaign.folder import RunFolder, network_file_of
+from hil.campaign.folder import RunFolder
 from hil.campaign.reading import read_run
+from hil.network import network_file_of
 from ident.assessment import Assessment
 from ident.assessment import assess as assess_result
 from ident.diagnosis.vehicle.closing import extended_model

@@ -15,6 +15,7 @@ from quasiomni.application import console, errors
 
 if TYPE_CHECKING:
     from hil.bench.simulators import Simulator
+    from hil.bus.urgency import Urgency
     from ident.effects import Effect  # loads CasADi, which few commands need
 
 READERS: Final[Mapping[str, tuple[Extra, str]]] = MappingProxyType(
@@ -77,7 +78,20 @@ FromOption = Annotated[
         "wrote. --effect adds to them.",
     ),
 ]
+PriorityOption = Annotated[
+    bool,
+    typer.Option(
+        "--priority/--no-priority",
+        help="In real time the loop goes before other programs (SCHED_FIFO) and stays in memory, where permitted.",
+    ),
+]
 GuiOption = Annotated[bool, typer.Option("--gui", help="Show the emulated vehicle in a window.")]
+
+
+def say_urgency(urgency: Urgency) -> None:
+    """What to do where a loop did not get what it asked for."""
+    if urgency.remedy:
+        errors.print(urgency.remedy, style="yellow", highlight=False, soft_wrap=True)
 
 
 def parse_effects(texts: Sequence[str] | None) -> tuple[Effect, ...]:

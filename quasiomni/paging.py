@@ -111,13 +111,34 @@ def watching_bench(page: Page | None, title: str, told: Told, network: Network) 
     return begin
 
 
+def watching_replay(page: Page | None, title: str, told: Told, pace: float) -> Callable[[Any, Any, Network], None]:
+    """What to call with a vehicle, its bench and its network before anything moves; does nothing without a page.
+
+    Args:
+        page: that shows them.
+        title: of it.
+        told: is told the log that is played.
+        pace: simulated seconds a second at most; 0: as many as it gets.
+    """
+
+    def begin(vehicle: Any, bench: Any, network: Network) -> None:
+        if page is None:
+            return
+        shown = watching().watch_bench(page, title, vehicle, bench, network, told.doing)
+        if pace > 0:
+            bench.attend(watching().Pace(bench.clock.now, pace, shown.attend).attend)
+
+    return begin
+
+
 @dataclass
 class Told:
-    """The step that a campaign drives, as it was told last."""
+    """The step that is driven, or the log that is played, as it was told last; progress is in what `unit` names."""
 
     step: str = ""
     done: int = 0
     total: int = 0
+    unit: str = "cycles"
     follow: Callable[[str, int, int], None] = field(default=lambda *_: None)
 
     def __call__(self, step: str, done: int, total: int) -> None:
@@ -129,4 +150,4 @@ class Told:
         """As the page takes it."""
         from hil.page.shown import Doing
 
-        return Doing(self.step, self.done, self.total)
+        return Doing(self.step, self.done, self.total, self.unit)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ident.errors import UserError
 from ident.extras import require_engine
 from quasiomni.application import app
 from quasiomni.options import (
@@ -17,6 +18,18 @@ from quasiomni.options import (
     GivenVehicleOption,
     NetworkOption,
     parse_effects,
+)
+from quasiomni.paging import (
+    LOOPBACK,
+    PORT,
+    Told,
+    WebHostOption,
+    WebOption,
+    WebPortOption,
+    paging,
+    plan_page,
+    say_where,
+    watching_replay,
 )
 from quasiomni.scenarios import Stand
 from quasiomni.showing import bar, say
@@ -49,9 +62,18 @@ def replay(
     json: Annotated[Path | None, typer.Option(help="Write the numbers here.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write an HTML report with the timeline here.")] = None,
     force: ForceOption = False,
+    web: WebOption = False,
+    web_host: WebHostOption = LOOPBACK,
+    web_port: WebPortOption = PORT,
+    web_pace: Annotated[
+        float, typer.Option("--web-pace", min=0.0, help="With --web: seconds of the log a second; 0 takes all it gets.")
+    ] = 1.0,
 ) -> None:
     """Play a record into the bench: which emulated node answers otherwise, where and when. Exit code 1 if one does."""
     require_engine(engine, "The emulator")
+    address = plan_page(web, web_host, web_port)
+    if address is None and web_pace != 1.0:
+        raise UserError("--web-pace is of the page.", "Add --web, or leave it out.")
     from hil.replay import replaying  # needs the emulator, which a vehicle's computer does not have
     from hil.replay import report as reports
 
@@ -69,8 +91,12 @@ def replay(
         report,
         force,
     )
-    with bar("replaying") as shown:
-        answer = replaying.replay(order, lambda part, done, total: shown(done, total))
+    with paging(address) as page:
+        say_where(page)
+        with bar("replaying") as shown:
+            told = Told(unit="frames", follow=lambda _, done, total: shown(done, total))
+            begin = watching_replay(page, f"replay of {', '.join(map(str, logs))}", told, web_pace)
+            answer = replaying.replay(order, told, begin)
     say(reports.summary_lines(answer))
     if json is not None:
         reports.write_json(answer, json)

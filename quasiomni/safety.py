@@ -10,7 +10,7 @@ import typer
 from rich import box
 from rich.table import Table
 
-from hil.campaign.folder import network_file_of
+from hil.network import network_file_of
 from hil.safety import MasterDeathReport, StopSettings
 from ident.writing import refuse_inputs, write_whole
 from quasiomni.application import app, console

@@ -16,11 +16,13 @@ from rich.text import Text
 from hil.bench.control import ControlServer, Injection, control_path
 from hil.bus.clock import WallClock
 from hil.bus.report import ListenerReport
+from hil.bus.stamps import Stamps, write_stamps
 from hil.bus.traffic import Traffic, heard_by
 from hil.bus.unix import UnixHub
-from hil.campaign.folder import network_file_of
-from hil.network import load_network
+from hil.bus.urgency import urgent
+from hil.network import load_network, network_file_of
 from ident.errors import UserError
+from ident.writing import refuse_folder, write_by
 from quasiomni.application import app, console
 from quasiomni.filming import VIDEO_RATE, VideoOption, VideoRateOption, drawing, plan_video
 from quasiomni.options import (
@@ -32,12 +34,14 @@ from quasiomni.options import (
     GuiOption,
     NetworkOption,
     PlantOption,
+    PriorityOption,
     SeedOption,
     choose_engine,
     load_emulation,
     parse_effects,
     parse_plant,
     read_simulator,
+    say_urgency,
     tell_native,
 )
 from quasiomni.paging import (
@@ -93,6 +97,11 @@ def emulate(
         Path | None, typer.Option(help="Folder where the nodes keep parameters stored by 1010h, for the next start.")
     ] = None,
     duration: Annotated[float | None, typer.Option(min=0.0, help="Stop after so many seconds of wall time.")] = None,
+    priority: PriorityOption = True,
+    trace: Annotated[
+        Path | None,
+        typer.Option(help="Write here when the loop was where, as CSV: the newest million stamps, for `doctor`."),
+    ] = None,
     scenario: ScenarioOption = None,
     junit: JunitOption = None,
     json: JsonOption = None,
@@ -113,61 +122,72 @@ def emulate(
     script = open_scenario(context, scenario, (junit, json))
     address = plan_page(web, web_host, web_port)
     _refuse_together(plant, simulator, script, address)
-    fmu, model = parse_plant(plant, force=force), read_simulator(simulator, force=force)
-    chosen = choose_engine(engine) if fmu is None else None
-    emulation = load_emulation()
-    faults = emulation.read_faults(fault or [])
-    if script is not None:
-        prototype, network, seed = script.bench(prototype, network, seed)
-        stand = script.stand(stand)
-    if script is not None and script.drives_itself:
-        effects = parse_effects(effect)
-        script.drive(prototype, network, seed, chosen, effects, model, faults, delays=bit_times, gui=gui)
-        return
-    network_file = network or network_file_of(prototype)
-    end = None if duration is None else time.monotonic() + duration
-    tell_native(fmu)
-    with (
-        paging(address) as page,
-        drawing(film) as drawn,
-        emulation.vehicle(
-            prototype, seed, gui, network_file, parse_effects(effect), fmu, chosen, drawn, model
-        ) as vehicle,
-        emulation.server_bus(bus, load_network(network_file)) as opened,
-    ):
-        if stand is Stand.JACK:
-            vehicle.lift()
-        _say_what_is_assumed(prototype, len(emulation.assumed(prototype, network_file, model)))
-        served_as, pace = plant or simulator or prototype, "in lockstep" if lockstep else "in real time"
-        console.print(f"{served_as} is up on {bus}, {pace}. Ctrl-C ends it.")
-        watched = None if script is None else script.watch(vehicle, load_network(network_file))
-        clients, traffic = partial(_clients, opened), Traffic() if page is not None else None
-        server = emulation.server(
-            vehicle,
-            opened,
-            WallClock(),
-            network_file,
-            lockstep,
-            seed=seed,
-            delays=bit_times,
-            storage=storage,
-            hear=heard_by([one.hear for one in (watched, traffic) if one is not None]),
+    # The page comes up while everything else is loaded.
+    with paging(address) as page:
+        fmu, model = parse_plant(plant, force=force), read_simulator(simulator, force=force)
+        chosen = choose_engine(engine) if fmu is None else None
+        emulation = load_emulation()
+        say_where(page)
+        faults = emulation.read_faults(fault or [])
+        if script is not None:
+            prototype, network, seed = script.bench(prototype, network, seed)
+            stand = script.stand(stand)
+        if script is not None and script.drives_itself:
+            effects = parse_effects(effect)
+            script.drive(prototype, network, seed, chosen, effects, model, faults, delays=bit_times, gui=gui)
+            return
+        network_file = network or network_file_of(prototype)
+        stamps, stamping = _stamping(trace)
+        end = None if duration is None else time.monotonic() + duration
+        tell_native(fmu)
+        with (
+            drawing(film) as drawn,
+            emulation.vehicle(
+                prototype, seed, gui, network_file, parse_effects(effect), fmu, chosen, drawn, model
+            ) as vehicle,
+            emulation.server_bus(bus, load_network(network_file)) as opened,
+        ):
+            if stand is Stand.JACK:
+                vehicle.lift()
+            _say_what_is_assumed(prototype, len(emulation.assumed(prototype, network_file, model)))
+            served_as = plant or simulator or prototype
+            watched = None if script is None else script.watch(vehicle, load_network(network_file))
+            clients, traffic = partial(_clients, opened), Traffic() if page is not None else None
+            server = emulation.server(
+                vehicle,
+                opened,
+                WallClock(),
+                network_file,
+                lockstep,
+                seed=seed,
+                delays=bit_times,
+                storage=storage,
+                hear=heard_by([one.hear for one in (watched, traffic) if one is not None]),
+                stamps=stamps,
+            )
+            for one in faults:
+                server.faults.add(one)
+            between: list[Callable[[], None]] = []
+            if page is not None and traffic is not None:
+                shown = emulation.complete_network(prototype, network_file, model)
+                page_of = watching().watch_server(page, str(served_as), vehicle, server, shown, traffic, clients)
+                between.append(page_of.attend)
+            # A video is drawn between two steps, for longer than any other program should have to wait.
+            in_haste = priority and not lockstep and film is None
+            with _commands(control, bus, server.faults, clients) as poll, stamping, urgent(in_haste) as urgency:
+                pace = "in lockstep" if lockstep else f"in real time, {urgency.what}"
+                console.print(f"{served_as} is up on {bus}, {pace}. Ctrl-C ends it.", soft_wrap=True)
+                say_urgency(urgency)
+                _serve(server, (*between, poll), end, watched)
+            _say_who_has_lost_frames(opened)
+        if trace is not None and stamps is not None:
+            write_by(partial(write_stamps, stamps.table()), trace)
+        served = server.report
+        console.print(
+            f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms."
         )
-        for one in faults:
-            server.faults.add(one)
-        between: list[Callable[[], None]] = []
-        if page is not None and traffic is not None:
-            shown = emulation.complete_network(prototype, network_file, model)
-            page_of = watching().watch_server(page, str(served_as), vehicle, server, shown, traffic, clients)
-            between.append(page_of.attend)
-            say_where(page)
-        with _commands(control, bus, server.faults, clients) as poll:
-            _serve(server, (*between, poll), end, watched)
-        _say_who_has_lost_frames(opened)
-    served = server.report
-    console.print(f"{served.syncs} cycles served, {served.overruns} overruns, worst {served.worst_lag * 1e3:.1f} ms.")
-    if script is not None and watched is not None:
-        script.end(watched.report())
+        if script is not None and watched is not None:
+            script.end(watched.report())
 
 
 def _serve(
@@ -197,6 +217,15 @@ def _refuse_together(
             "A scenario with set-points drives in simulated time, which no page can follow.",
             "Leave --web out, or let a master drive and have the scenario watch.",
         )
+
+
+def _stamping(trace: Path | None) -> tuple[Stamps | None, contextlib.AbstractContextManager[None]]:
+    """Where a trace is taken, and inside of what."""
+    if trace is None:
+        return None, contextlib.nullcontext()
+    refuse_folder(trace)
+    stamps = Stamps()
+    return stamps, stamps.collections()
 
 
 def _say_what_is_assumed(prototype: str, count: int) -> None:

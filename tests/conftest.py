@@ -13,11 +13,11 @@ import pytest
 
 from hil.bench import emulation
 from hil.campaign.creating import create_run
-from hil.campaign.folder import Run, RunFolder, network_file_of
+from hil.campaign.folder import Run, RunFolder
 from hil.campaign.runner import CampaignRunner
 from hil.describing import check_measures
 from hil.frames.recorder import LogFormat, Recorder
-from hil.network import load_network
+from hil.network import load_network, network_file_of
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import PERIODS
 from ident.errors import DataFileError

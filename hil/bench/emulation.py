@@ -17,21 +17,23 @@ from emulator.vehicle import EmulatedVehicle
 from hil.bench.lockstep import LockstepBench
 from hil.bench.serving import VehicleServer
 from hil.bench.simulators import Simulator, load_simulated, naming
+from hil.bench.tracing import TracedServer
 from hil.bus.clock import Clock
 from hil.bus.opening import open_served_bus
+from hil.bus.stamps import Stamps
 from hil.bus.traffic import Hear
 from hil.cosimulation.plant import FmuVehicle
 from hil.faults import Fault, parse_fault, parse_script
 from hil.faults.devices import Slippery
 from hil.faults.fault import FaultError
 from hil.network import Network
-from ident.effects import Effect
 from ident.errors import UserError
 from ident.extras import EngineName, default_engine
 from ident.reading import read_bounded
 
 if TYPE_CHECKING:
     from hil.video.film import Video
+    from ident.effects import Effect
 
 
 class Plant(VehicleHardware, Slippery, Protocol):
@@ -209,12 +211,14 @@ def server(
     delays: bool = False,
     storage: Path | None = None,
     hear: Hear | None = None,
+    stamps: Stamps | None = None,
 ) -> VehicleServer:
     """A server of an emulated vehicle on a bus; `seed` is that of its faults, see `VehicleServer`.
 
     Args:
         storage: folder where the nodes store parameters.
         hear: called with every frame as it passes.
+        stamps: where its turns are stamped.
 
     Raises:
         OSError: the folder cannot be made.
@@ -223,7 +227,8 @@ def server(
         # Now, and not when a master stores for the first time, it shows whether that is possible.
         storage.mkdir(parents=True, exist_ok=True)
     memory = None if storage is None else FolderMemory(storage)
-    return VehicleServer(emulated, bus, clock, network, lockstep, emulated, seed, delays, memory, hear)
+    words = emulated, bus, clock, network, lockstep, emulated, seed, delays, memory, hear
+    return VehicleServer(*words) if stamps is None else TracedServer(stamps, *words)
 
 
 def read_faults(texts: Sequence[str]) -> list[Fault]:

@@ -54,14 +54,17 @@ class ServingReport:
     worst_lag: float = 0.0
 
 
-class _Port(Protocol):
+class Port(Protocol):
     """Frames as (identifier with the flags of `can_frame`, data): no message is built for each."""
 
-    def take(self, timeout: float) -> tuple[int, bytes] | None: ...
+    def take(self, timeout: float) -> tuple[int, bytes] | None:
+        """The next frame; None after `timeout` [s]."""
 
-    def send_data(self, can_id: int, data: bytes) -> None: ...
+    def send_data(self, can_id: int, data: bytes) -> None:
+        """Send a frame."""
 
-    def burst(self) -> AbstractContextManager[None]: ...
+    def burst(self) -> AbstractContextManager[None]:
+        """Inside, frames may be collected and sent together at the end."""
 
 
 class _BusPort:
@@ -92,7 +95,7 @@ class _HeardPort:
         hear: called with identifier, with flags, and data of each frame.
     """
 
-    def __init__(self, port: _Port, hear: Hear) -> None:
+    def __init__(self, port: Port, hear: Hear) -> None:
         self._port = port
         self._hear = hear
         self.burst = port.burst
@@ -146,8 +149,8 @@ class VehicleServer:
         hear: Hear | None = None,
     ) -> None:
         described = load_network(network)
-        port: _Port = bus if isinstance(bus, UnixHub) else _BusPort(bus)
-        self._port = port if hear is None else _HeardPort(port, hear)
+        port: Port = bus if isinstance(bus, UnixHub) else _BusPort(bus)
+        self._port: Port = port if hear is None else _HeardPort(port, hear)
         self._clock = clock
         self._lockstep = lockstep
         self._period = described.cycle_period
@@ -212,11 +215,15 @@ class VehicleServer:
             self._wired.settle(self._grid + self._period - _BEFORE_SYNC)
 
     def _take_sync(self, can_id: int, data: bytes) -> None:
+        self._move()
+        self._devices.receive(can_id, data)
+
+    def _move(self) -> None:
+        """Let the vehicle move up to a SYNC."""
         if self._lockstep:
             self._step()
         else:
             self._follow_clock()
-        self._devices.receive(can_id, data)
 
     def _step(self) -> None:
         if self._stepping:

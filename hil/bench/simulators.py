@@ -6,19 +6,19 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from emulator.reparametrised import with_truth
 from hil.bench.prototypes import Emulated, derive_emulated, is_vehicle_file, load_emulated
 from hil.network.described import load_described
-from ident.assessment.file import refuse_unusable
-from ident.effects import Effect
-from ident.effects.combining import combined
-from ident.effects.extended import ExtendedModel
 from ident.errors import DataFileError, UserError
-from ident.parameters_file import read_model
 from ident.vehicle.geometry import GEOMETRY_UNITS, Geometry, read_geometry
 from ident.vehicle.parameters import PARAMETER_NAMES
 from ident.vehicle.quantities import read_toml
+
+if TYPE_CHECKING:
+    from ident.effects import Effect
+    from ident.effects.extended import ExtendedModel
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,8 @@ class Simulator:
 
     def with_more(self, effects: Sequence[Effect]) -> tuple[Effect, ...]:
         """Its effects, and others added to them."""
+        from ident.effects.combining import combined  # loads the mathematics of effects, which few vehicles have
+
         return combined(self.model.effects, effects)
 
 
@@ -51,6 +53,9 @@ def read_simulator(path: Path, *, force: bool = False) -> Simulator:
         DataFileError: the file cannot be used; says where.
         UserError: it was assessed as unusable.
     """
+    from ident.assessment.file import refuse_unusable  # both load the estimation, which a prototype does without
+    from ident.parameters_file import read_model
+
     document = read_toml(path)
     refuse_unusable(document, str(path), force=force)
     model = read_model(path)

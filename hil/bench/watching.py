@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
+from typing import Final
 
 from emulator.vehicle import EmulatedVehicle
 from hil.bench.lockstep import LockstepBench
@@ -17,6 +19,12 @@ from hil.page.shown import BusNow, CyclesNow, Doing
 from hil.page.watch import Watch
 from hil.video.film import FilmedVehicle
 from ident.errors import UserError
+
+_SHORTEST_WAIT: Final = 0.005
+"""For less than that it is not worth to sleep [s]."""
+
+_LONGEST_WAIT: Final = 0.02
+"""Without looking what is asked on the page [s]."""
 
 
 def watch(page: Page, title: str, vehicle: object, faults: FaultInjector, network: Network, around: Around) -> Watch:
@@ -89,3 +97,40 @@ def watch_bench(
     watched = watch(page, title, vehicle, bench.faults, network, Around(bus, doing))
     bench.attend(watched.attend)
     return watched
+
+
+class Pace:
+    """What to call between two moves of time, so that simulated time passes no faster than it is to be watched.
+
+    Args:
+        simulated: simulated time [s].
+        pace: simulated seconds a second at most.
+        meanwhile: called at least once, and again while there is to be waited.
+        monotonic, sleep: the operating system's clock functions.
+    """
+
+    def __init__(
+        self,
+        simulated: Callable[[], float],
+        pace: float,
+        meanwhile: Callable[[], None],
+        monotonic: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._simulated = simulated
+        self._pace = pace
+        self._meanwhile = meanwhile
+        self._monotonic = monotonic
+        self._sleep = sleep
+        self._due = monotonic() - simulated() / pace
+
+    def attend(self) -> None:
+        """Wait as long as simulated time is ahead; where it is behind, nothing is made up for later."""
+        self._meanwhile()
+        while (ahead := self._ahead()) > _SHORTEST_WAIT:
+            self._sleep(min(ahead, _LONGEST_WAIT))
+            self._meanwhile()
+        self._due -= min(ahead, 0.0)
+
+    def _ahead(self) -> float:
+        return self._due + self._simulated() / self._pace - self._monotonic()

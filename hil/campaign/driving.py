@@ -37,6 +37,7 @@ def drive_run(
     progress: Progress,
     *,
     lockstep: bool = False,
+    priority: bool = False,
 ) -> int:
     """Make the run folder where there is none yet, and drive; gives how many cycles began late.
 
@@ -48,6 +49,7 @@ def drive_run(
         operator: lifts and lowers the vehicle.
         progress: called with the progress of each step.
         lockstep: SYNCs move the time of the other side, and wall time says nothing of its samples.
+        priority: go before other programs while the drives are enabled, where that is permitted.
 
     Raises:
         UserError: a step failed or cannot be used; the drives are stopped.
@@ -57,7 +59,7 @@ def drive_run(
     stamp = SyncTime(run.network.sync_cob_id, run.network.cycle_period) if lockstep else None
     recorder = Recorder(run.folder.frames, order.log_format, stamp)
     try:
-        runner = CampaignRunner(run, bus, clock, recorder, operator, progress)
+        runner = CampaignRunner(run, bus, clock, recorder, operator, progress, priority=priority)
         runner.drive()
     except BaseException:
         # The error that is on its way out is the one to report.

@@ -30,7 +30,7 @@ from hil.campaign.carried import (
     carried_vehicle,
     is_carried,
 )
-from hil.network import DEFAULT_NETWORK, Network
+from hil.network import Network, network_file_of
 from hil.network.described import Described, load_described
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.optimise import Excitation
@@ -43,20 +43,6 @@ from ident.reading import read_json
 from ident.vehicle.description import VehicleDescription
 
 SCHEMA: Final = "quasiomni.run/1"
-
-
-def network_file_of(vehicle: str) -> Path:
-    """The network file of a vehicle: beside its own file, or that shipped under the name of the vehicle or its file.
-
-    Beside `my_vehicle.toml` lies `my_vehicle.network.toml`; beside the vehicle file of a run folder, the folder's own.
-    """
-    beside = (Path(vehicle).with_suffix(".network.toml"), Path(vehicle).parent / "network" / "network.toml")
-    if Path(vehicle).suffix:
-        for path in beside:
-            if path.is_file():
-                return path
-    shipped = DEFAULT_NETWORK.with_name(f"{Path(vehicle).stem}.toml")
-    return shipped if shipped.is_file() else DEFAULT_NETWORK
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from hil.campaign.folder import (
     carries_network,
     carries_simulator,
     carries_vehicle,
-    network_file_of,
 )
 from hil.frames.recorder import LogFormat
+from hil.network import network_file_of
 from hil.network.described import load_described
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import DIAGNOSTIC

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hil.bus.clock import Clock
 from hil.bus.realtime import steady_memory
+from hil.bus.urgency import urgent
 from hil.campaign.folder import Run
 from hil.campaign.inspection import refusal, reject_unusable
 from hil.campaign.reading import read_run
@@ -129,6 +130,7 @@ class CampaignRunner:
         operator: lifts and lowers the vehicle.
         progress: shown to people.
         spare_alignments: leave out an alignment where the wheels stand right already.
+        priority: go before other programs while the drives are enabled, where that is permitted.
     """
 
     def __init__(
@@ -141,6 +143,7 @@ class CampaignRunner:
         progress: Progress,
         *,
         spare_alignments: bool = False,
+        priority: bool = False,
     ) -> None:
         self._run = run
         self._plan = run.plan
@@ -150,6 +153,7 @@ class CampaignRunner:
         self._operator = operator
         self._progress = progress
         self._spare_alignments = spare_alignments
+        self._priority = priority
         self.overruns = 0
 
     def drive(self) -> None:
@@ -189,7 +193,7 @@ class CampaignRunner:
         """
         before = set(finished_steps(self._run.folder.frames))
         references = [self._plan.reference(step, self._parameters(step)) for step in steps]
-        with steady_memory(), self._master() as master:
+        with steady_memory(), urgent(self._priority), self._master() as master:
             master.boot()
             master.enable()
             for reference in references:

@@ -9,12 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from hil.campaign.folder import RunFolder, describe, network_file_of, open_run
+from hil.campaign.folder import RunFolder, describe, open_run
 from hil.campaign.reading import read_any, read_driven, whole_records
 from hil.checking.findings import Finding, Severity, unreadable
 from hil.checking.records import check_records
 from hil.checking.vehicle import check_agreement, check_rehearsal, check_vehicle
-from hil.network import Network, load_network
+from hil.network import Network, load_network, network_file_of
 from hil.network.described import Described, differences, load_described
 from hil.network.reader import read_eds
 from ident.errors import DataFileError, RecordError, UserError

@@ -8,9 +8,10 @@ from functools import partial
 from pathlib import Path
 
 from hil.bench.simulators import Simulator, load_simulated, naming, read_simulator
-from hil.campaign.folder import RunFolder, network_file_of, open_run, sources_of
+from hil.campaign.folder import RunFolder, open_run, sources_of
 from hil.campaign.reading import read_as
 from hil.cosimulation.emulated import forces_of
+from hil.network import network_file_of
 from hil.network.described import Described
 from ident.diagnosis.vehicle.following import Difference, Following, all_differences, followings_of
 from ident.diagnosis.vehicle.simulator_gap import simulator_gap

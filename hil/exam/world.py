@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from emulator.effects import Wanted
-from hil.campaign.folder import network_file_of
+from hil.network import network_file_of
 from ident.campaign.plan import Plan
 from ident.errors import UserError
 from ident.records.record import Record

@@ -11,7 +11,7 @@ from hil.network.description import (
     PdoDirection,
     Role,
 )
-from hil.network.reader import DEFAULT_NETWORK, load_network
+from hil.network.reader import DEFAULT_NETWORK, load_network, network_file_of
 
 __all__ = [
     "DEFAULT_NETWORK",
@@ -25,4 +25,5 @@ __all__ = [
     "PdoDirection",
     "Role",
     "load_network",
+    "network_file_of",
 ]

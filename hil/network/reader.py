@@ -73,6 +73,20 @@ _SUBINDICES = 254
 _DEVICE_INFO = re.compile(r"^\s*\[DeviceInfo\]", re.IGNORECASE | re.MULTILINE)
 
 
+def network_file_of(vehicle: str) -> Path:
+    """The network file of a vehicle: beside its own file, or that shipped under the name of the vehicle or its file.
+
+    Beside `my_vehicle.toml` lies `my_vehicle.network.toml`; beside the vehicle file of a run folder, the folder's own.
+    """
+    beside = (Path(vehicle).with_suffix(".network.toml"), Path(vehicle).parent / "network" / "network.toml")
+    if Path(vehicle).suffix:
+        for path in beside:
+            if path.is_file():
+                return path
+    shipped = DEFAULT_NETWORK.with_name(f"{Path(vehicle).stem}.toml")
+    return shipped if shipped.is_file() else DEFAULT_NETWORK
+
+
 def load_network(path: Path = DEFAULT_NETWORK) -> Network:
     """Read a network file and the EDS files it names.
 

@@ -20,6 +20,7 @@ from emulator.firmware.node import Node as EmulatedNode
 from hil.master.codec import Counter
 from hil.network import Network, Node
 from hil.network.cia import Index
+from hil.page.offers import offers
 from hil.page.shown import (
     ActiveFault,
     BusNow,
@@ -125,15 +126,17 @@ class EmulatedView:
             )
             for name, build in zip(WHEELS, built.wheels, strict=True)
         )
+        drives, encoders = _named(self._drives), _named([node for node, _ in self._encoders])
         return Sketch(
             self._title,
-            _named(self._drives),
-            _named([node for node, _ in self._encoders]),
+            drives,
+            encoders,
             tuple(chassis_shapes(prototype)),
             wheels,
             prototype.truth["m_ch"] * GRAVITY,
             geometry.wheelbase + geometry.track_width,
             self._network.bit_rate,
+            offers([name for name, _ in drives], [name for name, _ in encoders]),
         )
 
     def look(self, wall: float, faults: tuple[ActiveFault, ...], stopped: bool) -> Snapshot:

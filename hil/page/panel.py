@@ -8,35 +8,20 @@ from typing import Any, Final
 
 import viser
 
-from hil.faults.fault import SPECIFICATIONS, FaultKind, Specification, Target
 from hil.page import tables
 from hil.page.plots import Plots
 from hil.page.scene import Scene
-from hil.page.shown import Action, Asked, Sketch, Snapshot, Told
-from ident.vehicle.geometry import WHEELS
+from hil.page.shown import Action, Asked, Offer, Sketch, Snapshot, Told
 
 _RIGHT: Final = 500
 _LEFT: Final = 430
 """Widths of the panels [pixels]."""
 
 _NONE: Final = "–"
+_FIRST: Final = "power"
+"""The kind of fault that is chosen already."""
 
 Ask = Callable[[Asked], None]
-
-
-def _places(sketch: Sketch) -> dict[Target, tuple[str, ...]]:
-    """Where a fault can be, in the words of its line; identifiers are those of an example."""
-    drives = tuple(name for name, _ in sketch.drives)
-    nodes = (*drives, *(name for name, _ in sketch.encoders))
-    return {
-        Target.FRAMES: (*nodes, "master", "all", "0x181"),
-        Target.IDENTIFIER: ("0x001", "0x080"),
-        Target.SENDER: (*nodes, "master"),
-        Target.NODE: nodes,
-        Target.DRIVE: drives,
-        Target.MASTER: ("master",),
-        Target.GROUND: ("floor", *(f"wheel_{wheel}" for wheel in WHEELS)),
-    }
 
 
 class Panel:
@@ -54,7 +39,7 @@ class Panel:
         self._sketch = sketch
         self._scene = scene
         self._ask = ask
-        self._places = _places(sketch)
+        self._offers = {one.kind: one for one in sketch.offers}
         self._finished: list[str] = []
         self._step = ""
         self._pace: deque[tuple[float, float]] = deque(maxlen=50)
@@ -123,11 +108,11 @@ class Panel:
 
     def _build_faults(self) -> None:
         gui = self._server.gui
-        kinds = [str(kind) for kind in FaultKind if SPECIFICATIONS[kind].target in self._places]
-        self._kind = gui.add_dropdown("What", kinds, initial_value=str(FaultKind.POWER))
-        self._place = gui.add_dropdown("Where", self._places_of(FaultKind.POWER))
+        first = self._offers[_FIRST]
+        self._kind = gui.add_dropdown("What", tuple(self._offers), initial_value=first.kind)
+        self._place = gui.add_dropdown("Where", first.places)
         self._numbers = gui.add_text("How", "to=2s", hint="NAME=NUMBER,...: from, to, and the numbers of the kind.")
-        self._meaning = gui.add_html(_meaning(FaultKind.POWER))
+        self._meaning = gui.add_html(_meaning(first))
         self._kind.on_update(lambda _: self._choose_kind())
         gui.add_button("Inject").on_click(lambda _: self._inject())
         gui.add_html('<div style="padding:0 8px;font-size:12px;color:#667">Faults that last:</div>')
@@ -136,12 +121,9 @@ class Panel:
         gui.add_button_group("End", ["this one", "all"]).on_click(self._end)
 
     def _choose_kind(self) -> None:
-        kind = FaultKind(self._kind.value)
-        self._place.options = self._places_of(kind)
-        self._set(self._meaning, _meaning(kind))
-
-    def _places_of(self, kind: FaultKind) -> tuple[str, ...]:
-        return self._places[SPECIFICATIONS[kind].target]
+        chosen = self._offers[self._kind.value]
+        self._place.options = chosen.places
+        self._set(self._meaning, _meaning(chosen))
 
     def _inject(self) -> None:
         numbers = self._numbers.value.strip()
@@ -181,7 +163,6 @@ class Panel:
             handle.content = content
 
 
-def _meaning(kind: FaultKind) -> str:
-    one: Specification = SPECIFICATIONS[kind]
-    numbers = "; ".join(f"<code>{name}</code>: {known.what}" for name, known in one.parameters.items())
-    return f'<div style="padding:0 8px;font-size:11px;color:#667">{one.what}. {numbers}</div>'
+def _meaning(offer: Offer) -> str:
+    numbers = "; ".join(f"<code>{name}</code>: {what}" for name, what in offer.numbers)
+    return f'<div style="padding:0 8px;font-size:11px;color:#667">{offer.what}. {numbers}</div>'

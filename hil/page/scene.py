@@ -18,6 +18,8 @@ from ident.vehicle.geometry import WHEELS
 
 NORMAL_COLOUR: Final = (40, 110, 200)
 DRIVE_COLOUR: Final = (230, 110, 10)
+_GROUND_COLOUR: Final = (170, 170, 170)
+_SKY_INTENSITY: Final = 1.6
 _PATH_COLOUR: Final = (30, 140, 90)
 COLOURS: Final = {
     Health.RUNNING: "#2b8a3e",
@@ -80,6 +82,10 @@ class Scene:
         self._sketch = sketch
         self._scene = scene = server.scene
         scene.set_up_direction("+z")
+        # Light from a panorama and shadows take a browser without a graphics card twice as long as all the rest.
+        scene.configure_environment_map(None)
+        scene.configure_default_lights(cast_shadow=False)
+        scene.add_light_hemisphere("/sky", ground_color=_GROUND_COLOUR, intensity=_SKY_INTENSITY)
         self._world = scene.add_frame("/world", show_axes=False)
         scene.add_grid(
             "/world/floor",

@@ -41,6 +41,23 @@ class WheelSketch:
 
 
 @dataclass(frozen=True)
+class Offer:
+    """A kind of fault that can be asked for.
+
+    Attributes:
+        kind: as it is called.
+        places: where it can be.
+        what: it does.
+        numbers: that it takes, as (name, meaning).
+    """
+
+    kind: str
+    places: tuple[str, ...]
+    what: str
+    numbers: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
 class Sketch:
     """What does not change while the page is open.
 
@@ -52,6 +69,7 @@ class Sketch:
         weight: of the vehicle [N].
         size: sum of wheelbase and track width [m].
         bit_rate: of the bus [bit/s].
+        offers: faults to be asked for.
     """
 
     title: str
@@ -62,6 +80,7 @@ class Sketch:
     weight: float
     size: float
     bit_rate: float
+    offers: tuple[Offer, ...]
 
 
 @dataclass(frozen=True)
@@ -161,11 +180,12 @@ class CyclesNow:
 
 @dataclass(frozen=True)
 class Doing:
-    """The step that is driven, and how far it is; nothing where nobody says."""
+    """The step that is driven, and how far it is, in what `unit` names; nothing where nobody says."""
 
     step: str = ""
     done: int = 0
     total: int = 0
+    unit: str = "cycles"
 
 
 @dataclass(frozen=True)

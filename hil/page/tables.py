@@ -67,7 +67,8 @@ def step(snapshot: Snapshot, finished: Iterable[str]) -> str:
     doing = snapshot.doing
     done = ", ".join(map(escape, finished))
     before = f"<br>Finished: {done}." if done else ""
-    now = f"<b>{escape(doing.step)}</b>: {doing.done} of {doing.total} cycles" if doing.step else "Between two steps"
+    progress = f"<b>{escape(doing.step)}</b>: {doing.done} of {doing.total} {doing.unit}"
+    now = progress if doing.step else "Between two steps"
     return f'<div id="qo-step" style="padding:0 8px;font-size:12px">{now}.{before}</div>'
 
 

@@ -189,7 +189,7 @@ def _asked(request: pytest.FixtureRequest) -> dict[str, Any]:
 def _emulated(asked: Mapping[str, Any]) -> Emulated:
     """The prototype and the network that were asked for; they agree."""
     from hil.bench.prototypes import load_emulated
-    from hil.campaign.folder import network_file_of
+    from hil.network import network_file_of
 
     prototype = str(asked["prototype"])
     return load_emulated(prototype, Path(asked["network"] or network_file_of(prototype)))

@@ -124,6 +124,7 @@ class Player:
                 self._keep(stamp + late, can_id, data)
                 if not number % _REPORT:
                     self._told(part.name, number, len(part.table))
+            self._told(part.name, len(part.table), len(part.table))
         self._drain()
         return self.played
 
@@ -153,6 +154,7 @@ class Player:
                     self._keep(instant - begin, can_id, data)
                 if not number % _REPORT:
                     self._told(part.name, number, len(part.table))
+            self._told(part.name, len(part.table), len(part.table))
         self._bench.clock.wait_until(round(grid.last + self._period / 2, 9))
         self._drain()
         return self.played

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,9 +14,9 @@ from emulator.vehicle import EmulatedVehicle
 from hil.bench.emulation import BenchOperator
 from hil.bench.lockstep import LockstepBench
 from hil.bench.simulators import Simulator, load_simulated, naming, read_simulator
-from hil.campaign.folder import Run, RunFolder, network_file_of, open_run
+from hil.campaign.folder import Run, RunFolder, open_run
 from hil.campaign.runner import check_network
-from hil.network import Network
+from hil.network import Network, network_file_of
 from hil.replay.commissioning import boots, commission, first_sample
 from hil.replay.comparing import Compared, compare
 from hil.replay.hands import Hands, is_lifted
@@ -112,8 +112,21 @@ class _Scene:
     notes: list[str] = field(default_factory=list)
 
 
-def replay(order: ReplayOrder, told: Told) -> ReplayAnswer:
+Begin = Callable[[EmulatedVehicle, LockstepBench, Network], object]
+"""Called with vehicle, bench and complete network of the emulation that is compared, before anything moves."""
+
+
+def _leave_alone(_vehicle: EmulatedVehicle, _bench: LockstepBench, _network: Network) -> None:
+    """Nobody watches."""
+
+
+def replay(order: ReplayOrder, told: Told, begin: Begin = _leave_alone) -> ReplayAnswer:
     """Play a record into the bench, and compare; nothing is written.
+
+    Args:
+        order: what is asked for.
+        told: is told the progress.
+        begin: lets somebody watch.
 
     Raises:
         UserError: a log cannot be read or replayed, or no vehicle can be as it is asked for.
@@ -122,7 +135,8 @@ def replay(order: ReplayOrder, told: Told) -> ReplayAnswer:
     scene = _scene(order)
     seed = order.seed if order.seed is not None else (scene.run.seed if scene.run is not None else 1)
     count = order.emulations or (1 if scene.in_step else EMULATIONS)
-    played = [_emulated(scene, seed + number, told) for number in range(count)]
+    # The others only tell by how much noise alone makes emulations differ.
+    played = [_emulated(scene, seed + number, told, _leave_alone if number else begin) for number in range(count)]
     compared = compare(played[0], played[1:], scene.network)
     if not compared.answers:
         raise UserError(
@@ -180,21 +194,31 @@ def _described(scene: _Scene, seed: int) -> str:
     return f"{', '.join(parts)}, seed {seed}"
 
 
-def _emulated(scene: _Scene, seed: int, told: Told) -> Played:
+def _emulated(scene: _Scene, seed: int, told: Told, begin: Begin) -> Played:
     with _bench(scene, seed) as (bench, hands, vehicle):
-        player = Player(bench, scene.network, told)
-        if scene.in_step:
-            # A campaign asks who is there before it begins to record.
-            check_network(bench.bus, bench.clock, scene.network)
-            return player.in_step(scene.recording, hands.before if hands is not None else _nobody)
-        if boots(scene.recording):
-            if hands is None and scene.lifted:
-                vehicle.lift()
-            return player.by_stamps(scene.recording, hands.before if hands is not None else _nobody)
-        _stand(scene, vehicle)
-        enable = first_sample(scene.recording, scene.network).enabled
-        commission(bench, scene.network, scene.recording, enable=enable)
-        return player.by_stamps(scene.recording, _nobody)
+        begin(vehicle, bench, scene.network)
+        played = _played(scene, Player(bench, scene.network, told), bench, hands, vehicle)
+        if bench.faults.log:
+            injected = ", ".join(str(one.fault) for one in bench.faults.log)
+            scene.notes.append(f"Faults were injected meanwhile, and what differs may be their work: {injected}.")
+        return played
+
+
+def _played(
+    scene: _Scene, player: Player, bench: LockstepBench, hands: Hands | None, vehicle: EmulatedVehicle
+) -> Played:
+    if scene.in_step:
+        # A campaign asks who is there before it begins to record.
+        check_network(bench.bus, bench.clock, scene.network)
+        return player.in_step(scene.recording, hands.before if hands is not None else _nobody)
+    if boots(scene.recording):
+        if hands is None and scene.lifted:
+            vehicle.lift()
+        return player.by_stamps(scene.recording, hands.before if hands is not None else _nobody)
+    _stand(scene, vehicle)
+    enable = first_sample(scene.recording, scene.network).enabled
+    commission(bench, scene.network, scene.recording, enable=enable)
+    return player.by_stamps(scene.recording, _nobody)
 
 
 def _nobody(_part: str, _can_id: int, _data: bytes) -> None:

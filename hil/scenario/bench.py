@@ -10,8 +10,8 @@ from emulator.engine.choice import ENGINES
 from emulator.vehicle import EmulatedVehicle
 from hil.bench.lockstep import LockstepBench
 from hil.bench.simulators import Simulator, load_simulated, naming
-from hil.campaign.folder import network_file_of
 from hil.faults import Fault
+from hil.network import network_file_of
 from hil.pytest_plugin.world import World
 from hil.scenario.running import ScenarioReport, run_scenario
 from hil.scenario.scenario import Scenario

@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 
 from hil.bench.prototypes import load_emulated
-from hil.campaign.folder import RunFolder, network_file_of
+from hil.campaign.folder import RunFolder
+from hil.network import network_file_of
 from hil.network.described import load_described
 from ident.estimate.result import KnownInertia
 from ident.records.record import Step

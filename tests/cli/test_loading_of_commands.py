@@ -49,6 +49,7 @@ def test_every_module_of_the_command_line_is_listed() -> None:
         "interface",
         "options",
         "paging",
+        "real_time",
         "scenarios",
         "showing",
     }

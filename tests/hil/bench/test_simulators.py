@@ -14,7 +14,7 @@ from emulator.prototype import load_prototype
 from hil.bench import emulation
 from hil.bench.simulators import load_simulated, read_simulator
 from hil.bench.truth import truth_of
-from hil.campaign.folder import network_file_of
+from hil.network import network_file_of
 from ident.effects import EFFECTS, Effect, make_effect
 from ident.effects.extended import ExtendedModel
 from ident.effects.text import parse_effect

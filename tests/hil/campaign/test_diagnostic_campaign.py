@@ -12,11 +12,11 @@ from emulator.vehicle import EmulatedVehicle
 from hil.bench.emulation import BenchOperator
 from hil.bench.lockstep import LockstepBench
 from hil.campaign.creating import create_run
-from hil.campaign.folder import Run, RunFolder, network_file_of, open_run
+from hil.campaign.folder import Run, RunFolder, open_run
 from hil.campaign.reading import PAYLOAD, read_driven
 from hil.campaign.runner import CampaignRunner
 from hil.frames.recorder import Recorder
-from hil.network import load_network
+from hil.network import load_network, network_file_of
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import PERIODS
 from ident.estimate.equations import equations_of

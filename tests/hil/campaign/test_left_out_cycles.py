@@ -15,12 +15,12 @@ from hil.bench import emulation
 from hil.bench.lockstep import LockstepBench
 from hil.bench.truth import truth_of
 from hil.campaign.creating import create_run
-from hil.campaign.folder import Run, RunFolder, network_file_of
+from hil.campaign.folder import Run, RunFolder
 from hil.campaign.reading import read_driven, read_run
 from hil.campaign.runner import CampaignRunner
 from hil.frames.recorder import Recorder
 from hil.master import Master
-from hil.network import load_network
+from hil.network import load_network, network_file_of
 from ident.campaign.excitation import FourierSeries
 from ident.campaign.optimise import Excitation
 from ident.campaign.plan import assemble_plan, make_plan

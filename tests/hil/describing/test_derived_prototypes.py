@@ -13,8 +13,8 @@ from emulator.derivation import Wiring, derive_prototype
 from emulator.rigid_bodies import RigidBody
 from emulator.vehicle import EmulatedVehicle
 from hil.bench.prototypes import load_emulated
-from hil.campaign.folder import network_file_of
 from hil.describing import check_measures, write_description
+from hil.network import network_file_of
 from ident.errors import DataFileError
 from ident.vehicle.description import VehicleDescription, load_vehicle
 

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from hil.bench.prototypes import load_emulated, stated_by
-from hil.campaign.folder import network_file_of
-from hil.network import DEFAULT_NETWORK, load_network
+from hil.network import DEFAULT_NETWORK, load_network, network_file_of
 from hil.network.agreement import disagreements
 from hil.network.described import load_described
 from ident.errors import DataFileError

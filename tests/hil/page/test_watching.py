@@ -15,6 +15,7 @@ from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
 from hil.bench import emulation
 from hil.bench.lockstep import LockstepBench
+from hil.bench.watching import Pace
 from hil.bus.bit_length import frame_bits
 from hil.bus.traffic import Traffic
 from hil.master import Master
@@ -243,3 +244,29 @@ def test_the_page_comes_up_by_itself_and_ends_with_its_owner() -> None:
         process = page._process
         assert process.poll() is None
     assert process.poll() is not None
+
+
+def test_what_is_watched_passes_no_faster_than_asked_and_makes_up_for_nothing() -> None:
+    wall, simulated = 0.0, 10.0
+
+    def sleep(duration: float) -> None:
+        nonlocal wall
+        wall += duration
+
+    looks: list[float] = []
+    pace = Pace(lambda: simulated, 2.0, lambda: looks.append(wall), lambda: wall, sleep)
+    for _ in range(100):
+        simulated += 0.02
+        pace.attend()
+    assert wall == pytest.approx(1.0, abs=0.01)
+    wall += 5.0
+    pace.attend()
+    begin = wall
+    for _ in range(100):
+        simulated += 0.02
+        pace.attend()
+    assert wall - begin == pytest.approx(1.0, abs=0.01)
+    simulated += 2.0
+    begin = len(looks)
+    pace.attend()
+    assert len(looks) - begin > 40, "what is asked on the page is not kept waiting by a long move of time"

@@ -10,7 +10,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,11 +20,9 @@ from emulator.prototype import load_prototype
 from emulator.vehicle import EmulatedVehicle
 from hil.bench import emulation
 from hil.bench.lockstep import LockstepBench
-from hil.bus.clock import WallClock
-from hil.bus.opening import open_bus
-from hil.bus.realtime import steady_memory
+from hil.bench.real_time import Trial, drive_bench
 from hil.master import Master
-from hil.network import DEFAULT_NETWORK, load_network
+from hil.network import DEFAULT_NETWORK
 from hil.page.channel import Channel, make_pair
 from hil.page.emulated import Around, EmulatedView
 from hil.page.shown import BusNow
@@ -34,8 +31,6 @@ from hil.page.watch import PERIOD, Watch
 pytestmark = pytest.mark.bench
 
 CYCLES = 10_000
-LATE = 0.001
-"""[s]"""
 BUSY = 0.7
 """Load of the machine, in processes that want a core, from which on lateness says nothing about us."""
 LOOKS = 2000
@@ -69,71 +64,33 @@ def look_time() -> float:
     return spent / LOOKS
 
 
-def test_with_a_page_that_somebody_reads_no_more_cycles_are_late(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_with_a_page_that_somebody_reads_no_more_cycles_are_late(capsys: pytest.CaptureFixture[str]) -> None:
     """The reader draws nothing: drawing in software would take a core of its own."""
     load = os.getloadavg()[0]
     if load > BUSY:
         pytest.skip(f"the machine is busy (load {load:.1f}): lateness would be that of other programs")
-    without, served = compare(tmp_path, rounds=2)
+    without, served = compare(rounds=2)
     with capsys.disabled():
         print(f"\nlate by more than 1 ms: {100 * without:.2f} % without a page, {100 * served:.2f} % with one")
     assert served < without + 0.002
 
 
-def compare(folder: Path, rounds: int, cycles: int = CYCLES) -> tuple[float, float]:
+def compare(rounds: int, cycles: int = CYCLES) -> tuple[float, float]:
     """Shares of late cycles without and with a page, by turns, so that both meet the same machine."""
-    shares = [[lateness(folder / f"{turn}{page}", page, cycles) for page in (False, True)] for turn in range(rounds)]
+    emulate = (sys.executable, "-m", "quasiomni", "emulate")
+    alone = Trial(emulate, cycles)
+    shown = Trial((*emulate, "--web", "--web-port", "0"), cycles, beside=read_by_nobody)
+    shares = [[len(drive_bench(one, cycles).cycles) / cycles for one in (alone, shown)] for _ in range(rounds)]
     without, served = np.mean(shares, axis=0)
     return float(without), float(served)
 
 
-def lateness(folder: Path, page: bool, cycles: int) -> float:
-    """Share of the cycles whose last TPDO comes more than 1 ms after the instant at which it comes undisturbed."""
-    folder.mkdir()
-    bus, clock = f"unix:{folder / 'bus'}", WallClock()
-    words = ["--web", "--web-port", "0"] if page else []
-    command = [sys.executable, "-m", "quasiomni", "emulate", "--bus", bus, *words]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-        try:
-            address = wait_for(server, page)
-            with (
-                read_by_nobody(address),
-                steady_memory(),
-                open_bus(bus) as opened,
-                Master(opened, clock, load_network()) as master,
-            ):
-                master.boot()
-                master.enable()
-                spans = np.empty(cycles)
-                origin = clock.now() - master.exchange((0.0,) * 4).time
-                for k in range(cycles):
-                    sample = master.exchange((0.05,) * 4)
-                    spans[k] = clock.now() - origin - sample.time
-        finally:
-            server.kill()
-    return float((spans - np.quantile(spans, 0.05) > LATE).mean())
-
-
-def wait_for(server: subprocess.Popen[str], page: bool) -> str:
-    """The address of the page, empty without one, once the bus is served."""
-    assert server.stdout is not None
-    wanted = re.compile(r"The page is http://(\S+)" if page else r"is up on ()")
-    while (line := server.stdout.readline()) and not (found := wanted.search(line)):
-        continue
-    assert line
-    assert found
-    return found.group(1)
-
-
 @contextmanager
-def read_by_nobody(address: str) -> Iterator[None]:
-    """A client of the page, in a process of its own, that reads all it gets and draws nothing."""
-    if not address:
-        yield
-        return
-    with subprocess.Popen([sys.executable, __file__, address], stdout=subprocess.PIPE) as reader:
+def read_by_nobody(said: str) -> Iterator[None]:
+    """A client of the page that a server has told of, in a process of its own: reads all it gets and draws nothing."""
+    found = re.search(r"The page is http://(\S+)", said)
+    assert found
+    with subprocess.Popen([sys.executable, __file__, found.group(1)], stdout=subprocess.PIPE) as reader:
         try:
             assert reader.stdout is not None
             assert reader.stdout.readline() == b"reading\n"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Sequence
 from copy import deepcopy
+from itertools import count
 from pathlib import Path
 
 import can
@@ -16,6 +17,10 @@ from hil.bench.lockstep import LockstepBench
 from hil.frames.recorder import LogFormat, make_writer
 from hil.master import Master
 from hil.network import Network
+from hil.page.channel import Channel, make_pair
+from hil.page.emulated import Around, EmulatedView
+from hil.page.shown import BusNow, Snapshot
+from hil.page.watch import PERIOD, Watch
 from hil.replay.comparing import Compared, compare
 from hil.replay.parties import Answer
 from hil.replay.playing import Player
@@ -206,3 +211,45 @@ def test_a_clock_that_was_set_by_a_year_is_refused(tmp_path: Path, sound: tuple[
         frame.timestamp -= 3e7
     with pytest.raises(RecordError, match="clock may have been set"):
         replayed(path)
+
+
+def test_one_emulation_is_watched_and_watching_changes_nothing(
+    tmp_path: Path, sound: tuple[Messages, float], network: Network
+) -> None:
+    path = written(tmp_path / "drive.blf", driven(*sound))
+    seen: list[float] = []
+    told: list[tuple[str, int, int]] = []
+
+    def begin(vehicle: EmulatedVehicle, bench: LockstepBench, complete: Network) -> None:
+        assert complete.drives[0].role == network.drives[0].role
+        ours, theirs = map(Channel, make_pair())
+        around = Around(lambda: BusNow(bench.load.frames, (bench.load.bits,) * 2))
+        view = EmulatedView("replay", vehicle, bench.devices, complete, around)
+        watch = Watch(ours, view, bench.faults, count(step=2 * PERIOD).__next__)
+
+        def attend() -> None:
+            watch.attend()
+            seen.extend(one.time for one in theirs.receive() if isinstance(one, Snapshot))
+
+        bench.attend(attend)
+
+    watched = replay(ReplayOrder([path]), lambda *words: told.append(words), begin)
+    alone = replayed(path)
+    assert len(seen) > 900
+    assert seen == sorted(seen), "one emulation of three"
+    assert told[-1][1] == told[-1][2] > 0, "the last word is that all is done"
+    assert watched.notes == alone.notes
+    assert watched.compared.answers == alone.compared.answers
+    for one, other in zip(watched.compared.tracks, alone.compared.tracks, strict=True):
+        assert (one.emulated == other.emulated).all()
+
+
+def test_what_was_injected_while_it_was_watched_is_in_the_answer(tmp_path: Path, sound: tuple[Messages, float]) -> None:
+    path = written(tmp_path / "drive.blf", driven(*sound))
+
+    def begin(_vehicle: EmulatedVehicle, bench: LockstepBench, _network: Network) -> None:
+        bench.faults.add("stuck@drive_fl:from=0.5s")
+
+    answer = replay(ReplayOrder([path], emulations=1), lambda *_: None, begin)
+    assert any("stuck@drive_fl" in note for note in answer.notes)
+    assert not answer.compared.agrees

@@ -11,12 +11,12 @@ import pytest
 
 from hil.bench import emulation
 from hil.campaign.driving import drive_run
-from hil.campaign.folder import Run, RunFolder, network_file_of, open_run
+from hil.campaign.folder import Run, RunFolder, open_run
 from hil.campaign.order import Order
 from hil.campaign.runner import check_network
 from hil.frames import FrameTable, read_log
 from hil.frames.recorder import LogFormat
-from hil.network import load_network
+from hil.network import load_network, network_file_of
 from hil.replay.replaying import ReplayAnswer, ReplayOrder, replay
 from hil.replay.report import as_json, headline, render_page, summary_lines
 from ident.campaign.plan import make_plan
