@@ -16,6 +16,7 @@ from typing import Any, Final
 import casadi as ca
 import numpy as np
 
+from fmu.model.elimination import Elimination, elimination
 from fmu.model.equations import equations
 from fmu.variables import Block, Inputs, Variable, VariableTable
 from ident.effects import Effect
@@ -73,10 +74,12 @@ class _Routine:
 def generate_core(table: VariableTable, effects: Sequence[Effect], inputs: Inputs) -> Core:
     """The model for a table of variables, and the effects and inputs that it was made for."""
     model = equations(table, effects, inputs)
-    routines, jacobian_size = _routines(model)
+    jacobian = ca.jacobian(model.xd, model.x)
+    eliminated = elimination(jacobian, model.coupled)
+    routines = _routines(model, jacobian, eliminated)
     written = {name: (resources.files("fmu.model") / name).read_text(encoding="utf-8") for name in _WRITTEN}
     generated = {
-        "qo_sizes.h": _sizes(table, jacobian_size, model),
+        "qo_sizes.h": _sizes(table, eliminated, model),
         "qo_table.c": table_source(table),
         "qo_equations.h": _prototypes(routines),
         "qo_equations.c": _definitions(routines),
@@ -91,42 +94,33 @@ def _fastest(model: Equations, table: VariableTable) -> float:
     return float(1.0 / np.abs(np.linalg.eigvals(np.asarray(jacobian(*starts)))).max())
 
 
-def _routines(model: Equations) -> tuple[list[_Routine], int]:
+def _routines(model: Equations, jacobian: Expression, eliminated: Elimination) -> list[_Routine]:
     point = {"x": model.x, "u": model.u, "p": model.p}
-    jacobian = ca.jacobian(model.xd, model.x)
-    routines = [
+    return [
         _Routine("derivatives", point, {"xd": model.xd}),
         _Routine("outputs", point, {"y": model.y}),
         _Routine("mode_distances", point, {"z": model.z}),
         _Routine("linearize", point, {"xd": model.xd, "jacobian": _nonzeros(jacobian)}),
-        *_eliminations(jacobian.sparsity(), model.coupled),
+        *_eliminations(eliminated),
         _along_inputs(model, point),
         *_directional(model, point),
     ]
-    return routines, jacobian.nnz()
 
 
 def _nonzeros(matrix: Expression) -> Expression:
     return ca.vertcat(*matrix.nonzeros())
 
 
-def _eliminations(pattern: Any, count: int) -> list[_Routine]:
-    """The system (shift I - J) k = right, reduced to its coupled states: its matrix by rows, its side, its solution.
-
-    The others do not couple among each other beyond a triangle, so what they add is written out, without a loop.
-    """
-    values, shift = ca.SX.sym("jacobian", pattern.nnz()), ca.SX.sym("shift")
-    right, coupled = ca.SX.sym("right", pattern.size1()), ca.SX.sym("coupled", count)
-    matrix = shift * ca.SX.eye(pattern.size1()) - ca.SX(pattern, values)
-    first, rest = slice(None, count), slice(count, None)
-    reduced = matrix[first, first] - matrix[first, rest] @ ca.solve(matrix[rest, rest], matrix[rest, first])
-    side = right[first] - matrix[first, rest] @ ca.solve(matrix[rest, rest], right[rest])
-    others = ca.solve(matrix[rest, rest], right[rest] - matrix[rest, first] @ coupled)
-    system = {"jacobian": values, "shift": shift}
+def _eliminations(found: Elimination) -> list[_Routine]:
+    """A step's system (shift I - J) k = right: factors and the coupled rest by rows; then its sides and solutions."""
     return [
-        _Routine("schur", system, {"matrix": ca.densify(ca.vec(reduced.T))}),
-        _Routine("eliminate", {**system, "right": right}, {"coupled": side}),
-        _Routine("expand", {**system, "right": right, "coupled": coupled}, {"solution": ca.vertcat(coupled, others)}),
+        _Routine(
+            "factorize",
+            {"jacobian": found.jacobian, "shift": found.shift},
+            {"factors": found.factors, "matrix": found.matrix},
+        ),
+        _Routine("eliminate", {"factors": found.held, "right": found.right}, {"reduced": found.reduced}),
+        _Routine("expand", {"factors": found.held, "solved": found.solved}, {"solution": found.solution}),
     ]
 
 
@@ -210,7 +204,7 @@ def _definition(routine: _Routine) -> str:
     return "\n".join([_signature(routine), "{", body, *unused, "}", ""])
 
 
-def _sizes(table: VariableTable, jacobian_size: int, model: Equations) -> str:
+def _sizes(table: VariableTable, eliminated: Elimination, model: Equations) -> str:
     sizes = {
         "NX": len(table.block(Block.STATE)),
         "NU": len(table.block(Block.INPUT)),
@@ -218,7 +212,8 @@ def _sizes(table: VariableTable, jacobian_size: int, model: Equations) -> str:
         "NY": len(table.block(Block.OUTPUT)),
         "NZ": model.z.numel(),
         "NV": model.coupled,
-        "NJ": jacobian_size,
+        "NJ": eliminated.jacobian.numel(),
+        "NF": eliminated.factors.numel(),
     }
     lines = [f"#define QO_{name} {size}" for name, size in sizes.items()]
     lines += [f"#define QO_TOLERANCE {TOLERANCE!r}", f"#define QO_FIRST_STEP {FIRST_STEP!r}"]

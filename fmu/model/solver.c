@@ -44,8 +44,8 @@ static const double DRIFT[STAGES] = {0.5, 1.5, 0.0, 0.0};
 static const double ORDER_OF_ERROR = 3.0;
 
 typedef struct {
-    double shift; /* 1/(g h) */
     double jacobian[QO_NJ];
+    double factors[QO_NF]; /* of the states that are eliminated */
     double matrix[QO_NV][QO_NV];
     int pivot[QO_NV];
 } linear_system;
@@ -110,16 +110,16 @@ static void substitute(const linear_system *system, double *v) {
 
 /* Whether the system for a step of h, at the Jacobian that it has, can be solved. */
 static int prepare(linear_system *system, double h) {
-    system->shift = 1.0 / (GAMMA * h);
-    qo_eq_schur(system->jacobian, &system->shift, &system->matrix[0][0]);
+    const double shift = 1.0 / (GAMMA * h);
+    qo_eq_factorize(system->jacobian, &shift, system->factors, &system->matrix[0][0]);
     return decompose(system);
 }
 
 static void solve(const linear_system *system, const double *right, double *k) {
-    double coupled[QO_NV];
-    qo_eq_eliminate(system->jacobian, &system->shift, right, coupled);
-    substitute(system, coupled);
-    qo_eq_expand(system->jacobian, &system->shift, right, coupled, k);
+    double reduced[QO_NX];
+    qo_eq_eliminate(system->factors, right, reduced);
+    substitute(system, reduced);
+    qo_eq_expand(system->factors, reduced, k);
 }
 
 static void add_scaled(double *sum, const double *values, double weight) {
