@@ -1,8 +1,9 @@
 """The states that a solver eliminates before it solves for those that are coupled, as straight code without a loop.
 
-Of (shift I - J) k = r the first states, the rates, are coupled densely; the others hang on them and on a few of their own
-kind: an angle on its rate, the memory of a joint on its lagged load. LU decomposition with the pivots on the diagonal, in
-an order that fills little; its factors are computed once for a step, and used for each of its stages.
+Of (shift I - J) k = r the first states, the rates of chassis and steering, are coupled densely; the others hang on them
+and on a few of their own kind: a wheel on its floor, an angle on its rate, the memory of a joint on its lagged load. LU
+decomposition with the pivots on the diagonal, in an order that fills little; its factors are computed once for a step,
+and used for each of its stages.
 """
 
 from __future__ import annotations

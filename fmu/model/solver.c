@@ -57,7 +57,7 @@ typedef struct {
     int ramps;           /* whether any input has a rate */
 } departure;
 
-/* LU decomposition with row pivoting, in place. Whether there is one. */
+/* LU decomposition with row pivoting, in place; the diagonal has its inverses. Whether there is one. */
 static int decompose(linear_system *system) {
     int column, row, k;
     for (column = 0; column < QO_NV; ++column) {
@@ -77,8 +77,9 @@ static int decompose(linear_system *system) {
         if (!(fabs(system->matrix[column][column]) > 0.0)) {
             return 0;
         }
+        system->matrix[column][column] = 1.0 / system->matrix[column][column];
         for (row = column + 1; row < QO_NV; ++row) {
-            double factor = system->matrix[row][column] / system->matrix[column][column];
+            double factor = system->matrix[row][column] * system->matrix[column][column];
             system->matrix[row][column] = factor;
             for (k = column + 1; k < QO_NV; ++k) {
                 system->matrix[row][k] -= factor * system->matrix[column][k];
@@ -96,15 +97,18 @@ static void substitute(const linear_system *system, double *v) {
         v[row] = held;
     }
     for (row = 0; row < QO_NV; ++row) {
+        double sum = v[row];
         for (k = 0; k < row; ++k) {
-            v[row] -= system->matrix[row][k] * v[k];
+            sum -= system->matrix[row][k] * v[k];
         }
+        v[row] = sum;
     }
     for (row = QO_NV - 1; row >= 0; --row) {
+        double sum = v[row];
         for (k = row + 1; k < QO_NV; ++k) {
-            v[row] -= system->matrix[row][k] * v[k];
+            sum -= system->matrix[row][k] * v[k];
         }
-        v[row] /= system->matrix[row][row];
+        v[row] = sum * system->matrix[row][row];
     }
 }
 
@@ -139,6 +143,22 @@ static void add(double *sum, const double *weights, double (*k)[QO_NX], int coun
     }
 }
 
+/* Of each state the sizes of the effects that it is there for, -1 behind; of the generated table. */
+extern const int qo_felt_by[QO_NX][QO_NE];
+
+/* Whether a state that is there for the sake of effects has none. Then nothing depends on it, or it is the twist of a
+   spring so stiff that both ends move as one; it follows as the method lets it, without asking for shorter steps. */
+static int idle(const qo_model *model, int state) {
+    int index, effects = 0;
+    for (index = 0; index < QO_NE && qo_felt_by[state][index] >= 0; ++index) {
+        if (model->p[qo_felt_by[state][index]] != 0.0) {
+            return 0;
+        }
+        ++effects;
+    }
+    return effects > 0;
+}
+
 /* Largest part of the error over its bound; *worst is the state that has it. */
 static double error_ratio(const qo_model *model, const double *next, const double *error, int *worst) {
     double largest = 0.0;
@@ -146,13 +166,13 @@ static double error_ratio(const qo_model *model, const double *next, const doubl
     for (index = 0; index < QO_NX; ++index) {
         double size = fmax(fabs(model->x[index]), fabs(next[index]));
         double ratio = fabs(error[index]) / (model->tolerance * (qo_states[index].nominal + RELATIVE_PART * size));
-        if (!(ratio <= largest)) {
-            largest = ratio;
-            *worst = index;
-        }
         if (!isfinite(next[index]) || !isfinite(ratio)) {
             *worst = index;
             return INFINITY;
+        }
+        if (ratio > largest && !idle(model, index)) {
+            largest = ratio;
+            *worst = index;
         }
     }
     return largest;
