@@ -30,7 +30,7 @@ TOLERANCE: Final = 1e-4
 FIRST_STEP: Final = 1e-3
 """Length that the first internal step tries [s]."""
 
-_WRITTEN: Final = ("core.h", "core.c", "solver.c", "fastest.c", "qo_internal.h")
+_WRITTEN: Final = ("core.h", "core.c", "solver.c", "linear.c", "fastest.c", "qo_internal.h", "qo_linear.h")
 """Files of the core that are written by hand."""
 
 _ROWS: Final = (("states", "NX", Block.STATE), ("inputs", "NU", Block.INPUT), ("parameters", "NP", Block.PARAMETER))
