@@ -5,18 +5,20 @@ CasADi writes the equations as C; each function gets plain arrays for arguments,
 
 from __future__ import annotations
 
-import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 import casadi as ca
 import numpy as np
 
+from fmu.model.effect_sizes import felt_by, sized
+from fmu.model.elimination import Elimination, elimination
 from fmu.model.equations import equations
+from fmu.model.straight_code import Routine, c_function
 from fmu.variables import Block, Inputs, Variable, VariableTable
 from ident.effects import Effect
 from ident.plant.creeping import Equations
@@ -28,22 +30,14 @@ TOLERANCE: Final = 1e-4
 FIRST_STEP: Final = 1e-3
 """Length that the first internal step tries [s]."""
 
-_WRITTEN: Final = ("core.h", "core.c", "solver.c", "fastest.c", "qo_internal.h")
+_WRITTEN: Final = ("core.h", "core.c", "solver.c", "linear.c", "fastest.c", "qo_internal.h", "qo_linear.h")
 """Files of the core that are written by hand."""
 
 _ROWS: Final = (("states", "NX", Block.STATE), ("inputs", "NU", Block.INPUT), ("parameters", "NP", Block.PARAMETER))
 """Arrays of rows: name, size and block."""
 
-_HELPERS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "sq": "static double qo_sq(double x) { return x * x; }",
-        "fabs": "static double qo_fabs(double x) { return fabs(x); }",
-        "fmax": "static double qo_fmax(double x, double y) { return x > y ? x : y; }",
-        "fmin": "static double qo_fmin(double x, double y) { return x < y ? x : y; }",
-        "sign": "static double qo_sign(double x) { return x < 0 ? -1 : x > 0 ? 1 : x; }",
-    }
-)
-"""What CasADi calls beyond <math.h>."""
+_OFTEN: Final = ("derivatives", "linearize", "outputs")
+"""Routines of every step; they alone test the sizes of effects, which takes the compilers time."""
 
 
 @dataclass(frozen=True)
@@ -61,25 +55,18 @@ class Core:
     fastest: float
 
 
-@dataclass(frozen=True)
-class _Routine:
-    """A C function to be: `void qo_eq_<name>(const double *<argument>, ..., double *<result>, ...)`."""
-
-    name: str
-    arguments: Mapping[str, Expression]
-    results: Mapping[str, Expression]
-
-
 def generate_core(table: VariableTable, effects: Sequence[Effect], inputs: Inputs) -> Core:
     """The model for a table of variables, and the effects and inputs that it was made for."""
     model = equations(table, effects, inputs)
-    routines, jacobian_size = _routines(model)
+    jacobian = ca.jacobian(model.xd, model.x)
+    eliminated = elimination(jacobian, model.coupled)
+    routines, felt = _routines(model, jacobian, eliminated), felt_by(table, effects)
     written = {name: (resources.files("fmu.model") / name).read_text(encoding="utf-8") for name in _WRITTEN}
     generated = {
-        "qo_sizes.h": _sizes(table, jacobian_size, model),
-        "qo_table.c": table_source(table),
+        "qo_sizes.h": _sizes(table, eliminated, model, len(felt[0])),
+        "qo_table.c": table_source(table) + _felt_source(felt),
         "qo_equations.h": _prototypes(routines),
-        "qo_equations.c": _definitions(routines),
+        "qo_equations.c": _definitions(routines, [place for place, _ in sized(table, effects)]),
     }
     files, dependencies = MappingProxyType({**written, **generated}), MappingProxyType(_dependencies(model, table))
     return Core(files, dependencies, _fastest(model, table))
@@ -91,51 +78,42 @@ def _fastest(model: Equations, table: VariableTable) -> float:
     return float(1.0 / np.abs(np.linalg.eigvals(np.asarray(jacobian(*starts)))).max())
 
 
-def _routines(model: Equations) -> tuple[list[_Routine], int]:
+def _routines(model: Equations, jacobian: Expression, eliminated: Elimination) -> list[Routine]:
     point = {"x": model.x, "u": model.u, "p": model.p}
-    jacobian = ca.jacobian(model.xd, model.x)
-    routines = [
-        _Routine("derivatives", point, {"xd": model.xd}),
-        _Routine("outputs", point, {"y": model.y}),
-        _Routine("mode_distances", point, {"z": model.z}),
-        _Routine("linearize", point, {"xd": model.xd, "jacobian": _nonzeros(jacobian)}),
-        *_eliminations(jacobian.sparsity(), model.coupled),
+    return [
+        Routine("derivatives", point, {"xd": model.xd}),
+        Routine("outputs", point, {"y": model.y}),
+        Routine("mode_distances", point, {"z": model.z}),
+        Routine("linearize", point, {"xd": model.xd, "jacobian": _nonzeros(jacobian)}),
+        *_eliminations(eliminated),
         _along_inputs(model, point),
         *_directional(model, point),
     ]
-    return routines, jacobian.nnz()
 
 
 def _nonzeros(matrix: Expression) -> Expression:
     return ca.vertcat(*matrix.nonzeros())
 
 
-def _eliminations(pattern: Any, count: int) -> list[_Routine]:
-    """The system (shift I - J) k = right, reduced to its coupled states: its matrix by rows, its side, its solution.
-
-    The others do not couple among each other beyond a triangle, so what they add is written out, without a loop.
-    """
-    values, shift = ca.SX.sym("jacobian", pattern.nnz()), ca.SX.sym("shift")
-    right, coupled = ca.SX.sym("right", pattern.size1()), ca.SX.sym("coupled", count)
-    matrix = shift * ca.SX.eye(pattern.size1()) - ca.SX(pattern, values)
-    first, rest = slice(None, count), slice(count, None)
-    reduced = matrix[first, first] - matrix[first, rest] @ ca.solve(matrix[rest, rest], matrix[rest, first])
-    side = right[first] - matrix[first, rest] @ ca.solve(matrix[rest, rest], right[rest])
-    others = ca.solve(matrix[rest, rest], right[rest] - matrix[rest, first] @ coupled)
-    system = {"jacobian": values, "shift": shift}
+def _eliminations(found: Elimination) -> list[Routine]:
+    """A step's system (shift I - J) k = right: factors and the coupled rest by rows; then its sides and solutions."""
     return [
-        _Routine("schur", system, {"matrix": ca.densify(ca.vec(reduced.T))}),
-        _Routine("eliminate", {**system, "right": right}, {"coupled": side}),
-        _Routine("expand", {**system, "right": right, "coupled": coupled}, {"solution": ca.vertcat(coupled, others)}),
+        Routine(
+            "factorize",
+            {"jacobian": found.jacobian, "shift": found.shift},
+            {"factors": found.factors, "matrix": found.matrix},
+        ),
+        Routine("eliminate", {"factors": found.held, "right": found.right}, {"reduced": found.reduced}),
+        Routine("expand", {"factors": found.held, "solved": found.solved}, {"solution": found.solution}),
     ]
 
 
-def _along_inputs(model: Equations, point: Mapping[str, Expression]) -> _Routine:
+def _along_inputs(model: Equations, point: Mapping[str, Expression]) -> Routine:
     direction = ca.SX.sym("du", model.u.numel())
-    return _Routine("input_direction", {**point, "du": direction}, {"sxd": ca.jtimes(model.xd, model.u, direction)})
+    return Routine("input_direction", {**point, "du": direction}, {"sxd": ca.jtimes(model.xd, model.u, direction)})
 
 
-def _directional(model: Equations, point: Mapping[str, Expression]) -> list[_Routine]:
+def _directional(model: Equations, point: Mapping[str, Expression]) -> list[Routine]:
     seeds = {f"d{name}": ca.SX.sym(f"d{name}", symbols.numel()) for name, symbols in point.items()}
     stacked, results = ca.vertcat(*point.values()), ca.vertcat(model.xd, model.y)
     forward = ca.jtimes(results, stacked, ca.vertcat(*seeds.values()))
@@ -143,12 +121,12 @@ def _directional(model: Equations, point: Mapping[str, Expression]) -> list[_Rou
     adjoint = ca.jtimes(results, stacked, ca.vertcat(*weights.values()), True)
     sizes = [0, model.x.numel(), model.x.numel() + model.u.numel(), stacked.numel()]
     return [
-        _Routine(
+        Routine(
             "jacobian_vector",
             {**point, **seeds},
             {"sxd": forward[: model.xd.numel()], "sy": forward[model.xd.numel() :]},
         ),
-        _Routine(
+        Routine(
             "vector_jacobian",
             {**point, **weights},
             {f"a{name}": adjoint[sizes[part] : sizes[part + 1]] for part, name in enumerate(point)},
@@ -166,14 +144,8 @@ def _dependencies(model: Equations, table: VariableTable) -> dict[str, tuple[str
     return {name: tuple(knowns[column] for column in sorted(columns)) for name, columns in found.items()}
 
 
-def _signature(routine: _Routine) -> str:
-    arguments = [f"const double *{name}" for name in routine.arguments]
-    results = [f"double *{name}" for name in routine.results]
-    return f"void qo_eq_{routine.name}({', '.join(arguments + results)})"
-
-
-def _prototypes(routines: Sequence[_Routine]) -> str:
-    lines = [f"{_signature(routine)};" for routine in routines]
+def _prototypes(routines: Sequence[Routine]) -> str:
+    lines = [f"{routine.signature};" for routine in routines]
     return guarded("QO_EQUATIONS_H", "The equations of the model.", lines)
 
 
@@ -184,33 +156,17 @@ def guarded(guard: str, comment: str, lines: Sequence[str]) -> str:
     )
 
 
-def _definitions(routines: Sequence[_Routine]) -> str:
-    bodies = [_definition(routine) for routine in routines]
-    used = {name for body in bodies for name in re.findall(r"\bqo_(\w+)\(", body) if not name.startswith("eq_")}
-    helpers = [_HELPERS[name] for name in sorted(used)]
+def _definitions(routines: Sequence[Routine], sizes: Collection[int]) -> str:
     head = ["/* The equations of the model. Generated. */", '#include "qo_equations.h"', "", "#include <math.h>", ""]
-    return "\n".join([*head, *helpers, "", *bodies])
+    return "\n".join([*head, *(c_function(each, sizes if each.name in _OFTEN else ()) for each in routines)])
 
 
-def _definition(routine: _Routine) -> str:
-    """The body that CasADi writes, arguments and results being plain arrays that are there."""
-    dense = [ca.densify(result) for result in routine.results.values()]
-    function = ca.Function(routine.name, list(routine.arguments.values()), ca.cse(dense))
-    generator = ca.CodeGenerator("equations.c")
-    generator.add(function)
-    match = re.search(r"static int casadi_f0\([^)]*\) \{\n(.*?)\n *return 0;\n\}", generator.dump(), re.DOTALL)
-    if match is None:
-        raise RuntimeError("This version of CasADi writes functions in a way that is not known here.")
-    body = match[1].replace("casadi_real ", "double ").replace("casadi_", "qo_")
-    for place, name in enumerate(routine.arguments):
-        body = re.sub(rf"arg\[{place}\]\? arg\[{place}\]\[(\d+)\] : 0", rf"{name}[\1]", body)
-    for place, name in enumerate(routine.results):
-        body = re.sub(rf"if \(res\[{place}\]!=0\) res\[{place}\]\[(\d+)\]", rf"{name}[\1]", body)
-    unused = [f"  (void){name};" for name in routine.arguments if not re.search(rf"\b{name}\[", body)]
-    return "\n".join([_signature(routine), "{", body, *unused, "}", ""])
+def _felt_source(felt: Sequence[tuple[int, ...]]) -> str:
+    rows = [f"    {{{', '.join(map(str, places))}}}," for places in felt]
+    return "\n".join(["", "const int qo_felt_by[QO_NX][QO_NE] = {", *rows, "};", ""])
 
 
-def _sizes(table: VariableTable, jacobian_size: int, model: Equations) -> str:
+def _sizes(table: VariableTable, eliminated: Elimination, model: Equations, felt: int) -> str:
     sizes = {
         "NX": len(table.block(Block.STATE)),
         "NU": len(table.block(Block.INPUT)),
@@ -218,7 +174,9 @@ def _sizes(table: VariableTable, jacobian_size: int, model: Equations) -> str:
         "NY": len(table.block(Block.OUTPUT)),
         "NZ": model.z.numel(),
         "NV": model.coupled,
-        "NJ": jacobian_size,
+        "NJ": eliminated.jacobian.numel(),
+        "NF": eliminated.factors.numel(),
+        "NE": felt,
     }
     lines = [f"#define QO_{name} {size}" for name, size in sizes.items()]
     lines += [f"#define QO_TOLERANCE {TOLERANCE!r}", f"#define QO_FIRST_STEP {FIRST_STEP!r}"]

@@ -5,9 +5,6 @@
  * products by the Jacobian (Hairer, Wanner, Solving Ordinary Differential Equations II, section IV.7) stage i solves
  *
  *     (I/(g h) - J) k_i = f(x + sum a_ij k_j) + sum c_ij k_j / h
- *
- * Only the first states, the rates, are coupled; the others follow from them and are eliminated before and after. What
- * is left is a dense system of QO_NV equations.
  */
 #include <math.h>
 #include <string.h>
@@ -15,6 +12,7 @@
 #include "core.h"
 #include "qo_equations.h"
 #include "qo_internal.h"
+#include "qo_linear.h"
 
 #define STAGES 4
 #define MAX_INTERNAL_STEPS 20000
@@ -43,84 +41,12 @@ static const double MOMENT[STAGES] = {0.0, 0.0, 1.0, 1.0};
 static const double DRIFT[STAGES] = {0.5, 1.5, 0.0, 0.0};
 static const double ORDER_OF_ERROR = 3.0;
 
-typedef struct {
-    double shift; /* 1/(g h) */
-    double jacobian[QO_NJ];
-    double matrix[QO_NV][QO_NV];
-    int pivot[QO_NV];
-} linear_system;
-
 /* Where a step begins. */
 typedef struct {
     double slope[QO_NX]; /* of the states */
     double drift[QO_NX]; /* of the slope, by the inputs alone */
     int ramps;           /* whether any input has a rate */
 } departure;
-
-/* LU decomposition with row pivoting, in place. Whether there is one. */
-static int decompose(linear_system *system) {
-    int column, row, k;
-    for (column = 0; column < QO_NV; ++column) {
-        int best = column;
-        for (row = column + 1; row < QO_NV; ++row) {
-            if (fabs(system->matrix[row][column]) > fabs(system->matrix[best][column])) {
-                best = row;
-            }
-        }
-        system->pivot[column] = best;
-        if (best != column) {
-            double held[QO_NV];
-            memcpy(held, system->matrix[column], sizeof held);
-            memcpy(system->matrix[column], system->matrix[best], sizeof held);
-            memcpy(system->matrix[best], held, sizeof held);
-        }
-        if (!(fabs(system->matrix[column][column]) > 0.0)) {
-            return 0;
-        }
-        for (row = column + 1; row < QO_NV; ++row) {
-            double factor = system->matrix[row][column] / system->matrix[column][column];
-            system->matrix[row][column] = factor;
-            for (k = column + 1; k < QO_NV; ++k) {
-                system->matrix[row][k] -= factor * system->matrix[column][k];
-            }
-        }
-    }
-    return 1;
-}
-
-static void substitute(const linear_system *system, double *v) {
-    int row, k;
-    for (row = 0; row < QO_NV; ++row) {
-        double held = v[system->pivot[row]];
-        v[system->pivot[row]] = v[row];
-        v[row] = held;
-    }
-    for (row = 0; row < QO_NV; ++row) {
-        for (k = 0; k < row; ++k) {
-            v[row] -= system->matrix[row][k] * v[k];
-        }
-    }
-    for (row = QO_NV - 1; row >= 0; --row) {
-        for (k = row + 1; k < QO_NV; ++k) {
-            v[row] -= system->matrix[row][k] * v[k];
-        }
-        v[row] /= system->matrix[row][row];
-    }
-}
-
-/* Whether the system for a step of h, at the Jacobian that it has, can be solved. */
-static int prepare(linear_system *system, double h) {
-    system->shift = 1.0 / (GAMMA * h);
-    qo_eq_schur(system->jacobian, &system->shift, &system->matrix[0][0]);
-    return decompose(system);
-}
-
-static void solve(const linear_system *system, const double *right, double *k) {
-    double coupled[QO_NV];
-    qo_eq_eliminate(system->jacobian, &system->shift, right, coupled);
-    substitute(system, coupled);
-    qo_eq_expand(system->jacobian, &system->shift, right, coupled, k);
-}
 
 static void add_scaled(double *sum, const double *values, double weight) {
     int index;
@@ -139,6 +65,22 @@ static void add(double *sum, const double *weights, double (*k)[QO_NX], int coun
     }
 }
 
+/* Of each state the sizes of the effects that it is there for, -1 behind; of the generated table. */
+extern const int qo_felt_by[QO_NX][QO_NE];
+
+/* Whether a state that is there for the sake of effects has none. Then nothing depends on it, or it is the twist of a
+   spring so stiff that both ends move as one; it follows as the method lets it, without asking for shorter steps. */
+static int idle(const qo_model *model, int state) {
+    int index, effects = 0;
+    for (index = 0; index < QO_NE && qo_felt_by[state][index] >= 0; ++index) {
+        if (model->p[qo_felt_by[state][index]] != 0.0) {
+            return 0;
+        }
+        ++effects;
+    }
+    return effects > 0;
+}
+
 /* Largest part of the error over its bound; *worst is the state that has it. */
 static double error_ratio(const qo_model *model, const double *next, const double *error, int *worst) {
     double largest = 0.0;
@@ -146,13 +88,13 @@ static double error_ratio(const qo_model *model, const double *next, const doubl
     for (index = 0; index < QO_NX; ++index) {
         double size = fmax(fabs(model->x[index]), fabs(next[index]));
         double ratio = fabs(error[index]) / (model->tolerance * (qo_states[index].nominal + RELATIVE_PART * size));
-        if (!(ratio <= largest)) {
-            largest = ratio;
-            *worst = index;
-        }
         if (!isfinite(next[index]) || !isfinite(ratio)) {
             *worst = index;
             return INFINITY;
+        }
+        if (ratio > largest && !idle(model, index)) {
+            largest = ratio;
+            *worst = index;
         }
     }
     return largest;
@@ -165,7 +107,7 @@ static void inputs_after(const qo_model *model, double h, double *u) {
     }
 }
 
-static departure depart(const qo_model *model, linear_system *system) {
+static departure depart(const qo_model *model, qo_linear *system) {
     departure from;
     int index;
     qo_eq_linearize(model->x, model->u, model->p, from.slope, system->jacobian);
@@ -188,12 +130,12 @@ static void evaluate(const qo_model *model, const departure *from, const double 
 }
 
 /* A step of h: the state after it, and its error ratio. */
-static double attempt(const qo_model *model, linear_system *system, const departure *from, double h, double *next,
+static double attempt(const qo_model *model, qo_linear *system, const departure *from, double h, double *next,
                       int *worst) {
     double k[STAGES][QO_NX];
     double slope[QO_NX], error[QO_NX];
     int stage;
-    if (!prepare(system, h)) {
+    if (!qo_prepare(system, 1.0 / (GAMMA * h))) {
         *worst = 0;
         return INFINITY;
     }
@@ -211,7 +153,7 @@ static double attempt(const qo_model *model, linear_system *system, const depart
         if (from->ramps) {
             add_scaled(right, from->drift, DRIFT[stage] * h);
         }
-        solve(system, right, k[stage]);
+        qo_solve(system, right, k[stage]);
     }
     memcpy(next, model->x, QO_NX * sizeof *next);
     add(next, B, k, STAGES, 1.0);
@@ -278,7 +220,7 @@ static void forget(qo_model *model, double tried, double proposed) {
 
 /* One step of at most h that the tolerance accepts; y stays. */
 static qo_status integrate(qo_model *model, double h, double *taken) {
-    linear_system system;
+    qo_linear system;
     const departure from = depart(model, &system);
     double next[QO_NX];
     double tried = fmin(fmax(first_guess(model), SHORTEST_STEP), h);

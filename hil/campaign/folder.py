@@ -133,6 +133,11 @@ class Run:
         own = Path(self.prototype).suffix and self.opened
         return str(self.folder.vehicle) if own else self.prototype
 
+    @property
+    def rehearsed(self) -> str:
+        """What an emulator plays who repeats the run: the same, or the vehicle file where a real vehicle was driven."""
+        return self.emulated or str(self.folder.vehicle)
+
 
 def sources_of(path: Path) -> tuple[Path, ...]:
     """The files that are read where a command is given a run folder, a folder of logs, or a file."""

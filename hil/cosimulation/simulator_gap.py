@@ -127,9 +127,7 @@ def _scene(order: SimulatorOrder) -> _Scene:
     record, described = read_as(order.record, order.vehicle, order.network)
     if order.vehicle is not None or not RunFolder(order.record).manifest.is_file():
         return _Scene(record, described, order.vehicle or "prototype")
-    run = open_run(order.record)
-    # A vehicle that was driven on a bus is emulated as it is rehearsed.
-    return _Scene(record, described, run.emulated or str(run.folder.vehicle))
+    return _Scene(record, described, open_run(order.record).rehearsed)
 
 
 def _before(order: SimulatorOrder, scene: _Scene) -> Simulator:

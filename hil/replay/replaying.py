@@ -169,7 +169,7 @@ def _refuse_unworkable(order: ReplayOrder) -> None:
 def _scene(order: ReplayOrder) -> _Scene:
     run = open_run(order.logs[0]) if order.logs[0].is_dir() else None
     recording = read_logs(order.logs) if run is None else read_run_folder(run.folder.frames, str(order.logs[0]))
-    name = order.vehicle or ((run.emulated or str(run.folder.vehicle)) if run is not None else "prototype")
+    name = order.vehicle or (run.rehearsed if run is not None else "prototype")
     network_file = order.network or (run.network.path if run is not None else network_file_of(name))
     path = order.simulator or (run.simulator if run is not None else None)
     simulator = None if path is None else read_simulator(path, force=order.force)

@@ -26,6 +26,7 @@ from ident.plant.stops import stop_torques
 from ident.plant.symbolic import LENGTHS, Expression
 from ident.plant.symbols import SIDES, Symbols, bound, dynamic_parameters
 from ident.plant.terms import (
+    FIRST_WHEEL,
     State,
     Surroundings,
     Term,
@@ -56,7 +57,8 @@ class Equations:
         y: outputs.
         z: event indicators (4,); the mode is 4 where z[0] < 0, else 3 where z[1] < 0, else 2 where z[2] and z[3] are
             negative, else 1.
-        coupled: how many of the first states, the rates, the equations couple; the others can be eliminated.
+        coupled: how many of the first states, the rates of chassis and steering, everything else hangs on and can be
+            eliminated from.
     """
 
     x: Expression
@@ -134,8 +136,7 @@ def equations(x: Symbols, u: Symbols, p: Symbols, effects: Sequence[Term], input
     at_shafts = (angle for each in gears for angle in (motor_angles[each.place], motor_rates[each.place]))
     y = ca.vertcat(reported, torques, slip[4:], slip[:4], _motor_wrench(motion, shaft), *at_shafts)
     distances = symbolic.mode_distances(alpha, p["mode_tolerance"])
-    coupled = rates.numel() + len(couplings) + len(gears) + slope_rates.numel()
-    return Equations(x.vector, u.vector, p.vector, bound(xd, p), bound(y, p), bound(distances, p), coupled)
+    return Equations(x.vector, u.vector, p.vector, bound(xd, p), bound(y, p), bound(distances, p), FIRST_WHEEL)
 
 
 def _state(x: Symbols, memories: Memories) -> State:

@@ -22,7 +22,7 @@ from fmu.packaging import Order, build_fmu
 from fmu.platforms import host_platform
 from fmu.source import ModelSource
 from fmu.table import neutral_effects, variable_table
-from fmu.variables import Block, Inputs
+from fmu.variables import Block, Carried, Inputs
 from ident.vehicle.description import load_vehicle
 from ident.vehicle.geometry import WHEELS
 
@@ -32,8 +32,14 @@ DRIVER = Path(__file__).parents[1] / "fmu" / "drivers" / "timing.c"
 STEP = 2e-3
 STEPS = 4000
 PERIOD = 250
-JUMPING_LIMIT = 25.0
-MICROSECONDS_LIMIT = 10.0
+STEADY_LIMIT = 7.0
+JUMPING_LIMITS = {0.1: 15.0, 0.3: 25.0, 1.0: 60.0}
+"""Of a step [us], by how much each torque jumps from step to step at most [Nm]; the motors are rated for 1.3 Nm."""
+
+CARRYING_LIMIT = 5.0
+"""Time of a step with every effect of size zero inside over that of the plain model."""
+
+WINDOWS = 3
 RATIO_LIMIT = 20.0
 
 PYTHON_SLAVE = '''
@@ -138,44 +144,69 @@ CASES = {
     "rotation": ({"alpha_l": -ROTATION, "alpha_r": ROTATION}, pattern(-1.0, -1.0, 1.0, 1.0)),
     "at rest": ({}, pattern(0.0, 0.0, 0.0, 0.0)),
     "held": ({}, pattern(0.1, 0.05, -0.05, 0.02)),
+    "driving and steering": ({}, pattern(0.4, 1.6, 1.5, 0.6)),
 }
 """Start values and torques; every half second the torques change their sign."""
 
 
-@pytest.fixture(scope="module")
-def ours(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, dict[str, int]]:
-    folder, vehicle = tmp_path_factory.mktemp("ours"), load_vehicle()
-    source = ModelSource(vehicle, vehicle.prior, (), {}, {})
+Unpacked = tuple[Path, str, dict[str, int]]
+
+
+def ours_with(folder: Path, carried: Carried) -> Unpacked:
+    vehicle = load_vehicle()
+    order = Order(FmiVersion.FMI2, Inputs.TORQUE, (host_platform(),), carried=carried)
     path = folder / "ours.fmu"
-    path.write_bytes(build_fmu(source, Order(FmiVersion.FMI2, Inputs.TORQUE, (host_platform(),)), find_compiler()))
+    path.write_bytes(build_fmu(ModelSource(vehicle, vehicle.prior, (), {}, {}), order, find_compiler()))
     return unpack(path, folder)
 
 
+@pytest.fixture(scope="module")
+def ours(tmp_path_factory: pytest.TempPathFactory) -> Unpacked:
+    return ours_with(tmp_path_factory.mktemp("ours"), Carried.STATELESS)
+
+
+def median(timing: ctypes.CDLL, fmu: Unpacked, case: str, ripple: float = 0.0) -> float:
+    """Of a step [us]; of some windows the one that was disturbed least."""
+    windows = (seconds(timing, fmu, *CASES[case], ripple=ripple) for _ in range(WINDOWS))
+    return min(statistics.median(window) for window in windows) * 1e6
+
+
 @pytest.mark.parametrize("case", CASES)
-def test_a_step_of_two_milliseconds_takes_at_most_ten_microseconds(
-    timing: ctypes.CDLL, ours: tuple[Path, str, dict[str, int]], case: str, capsys: pytest.CaptureFixture[str]
+def test_a_step_of_two_milliseconds_takes_at_most_seven_microseconds(
+    timing: ctypes.CDLL, ours: Unpacked, case: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    start, torques = CASES[case]
-    median = statistics.median(seconds(timing, ours, start, torques)) * 1e6
+    found = median(timing, ours, case)
     with capsys.disabled():
-        print(f"\n2 ms step, {case}: {median:.2f} us (limit {MICROSECONDS_LIMIT:.0f})")
-    assert median <= MICROSECONDS_LIMIT
+        print(f"\n2 ms step, {case}: {found:.2f} us (limit {STEADY_LIMIT:.0f})")
+    assert found <= STEADY_LIMIT
 
 
-@pytest.mark.parametrize("case", ["straight", "alignment", "lateral", "rotation", "held"])
-def test_a_step_with_torques_that_jump_every_step_takes_at_most_twenty_five_microseconds(
-    timing: ctypes.CDLL, ours: tuple[Path, str, dict[str, int]], case: str, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("ripple", JUMPING_LIMITS)
+@pytest.mark.parametrize("case", CASES)
+def test_a_step_with_torques_that_jump_every_step_takes_what_is_promised(
+    timing: ctypes.CDLL, ours: Unpacked, case: str, ripple: float, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """By up to a tenth of a newton metre each, at random: a controller at work."""
-    start, torques = CASES[case]
-    median = statistics.median(seconds(timing, ours, start, torques, ripple=0.1)) * 1e6
+    """At random: a controller at work, a coarse one, and noise of the size of the motors."""
+    found = median(timing, ours, case, ripple)
     with capsys.disabled():
-        print(f"\n2 ms step, {case}, torques that jump every step: {median:.2f} us (limit {JUMPING_LIMIT:.0f})")
-    assert median <= JUMPING_LIMIT
+        print(f"\n2 ms step, {case}, jumps of {ripple} Nm: {found:.2f} us (limit {JUMPING_LIMITS[ripple]:.0f})")
+    assert found <= JUMPING_LIMITS[ripple]
+
+
+def test_effects_that_are_carried_and_not_there_take_little(
+    timing: ctypes.CDLL, ours: Unpacked, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Turn by turn in one run."""
+    carrying = ours_with(tmp_path, Carried.ALL)
+    for case, ripple in (("straight", 0.0), ("straight", 0.1), ("held", 0.1), ("driving and steering", 0.1)):
+        plain, with_all = (median(timing, fmu, case, ripple) for fmu in (ours, carrying))
+        with capsys.disabled():
+            print(f"\n{case}, jumps of {ripple} Nm, all effects: {with_all:.1f} us, {with_all / plain:.1f} times")
+        assert with_all <= CARRYING_LIMIT * plain
 
 
 def test_it_is_twenty_times_faster_than_the_same_model_by_pythonfmu(
-    timing: ctypes.CDLL, ours: tuple[Path, str, dict[str, int]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    timing: ctypes.CDLL, ours: Unpacked, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Turn by turn in one run. The other takes one step of the same method, without error control."""
     theirs = unpack(python_fmu(tmp_path), tmp_path / "unpacked")

@@ -326,14 +326,21 @@ void qb_nmt_reset(qb_network *net, int node, int application);
 void qb_nmt_receive(qb_network *net, int node, const qb_frame *frame);
 void qb_guarding_answer(qb_network *net, int node);
 int qb_talks(const qb_network *net, int node);
-int qb_accepts_sync(qb_network *net, int node, const qb_frame *frame);
-void qb_latch(qb_network *net, int node);
-void qb_notify(qb_network *net, int node);
 qb_abort qb_node_write(qb_network *net, int node, uint16_t index, uint8_t subindex, int64_t value);
 int qb_consumes(const qb_network *net, int node, uint32_t id);
 void qb_heartbeat_receive(qb_network *net, int node, uint32_t id);
 void qb_node_timer(qb_network *net, int node, int timer);
 qb_abort qb_check_cob_id(uint32_t value);
+
+/* qb_sync.c */
+void qb_reset_sync(qb_network *net, int node);
+void qb_run_sync(qb_network *net, int node, int running);
+void qb_send_sync(qb_network *net, int node);
+qb_abort qb_write_sync(qb_network *net, int node, uint16_t index, uint32_t value);
+int qb_accepts_sync(qb_network *net, int node, const qb_frame *frame);
+/* Inputs are taken and set-points given at a SYNC; then what event-driven PDOs there are. */
+void qb_latch(qb_network *net, int node);
+void qb_notify(qb_network *net, int node);
 
 /* qb_drive.c, qb_axis.c: CiA 402 */
 void qb_drive_reset(qb_network *net, int node);

@@ -1,4 +1,4 @@
-/* NMT slave, heartbeat both ways, guarding answers, and SYNC of a node (CiA 301, 7.2.5, 7.2.8, 7.3.2). */
+/* NMT slave, heartbeat both ways, and guarding answers of a node (CiA 301, 7.2.8, 7.3.2). */
 #include "qb.h"
 
 #define SYNC_PRODUCES 0x40000000u
@@ -6,9 +6,7 @@
 #define INVALID 0x80000000u
 #define IDENTIFIER 0x1FFFFFFFu
 #define ERROR_CONTROL 0x700u
-#define MICROSECOND 1000LL
 #define HEARTBEAT_MISSING 0x8130
-#define SYNC_LENGTH 0x8240
 
 enum { START = 0x01, STOP = 0x02, ENTER_PRE_OPERATIONAL = 0x80, RESET_NODE = 0x81, RESET_COMMUNICATION = 0x82 };
 
@@ -34,122 +32,6 @@ qb_abort qb_check_cob_id(uint32_t value)
         }
     }
     return QB_FINE;
-}
-
-/* SYNC */
-
-static void restart_sync(qb_network *net, int node)
-{
-    const qb_sync *sync = &net->nodes[node].sync;
-    qb_stop_timer(net, node, QB_T_SYNC);
-    if (sync->running && sync->cob_id & SYNC_PRODUCES && sync->period > 0) {
-        qb_set_timer(net, node, QB_T_SYNC, sync->period * MICROSECOND);
-    }
-}
-
-static void reset_sync(qb_network *net, int node)
-{
-    qb_sync *sync = &net->nodes[node].sync;
-    sync->cob_id = (uint32_t)qb_value(net, node, 0x1005, 0, 0x080);
-    sync->period = (uint32_t)qb_value(net, node, 0x1006, 0, 0);
-    sync->overflow = (uint8_t)qb_value(net, node, 0x1019, 0, 0);
-    sync->window = qb_value(net, node, 0x1007, 0, 0) * MICROSECOND;
-    sync->seen_at = net->now;
-    sync->counter = 0;
-    sync->misfit = 0;
-}
-
-static void run_sync(qb_network *net, int node, int running)
-{
-    qb_sync *sync = &net->nodes[node].sync;
-    if (running != sync->running) {
-        sync->running = running;
-        restart_sync(net, node);
-    }
-}
-
-static void send_sync(qb_network *net, int node)
-{
-    const qb_sync *sync = &net->nodes[node].sync;
-    const uint8_t following = sync->overflow ? (uint8_t)(sync->counter % sync->overflow + 1) : 0;
-    qb_set_timer(net, node, QB_T_SYNC, sync->period * MICROSECOND);
-    qb_produce_sync(net, node, sync->cob_id & IDENTIFIER, &following, following ? 1 : 0);
-}
-
-int qb_accepts_sync(qb_network *net, int node, const qb_frame *frame)
-{
-    qb_sync *sync = &net->nodes[node].sync;
-    sync->misfit = frame->length != (sync->overflow ? 1 : 0);
-    if (!sync->misfit) {
-        sync->counter = frame->length ? frame->data[0] : 0;
-        sync->seen_at = net->now;
-        qb_end_communication(net, node, SYNC_LENGTH, QB_ANY_SOURCE);
-    } else if (qb_talks(net, node)) {
-        qb_report_communication(net, node, SYNC_LENGTH, frame->length);
-    }
-    return !sync->misfit;
-}
-
-static qb_abort write_sync(qb_network *net, int node, uint16_t index, uint32_t value)
-{
-    qb_sync *sync = &net->nodes[node].sync;
-    if (index == 0x1005) {
-        const int both = sync->cob_id & SYNC_PRODUCES && value & SYNC_PRODUCES;
-        const int started = value & SYNC_PRODUCES && !(sync->cob_id & SYNC_PRODUCES);
-        if (qb_check_cob_id(value) != QB_FINE || (both && (sync->cob_id ^ value) & IDENTIFIER)) {
-            return QB_VALUE_RANGE_EXCEEDED;
-        }
-        sync->cob_id = value;
-        sync->counter = started ? 0 : sync->counter;
-        restart_sync(net, node);
-    } else if (index == 0x1006) {
-        sync->period = value;
-        restart_sync(net, node);
-    } else if (index == 0x1007) {
-        sync->window = value * MICROSECOND;
-        sync->seen_at = net->now;
-    } else {
-        if (sync->period > 0) {
-            return QB_DEVICE_STATE;
-        }
-        if (value == 1 || value > 240) {
-            return QB_VALUE_RANGE_EXCEEDED;
-        }
-        sync->overflow = (uint8_t)value;
-        sync->counter = 0;
-    }
-    return QB_FINE;
-}
-
-void qb_latch(qb_network *net, int node)
-{
-    qb_node *me = &net->nodes[node];
-    int k;
-    if (me->state != QB_OPERATIONAL) {
-        return;
-    }
-    for (k = 0; k < QB_PDOS; k++) {
-        if (me->rpdos[k].wired && me->rpdos[k].type <= 240) {
-            qb_rpdo_sync(net, node, k);
-        }
-    }
-    if (qb_is_drive(node)) {
-        qb_drive_sample(net, node);
-    } else {
-        qb_encoder_sample(net, node);
-    }
-    for (k = 0; k < QB_PDOS; k++) {
-        if (me->tpdos[k].wired) {
-            qb_tpdo_sample(net, node, k);
-        }
-    }
-}
-
-void qb_notify(qb_network *net, int node)
-{
-    if (net->nodes[node].state == QB_OPERATIONAL) {
-        qb_tpdo_event(net, node);
-    }
 }
 
 /* Heartbeat */
@@ -293,7 +175,7 @@ static void enter(qb_network *net, int node, qb_nmt state)
         qb_drive_nmt_changed(net, node);
     }
     qb_pdo_wire(net, node, 1);
-    run_sync(net, node, qb_talks(net, node));
+    qb_run_sync(net, node, qb_talks(net, node));
     if (!qb_talks(net, node)) {
         qb_sdo_reset(net, node);
     }
@@ -306,7 +188,7 @@ static void reset_services(qb_network *net, int node, int application)
     qb_sdo_reset(net, node);
     qb_emergency_reset(net, node, application);
     qb_pdo_load(net, node);
-    reset_sync(net, node);
+    qb_reset_sync(net, node);
     qb_stop_timer(net, node, QB_T_HEARTBEAT);
     if (period > 0) {
         qb_set_timer(net, node, QB_T_HEARTBEAT, period * QB_MILLISECOND);
@@ -359,7 +241,7 @@ qb_abort qb_node_write(qb_network *net, int node, uint16_t index, uint8_t subind
     case 0x1005:
     case 0x1006:
     case 0x1007:
-    case 0x1019: return write_sync(net, node, index, (uint32_t)value);
+    case 0x1019: return qb_write_sync(net, node, index, (uint32_t)value);
     case 0x1014: {
         const uint32_t present = qb_emergency_cob_id(net, node);
         const int goes_on = !(present & INVALID) && !((uint32_t)value & INVALID);
@@ -383,7 +265,7 @@ void qb_node_timer(qb_network *net, int node, int timer)
     if (timer == QB_T_HEARTBEAT) {
         beat(net, node, qb_value(net, node, 0x1017, 0, 0));
     } else if (timer == QB_T_SYNC) {
-        send_sync(net, node);
+        qb_send_sync(net, node);
     } else {
         watch(net, node, timer - QB_T_CONSUMER);
     }

@@ -76,35 +76,34 @@ def test_both_kinds_of_clock_send_the_same(drive_fmu: Path) -> None:
         assert instance.next_tick == float("inf")
 
 
-@pytest.fixture
-def beating(tmp_path: Path) -> Path:
-    """A network file whose drives send heartbeats every 0.1 s from power-on."""
-    folder = tmp_path / "network"
+def network_with(folder: Path, entry: str, value: str) -> Path:
+    """A network file whose drives have another value of an object from power-on."""
     copytree(DEFAULT_NETWORK.parent, folder)
     eds = folder / "drive.eds"
-    eds.write_text(re.sub(r"(?s)(\[1017\].*?DefaultValue=)[^\n]*", r"\g<1>100", eds.read_text(), count=1))
+    eds.write_text(re.sub(rf"(?s)(\[{entry}\].*?DefaultValue=)[^\n]*", rf"\g<1>{value}", eds.read_text(), count=1))
     return folder / DEFAULT_NETWORK.name
 
 
 @pytest.fixture
-def container(beating: Path, tmp_path: Path) -> Path:
-    """Two drives with their terminals on each other."""
+def container(tmp_path: Path) -> Path:
+    """Two drives with their terminals on each other: one beats every 0.1 s, the one before it watches for 0.05 s."""
     from fmu_manipulation_toolbox.assembly import Assembly
 
-    for role in ("drive_fl", "drive_rl"):
-        build_drive(role, TxClock.TRIGGERED, tmp_path / f"{role}.fmu", beating)
+    entries = {"drive_rl": ("1016sub1", "0x00010032"), "drive_fl": ("1017", "100")}
+    for role, entry in entries.items():
+        build_drive(role, TxClock.TRIGGERED, tmp_path / f"{role}.fmu", network_with(tmp_path / role, *entry))
     (tmp_path / "pair.json").write_text(
-        '{"name": "pair.fmu", "fmu": ["drive_fl.fmu", "drive_rl.fmu"], "step_size": 0.01, '
-        '"link": [["drive_fl.fmu", "CAN", "drive_rl.fmu", "CAN"]]}'
+        '{"name": "pair.fmu", "fmu": ["drive_rl.fmu", "drive_fl.fmu"], "step_size": 0.01, '
+        '"link": [["drive_rl.fmu", "CAN", "drive_fl.fmu", "CAN"]]}'
     )
     Assembly("pair.json", fmu_directory=tmp_path).make_fmu(fmi_version=3, datalog=True)
     return tmp_path / "pair.fmu"
 
 
-def test_a_container_takes_the_frames_of_two_drives(
+def test_a_container_takes_the_frames_of_two_drives_and_one_hears_the_other(
     container: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Boot-up messages and heartbeats of both, with the ticks of their clocks."""
+    """With the ticks of their clocks. Who misses a heartbeat has heard the one before: EMCY 8130h of node 2."""
     from fmpy.simulation import simulate_fmu
 
     monkeypatch.chdir(tmp_path)
@@ -112,7 +111,9 @@ def test_a_container_takes_the_frames_of_two_drives(
     (log,) = tmp_path.glob("*datalog.csv")
     rows = re.findall(r"(?<=,)(?:[0-9A-F]{2}){16,}(?=,)", log.read_text())
     seen = {frame for row in rows for frame in frames(bytes.fromhex(row))}
-    assert seen == {CanFrame(0x700 + node, state) for node in (1, 2) for state in (b"\x00", b"\x7f")}
+    boot_up = {CanFrame(0x700 + node, b"\x00") for node in (1, 2)}
+    missed = CanFrame(0x082, bytes.fromhex("3081110100000000"))
+    assert seen == {*boot_up, CanFrame(0x701, b"\x7f"), missed}
 
 
 def test_the_same_run_gives_the_same_bytes(source: ModelSource, bus_fmu: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,16 +10,14 @@ import pytest
 from fmu.bus.packaging import BusPlant, bus_sources, vehicle_plant
 from fmu.bus.shaft_plant import shaft_plant
 from fmu.bus.system import BusSystem
-from fmu.compiling import HEADERS
 from fmu.source import ModelSource
 from hil.lsbus.system import drive_on_bus, vehicle_on_bus
 from hil.network import DEFAULT_NETWORK
 from tests.hil.lsbus.twins import silent_prototype
+from tests.sanitizing import Fuzz, sanitized
 
 DRIVER = Path(__file__).parent / "drivers" / "fuzz_bus.c"
 CHUNK = 250_000
-
-Fuzz = Callable[[int, int, str], str]
 
 
 def whole(source: ModelSource) -> tuple[BusPlant, BusSystem]:
@@ -39,24 +36,9 @@ def fuzz(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Fuzz:
     """Gives frames from a seed on; compiled once a level."""
-    compiler, folder = need("gcc"), tmp_path_factory.mktemp("fuzz_bus")
     plant, system = request.param(source)
-    for name, text in bus_sources(plant, system, "token").items():
-        (folder / name).write_bytes(text)
-    units = sorted(path.name for path in folder.glob("*.c"))
-    sanitizers = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    warnings = ["-Wall", "-Wextra", "-Werror"]
-
-    def run(seed: int, count: int, level: str) -> str:
-        program = folder / f"fuzz{level}"
-        if not program.exists():
-            flags = ["-g", level, "-std=gnu11", *sanitizers, *warnings, "-I", str(HEADERS), "-I", "."]
-            subprocess.run([compiler, *flags, "-o", program, *units, str(DRIVER), "-lm"], cwd=folder, check=True)
-        done = subprocess.run([program, str(seed), str(count)], capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout
-
-    return run
+    sources = bus_sources(plant, system, "token")
+    return sanitized(need("gcc"), sources, DRIVER, tmp_path_factory.mktemp("fuzz_bus"))
 
 
 def test_a_sample_of_random_frames_crashes_nothing(fuzz: Fuzz) -> None:

@@ -17,6 +17,7 @@ from tests.hil.lsbus.stimuli import (
     DISABLE_VOLTAGE,
     ENABLE,
     FAULT_RESET,
+    OF_THE_FMU,
     PRE_OPERATIONAL,
     QUICK_STOP,
     RESET_COMMUNICATION,
@@ -57,7 +58,7 @@ def test_every_object_reads_alike_but_the_eds_of_the_device(agree) -> None:  # t
         read(node.node_id, row.index, row.subindex)
         for node in SYSTEM.nodes
         for row in SYSTEM.devices[node.device].objects
-        if row.index not in (0x1021, 0x6502)
+        if row.index not in OF_THE_FMU
     ]
     answers = agree([*asked, read(1, 0x1234), read(1, 0x1018, 9), read(1, 0x6040, 1), read(6, 0x6040)])
     assert len(answers) == len(asked) + 4
