@@ -25,6 +25,7 @@ from ident.errors import UserError
 from ident.writing import refuse_folder, write_by
 from quasiomni.application import app, console
 from quasiomni.filming import VIDEO_RATE, VideoOption, VideoRateOption, drawing, plan_video
+from quasiomni.interrupts import asked_to_end
 from quasiomni.options import (
     DEFAULT_BUS,
     EffectOption,
@@ -174,11 +175,16 @@ def emulate(
                 between.append(page_of.attend)
             # A video is drawn between two steps, for longer than any other program should have to wait.
             in_haste = priority and not lockstep and film is None
-            with _commands(control, bus, server.faults, clients) as poll, stamping, urgent(in_haste) as urgency:
+            with (
+                _commands(control, bus, server.faults, clients) as poll,
+                stamping,
+                urgent(in_haste) as urgency,
+                asked_to_end() as asked,
+            ):
                 pace = "in lockstep" if lockstep else f"in real time, {urgency.what}"
                 console.print(f"{served_as} is up on {bus}, {pace}. Ctrl-C ends it.", soft_wrap=True)
                 say_urgency(urgency)
-                _serve(server, (*between, poll), end, watched)
+                _serve(server, (*between, poll), end, watched, asked)
             _say_who_has_lost_frames(opened)
         if trace is not None and stamps is not None:
             write_by(partial(write_stamps, stamps.table()), trace)
@@ -191,16 +197,24 @@ def emulate(
 
 
 def _serve(
-    server: VehicleServer, between: Sequence[Callable[[], None]], end: float | None, watched: WatchedServer | None
+    server: VehicleServer,
+    between: Sequence[Callable[[], None]],
+    end: float | None,
+    watched: WatchedServer | None,
+    asked: Callable[[], bool],
 ) -> None:
-    """Serve until Ctrl-C, an instant of the monotonic clock [s], or the end of a scenario; `between` is asked often."""
+    """Serve until somebody asks for an end, an instant of the monotonic clock [s], or the end of a scenario.
+
+    `between` is called often.
+    """
     if watched is not None:
         watched.served_by(server)
 
     def stop() -> bool:
         for each in between:
             each()
-        return (end is not None and time.monotonic() > end) or (watched is not None and watched.over())
+        over = watched is not None and watched.over()
+        return over or asked() or (end is not None and time.monotonic() > end)
 
     with contextlib.suppress(KeyboardInterrupt):
         server.serve(stop)
