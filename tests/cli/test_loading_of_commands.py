@@ -47,6 +47,7 @@ def test_every_module_of_the_command_line_is_listed() -> None:
         "behind_the_bus",
         "filming",
         "interface",
+        "interrupts",
         "options",
         "paging",
         "real_time",
