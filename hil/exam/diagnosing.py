@@ -29,6 +29,8 @@ from ident.effects.extended import ExtendedModel
 from ident.errors import UserError
 from ident.faults import sure_faults
 from ident.parameters_file import read_model
+from ident.records.axis_record import AxisRecord
+from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription, load_vehicle
 from ident.writing import write_whole
 
@@ -100,29 +102,53 @@ def diagnose_exam(
             f"{folder.path} holds no records yet.", "Seal first: quasiomni exam seal goes on where it stopped."
         )
     asked = [identifier for identifier in there if removed is None or identifier in removed]
-    left = [identifier for identifier in asked if not folder.diagnosis(identifier, removed is not None).is_file()]
     task = _axis_task(folder, removed or {}) if exam.of_axes else _vehicle_task(folder, removed or {})
     function = diagnose_axis_case if exam.of_axes else diagnose_case
-    progress(len(asked) - len(left), len(asked))
-    for done, (identifier, content) in enumerate(
-        run_all(function, map(task, left), jobs=jobs, scheduler=scheduler), len(asked) - len(left) + 1
-    ):
-        write_whole(content, folder.diagnosis(identifier, removed is not None))
-        progress(done, len(asked))
+    places = {identifier: folder.diagnosis(identifier, removed is not None) for identifier in asked}
+    keep_answers(function, task, places, jobs=jobs, scheduler=scheduler, progress=progress)
+
+
+def keep_answers(
+    function: Callable[..., tuple[str, bytes]],
+    task: Callable[[str], tuple[Any, ...]],
+    places: Mapping[str, Path],
+    *,
+    jobs: int,
+    scheduler: str | None,
+    progress: Progress,
+) -> None:
+    """Answer every case that has no answer yet, and write each as it comes.
+
+    Args:
+        function: gives the identifier of a case and its answer; runs in workers.
+        task: its arguments, by identifier.
+        places: where answers belong, by identifier.
+        jobs: processes on this machine.
+        scheduler: of a Dask cluster, None for this machine.
+        progress: called with cases done and in all.
+    """
+    left = [identifier for identifier, place in places.items() if not place.is_file()]
+    before = len(places) - len(left)
+    progress(before, len(places))
+    answers = run_all(function, map(task, left), jobs=jobs, scheduler=scheduler)
+    for done, (identifier, content) in enumerate(answers, before + 1):
+        write_whole(content, places[identifier])
+        progress(done, len(places))
 
 
 def _vehicle_task(folder: ExamFolder, removed: Mapping[str, str]) -> Callable[[str], tuple[Any, ...]]:
     """Arguments of `diagnose_case` for a case."""
     described = [path.read_text(encoding="utf-8") for path in (folder.vehicle, folder.model)]
-    return lambda identifier: (identifier, *_both(folder, identifier), *described, removed.get(identifier))
+    return lambda identifier: (identifier, *both_records(folder, identifier), *described, removed.get(identifier))
 
 
 def _axis_task(folder: ExamFolder, removed: Mapping[str, str]) -> Callable[[str], tuple[Any, ...]]:
     """Arguments of `diagnose_axis_case` for a case."""
-    return lambda identifier: (identifier, *_both(folder, identifier), removed.get(identifier))
+    return lambda identifier: (identifier, *both_records(folder, identifier), removed.get(identifier))
 
 
-def _both(folder: ExamFolder, identifier: str) -> tuple[bytes, ...]:
+def both_records(folder: ExamFolder, identifier: str) -> tuple[bytes, ...]:
+    """The records of a case to fit and to confirm, as Parquet."""
     return tuple(folder.record(identifier, which).read_bytes() for which in RECORDS)
 
 
@@ -159,7 +185,7 @@ def diagnose_case(
     effects = [name for name in EffectName if name != removed]
 
     def answer() -> dict[str, Any]:
-        records = [record_from_bytes(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
+        records = vehicle_records(fit, confirm)
         faults = sure_faults(records, world[0])
         if faults:
             return faulty(faults).as_json()
@@ -183,11 +209,21 @@ def diagnose_axis_case(identifier: str, fit: bytes, confirm: bytes, removed: str
     forbid_emulator()
 
     def answer() -> dict[str, Any]:
-        records = [axis_record_of(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
+        records = axis_records(fit, confirm)
         found = diagnose_axis(records[:1], records[1:], seed=1, lacking=() if removed is None else (removed,))
         return found.diagnosis().as_json()
 
     return identifier, _timed(answer)
+
+
+def vehicle_records(fit: bytes, confirm: bytes) -> list[Record]:
+    """Records of a vehicle to fit and to confirm, from their Parquet."""
+    return [record_from_bytes(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
+
+
+def axis_records(fit: bytes, confirm: bytes) -> list[AxisRecord]:
+    """The same of an axis."""
+    return [axis_record_of(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
 
 
 def _timed(answer: Callable[[], dict[str, Any]]) -> bytes:

@@ -12,20 +12,25 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hil.exam.axes.record_bytes import axis_record_of
 from hil.exam.cases import SIZES, Case, Kind
-from hil.exam.diagnosing import Progress, described, forbid_emulator, refuse_undiagnosed
-from hil.exam.folder import RECORDS, ExamFolder, read_exam
-from hil.exam.record_bytes import record_from_bytes
+from hil.exam.diagnosing import (
+    Progress,
+    axis_records,
+    both_records,
+    described,
+    forbid_emulator,
+    keep_answers,
+    refuse_undiagnosed,
+    vehicle_records,
+)
+from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.statistics import Rate, rate
-from hil.exam.workers import run_all
 from ident.diagnosis.axis.diagnose import pose_axis
 from ident.diagnosis.axis.reference import axis_reference
 from ident.diagnosis.known import NOTHING, log_evidence_of
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.vehicle.diagnose import pose_vehicle
 from ident.errors import UserError
-from ident.writing import write_whole
 
 
 def asked_of_oracle(cases: Sequence[Case]) -> dict[str, tuple[str, ...]]:
@@ -59,18 +64,13 @@ def ask_oracle(
     exam = read_exam(folder)
     if exam.sealed:
         refuse_undiagnosed(folder, [one for one in exam.identifiers if folder.complete(one)])
-    there = [identifier for identifier in asked if folder.complete(identifier)]
-    left = [identifier for identifier in there if not folder.oracle(identifier).is_file()]
     texts = None if exam.of_axes else tuple(path.read_text(encoding="utf-8") for path in (folder.vehicle, folder.model))
-    tasks = (
-        (one, *(folder.record(one, which).read_bytes() for which in RECORDS), texts, tuple(asked[one])) for one in left
-    )
-    progress(len(there) - len(left), len(there))
-    for done, (identifier, content) in enumerate(
-        run_all(evidence_of_case, tasks, jobs=jobs, scheduler=scheduler), len(there) - len(left) + 1
-    ):
-        write_whole(content, folder.oracle(identifier))
-        progress(done, len(there))
+
+    def task(identifier: str) -> tuple[object, ...]:
+        return identifier, *both_records(folder, identifier), texts, tuple(asked[identifier])
+
+    places = {identifier: folder.oracle(identifier) for identifier in asked if folder.complete(identifier)}
+    keep_answers(evidence_of_case, task, places, jobs=jobs, scheduler=scheduler, progress=progress)
 
 
 def evidence_of_case(
@@ -95,12 +95,12 @@ def evidence_of_case(
 
 
 def _axis(fit: bytes, confirm: bytes) -> tuple[Problem, Problem]:
-    records = [axis_record_of(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
+    records = axis_records(fit, confirm)
     return pose_axis(records[:1], records[1:], axis_reference(records[:1], None, records[1:]))
 
 
 def _vehicle(fit: bytes, confirm: bytes, vehicle: str, model: str) -> tuple[Problem, Problem]:
-    records = [record_from_bytes(content, which) for content, which in zip((fit, confirm), RECORDS, strict=True)]
+    records = vehicle_records(fit, confirm)
     return pose_vehicle(records[:1], records[1:], *described(vehicle, model)).problems
 
 

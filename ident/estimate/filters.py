@@ -63,13 +63,14 @@ def zero_phase(values: Array, cutoff: float, sample_time: float, unjudged: int =
     judged = np.asarray(values, dtype=float)[unjudged : len(values) - unjudged]
     sides = [(unjudged + _BEYOND, unjudged + _BEYOND)] + [(0, 0)] * (judged.ndim - 1)
     continued = np.pad(judged, sides, mode="reflect", reflect_type="odd")
-    filtered = signal.sosfiltfilt(_sections(cutoff, sample_time), continued, axis=0, padtype=None)
+    filtered = signal.sosfiltfilt(butterworth(FILTER_ORDER, cutoff, sample_time), continued, axis=0, padtype=None)
     return np.asarray(filtered[_BEYOND:-_BEYOND])
 
 
 @lru_cache(maxsize=32)
-def _sections(cutoff: float, sample_time: float) -> Array:
-    return np.asarray(signal.butter(FILTER_ORDER, cutoff / (2 * math.pi), fs=1 / sample_time, output="sos"))
+def butterworth(order: int, cutoff: float, sample_time: float) -> Array:
+    """Second-order sections (k, 6) of a low-pass, cutoff in rad/s; one array for all who ask, to be read only."""
+    return np.asarray(signal.butter(order, cutoff / (2 * math.pi), fs=1 / sample_time, output="sos"))
 
 
 MEMORY: Final = 50.0
@@ -89,7 +90,7 @@ def mirrored(values: Array, order: int, cutoff: float, sample_time: float) -> Ar
         cutoff: [rad/s].
         sample_time: [s].
     """
-    sections = signal.butter(order, cutoff / (2 * math.pi), fs=1 / sample_time, output="sos")
+    sections = butterworth(order, cutoff, sample_time)
     reach = min(math.ceil(MEMORY / (cutoff * sample_time)), len(values) - 1)
     return np.asarray(signal.sosfiltfilt(sections, values, axis=0, padtype="even", padlen=reach))
 

@@ -178,11 +178,8 @@ def axis_reference(
     known = {record.sample_time for record in records}
     strange = [record for record in others if record.sample_time not in known]
     apart = [axis_signals(record, chosen, ROWS_CUTOFF * chosen) for record in strange]
-    scales = tuple(
-        replace(scale, holds=_holds(apart, index, scale.values))
-        for index in range(len(records[0].axes))
-        for scale in (_scale(signals, index),)
-    )
+    alike = [_scale(signals, index) for index in range(len(records[0].axes))]
+    scales = tuple(replace(scale, holds=_holds(apart, index, scale.values)) for index, scale in enumerate(alike))
     limits = [
         noise_limit(axis, scale.values[0], scale.noise, chosen, repeat_duration(record), record.sample_time)
         for record in records

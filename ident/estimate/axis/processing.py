@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -18,7 +17,7 @@ from scipy import signal
 
 from ident.errors import EstimationError
 from ident.estimate.axis.cutoff import position_cutoff
-from ident.estimate.filters import differentiate
+from ident.estimate.filters import butterworth, differentiate
 from ident.records.axis_record import AxisRecord, AxisSignals
 
 Array = NDArray[np.float64]
@@ -109,12 +108,7 @@ def axis_equations(record: AxisRecord, axis: AxisSignals, processing: AxisProces
 
 def smoothed(position: Array, cutoff: float, sample_time: float) -> Array:
     """4th-order Butterworth low-pass forwards and backwards along axis 0, cutoff in rad/s."""
-    return _both_ways(_sections(cutoff, sample_time), position, BUTTERWORTH_ORDER)
-
-
-@lru_cache(maxsize=32)
-def _sections(cutoff: float, sample_time: float) -> Array:
-    return np.asarray(signal.butter(BUTTERWORTH_ORDER, cutoff / (2 * math.pi), fs=1 / sample_time, output="sos"))
+    return _both_ways(butterworth(BUTTERWORTH_ORDER, cutoff, sample_time), position, BUTTERWORTH_ORDER)
 
 
 def decimated(values: Array, factor: int) -> Array:
