@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -15,7 +16,10 @@ LED_BACK: Final = 1000
 """Samples at least over which a series is led back to its start before its spectrum is turned."""
 
 DAMPING: Final = 0.05
-"""Of what is behind a spring, over the critical damping: that of steel and screwed joints."""
+"""Of what is behind a spring, over the critical damping, tried first: so wide a resonance is met by a few of them."""
+
+RUNG: Final = 7.0
+"""Time constants after which what rings behind a spring is a thousandth of what it was."""
 
 RARER: Final = 1.0
 """Log odds of a filter in a drive against a plain delay, which rows of low frequency do not tell from it."""
@@ -34,26 +38,31 @@ def led(series: Array, time: float, sample_time: float) -> Array:
     return _answered(series, sample_time, lambda angular: 1 + 1j * angular * time)
 
 
-def sprung(series: Array, resonance: float, sample_time: float) -> Array:
+def sprung(series: Array, resonance: float, sample_time: float, damping: float = DAMPING) -> Array:
     """Second derivative of a series (N,), with a minus, behind a spring: ω² over 1 - (ω/ω_a)² + 2iζ ω/ω_a.
 
     Args:
-        series: as it is before.
+        series: as it is before; what is behind the spring is at rest when it begins.
         resonance: ω_a of what is behind the spring, with the front held [rad/s].
         sample_time: [s].
+        damping: ζ, over the critical one.
     """
 
     def response(angular: Array) -> NDArray[np.complex128]:
         share = angular / resonance
-        return np.asarray(angular**2 / (1 - share**2 + 2j * DAMPING * share), dtype=np.complex128)
+        return np.asarray(angular**2 / (1 - share**2 + 2j * damping * share), dtype=np.complex128)
 
-    return _answered(series, sample_time, response)
+    ringing = math.ceil(RUNG / (damping * resonance * sample_time))
+    return _answered(series, sample_time, response, max(ringing, LED_BACK))
 
 
 def _answered(
-    series: Array, sample_time: float, response: Callable[[Array], NDArray[np.complexfloating[Any, Any]]]
+    series: Array,
+    sample_time: float,
+    response: Callable[[Array], NDArray[np.complexfloating[Any, Any]]],
+    led_back: int = LED_BACK,
 ) -> Array:
-    length = fft.next_fast_len(len(series) + LED_BACK, real=True)
+    length = fft.next_fast_len(len(series) + led_back, real=True)
     closed = np.pad(series, (0, length - len(series)), mode="linear_ramp", end_values=series[0])
     turn = response(2 * np.pi * fft.rfftfreq(length, sample_time))
     return np.asarray(fft.irfft(fft.rfft(closed) * turn, length)[: len(series)])

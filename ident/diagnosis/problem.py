@@ -133,6 +133,8 @@ class Candidate:
         negligible: sizes of the coefficient of a single column, where it is negative and where it is positive, up to
             which it means nothing, in its unit.
         lowest: what the parameters must reach in size after the refit to be this effect; empty: anything.
+        expected: how far the numbers of the exact form (m,) are from what physics allows, in standard deviations (k,),
+            for what rows do not tell; None: nothing is known of them.
         excluded: the records speak against it, so that no others can bring it back.
         spread: standard deviations of the parameters that come with the way they are told, beyond the scatter of the
             rows; empty where there are none.
@@ -156,6 +158,7 @@ class Candidate:
     least: float | None = None
     negligible: tuple[float, float] = (0.0, 0.0)
     lowest: tuple[float, ...] = ()
+    expected: Callable[[Array], Array] | None = None
     excluded: bool = False
     spread: tuple[float, ...] = ()
     part: float = 0.0

@@ -84,6 +84,13 @@ class _Unknown:
             return self.exact(values, baseline)
         return [None if column is None else column @ values for column in self.columns]
 
+    def expected(self, values: Array) -> Array:
+        """How far its numbers are from what is expected of them, in standard deviations (k,), from all values."""
+        expected = self.candidate.expected
+        if self.exact is None or expected is None:
+            return np.zeros(0)
+        return expected(values[self.place])
+
 
 def refit(
     problems: Sequence[Problem],
@@ -171,14 +178,16 @@ class _Model:
         for number in range(len(self.unknowns)):
             model = model + self._added(number, values)
         white = self.whitener.apply(self.rows, self.rows.target - model)[self.chosen]
-        return np.append(white, self._weight * self.regression.prior_residual(values[: self.size]))
+        known = self._weight * self.regression.prior_residual(values[: self.size])
+        return np.concatenate([white, known, *(-unknown.expected(values) for unknown in self.unknowns)])
 
     def jacobian(self, values: Array) -> Array:
         """Derivative of the model of the same rows, (n + prior, all values)."""
         columns = [self.rows.baseline, *(self._derivative(number, values) for number in range(len(self.unknowns)))]
         white = self.whitener.apply(self.rows, np.hstack(columns))[self.chosen]
         prior = self._weight * self.regression.prior_jacobian(white.shape[1])
-        return np.vstack([white, prior])
+        expected = [_gradient(unknown.expected, values) for unknown in self.unknowns if len(unknown.expected(values))]
+        return np.vstack([white, prior, *expected])
 
     def result(self, values: Array) -> Refit:
         """Parameters with standard deviations, and the model of every block."""

@@ -18,7 +18,7 @@ from ident.diagnosis.axis.memories import friction_load, friction_warming, presl
 from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
 from ident.diagnosis.axis.motion import AxisMotion
 from ident.diagnosis.axis.positional import friction_position, gravity_loads, inertia_position
-from ident.diagnosis.delays import HELD, delayed, sprung
+from ident.diagnosis.delays import DAMPING, HELD, delayed, sprung
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.orders import FEWEST
 from ident.diagnosis.problem import Candidate, Periodic, Variant
@@ -36,6 +36,14 @@ rows hold the resonance itself, in a valley that is a tenth wide: from beside it
 HELD_FORCE: Final = 1 / 24
 """Of T²/M, the compliance that an effort seems to have that is held over the sample interval: its spectrum is that of
 the effort times a sinc, 1 - (ωT)²/24."""
+SHARE: Final = 1 / math.sqrt(12)
+"""Standard deviation of the share of the inertia that is behind a spring: anything between none and all."""
+LEAST_DAMPING: Final = 0.002
+USUAL_DAMPING: Final = 0.02
+"""Of what is behind a spring, over the critical damping: from 0.002 of solid steel by way of screwed joints to 0.2 of
+belts and wave gears."""
+DAMPINGS: Final = math.log(10.0) / 2
+"""Standard deviation of its logarithm."""
 SAMPLED: Final = 1 / 2
 """Of T²/M, the compliance up to which sampling may be what it is: when within a sample interval the effort acts and the
 position is read is not known, and a delay of T has (sT)²/2 in second order. Errors of the position make negative ones,
@@ -137,12 +145,18 @@ def _elasticity(axis: AxisModel) -> Candidate:
     """A load on a spring: u = M q'' + ... + c M ω²/(1 - (ω/ω_a)²) M q''; far below ω_a, only c is seen."""
     force, slowest = axis.inertia * axis.motion.acceleration, RESONANCES[0] * axis.bandwidth
 
-    def series(resonance: float) -> Array:
+    def series(resonance: float, damping: float = DAMPING) -> Array:
         within = np.clip(abs(resonance), slowest, RESONANCES[-1] * axis.bandwidth)
-        return axis.inertia * sprung(force, float(within), axis.sample_time)
+        return axis.inertia * sprung(force, float(within), axis.sample_time, max(abs(damping), LEAST_DAMPING))
 
     def heavier(baseline: Array) -> float:
         return float((baseline[axis.first] / axis.inertia) ** 2)
+
+    def expected(values: Array) -> Array:
+        """Of all inertia, what is behind the spring is c M ω_a², anything between nothing and all."""
+        share = max(values[0], 0.0) * abs(axis.inertia) * values[1] ** 2
+        damping = math.log(max(abs(values[2]), LEAST_DAMPING) / USUAL_DAMPING)
+        return np.array([(share - 0.5) / SHARE, damping / DAMPINGS])
 
     unit = f"{axis.kind.position_unit}/{axis.kind.effort_unit}"
     meaning = "between drive and load, all inertia behind it; negative where the position is measured behind it"
@@ -153,8 +167,15 @@ def _elasticity(axis: AxisModel) -> Candidate:
     sampling = axis.sample_time**2 / abs(axis.inertia)
     tried = [share * axis.bandwidth for share in RESONANCES]
     price = math.log(len(tried))
-    candidate = shaped_by(axis, EffectName.ELASTICITY, parameters, series, tried, price=price, scale=heavier)
-    return replace(candidate, negligible=(sampling, SAMPLED * sampling), spread=(HELD_FORCE * sampling, 0.0))
+    candidate = shaped_by(
+        axis, EffectName.ELASTICITY, parameters, series, tried, along=[DAMPING], price=price, scale=heavier
+    )
+    return replace(
+        candidate,
+        negligible=(sampling, SAMPLED * sampling),
+        spread=(HELD_FORCE * sampling, 0.0),
+        expected=expected,
+    )
 
 
 def _backlash(axis: AxisModel) -> Candidate:

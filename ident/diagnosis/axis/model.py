@@ -111,21 +111,23 @@ def shaped_by(
     axis: AxisModel,
     effect: str,
     parameters: tuple[EffectParameter, EffectParameter],
-    series: Callable[[float], Array],
+    series: Callable[..., Array],
     tried: Sequence[float],
     *,
+    along: Sequence[float] = (),
     price: float = 0.0,
     scale: Callable[[Array], float] = lambda _baseline: 1.0,
 ) -> Candidate:
     """An effect of a size times a series (N,) of one more number, of which some are tried first.
 
-    `scale` is by how much more the effect is, with other parameters than those of the first estimate.
+    `along` are where further numbers of the series begin, that are fitted and not stated. `scale` is by how much more
+    the effect is, with other parameters than those of the first estimate.
     """
 
     def contribution(values: Array, baseline: Array) -> tuple[Array | None, ...]:
-        return axis.alone(scale(baseline) * values[0] * series(float(values[1])))
+        return axis.alone(scale(baseline) * values[0] * series(*map(float, values[1:])))
 
     def variant(number: float) -> Variant:
-        return Variant(axis.alone(series(number)[:, None]), lambda found: np.append(found, number))
+        return Variant(axis.alone(series(number)[:, None]), lambda found: np.array([*found, number, *along]))
 
     return Candidate(effect, axis.place, parameters, tuple(map(variant, tried)), contribution, price=price)

@@ -124,7 +124,7 @@ class Signals:
                 friction=float(scale.values[PARAMETERS.index("Fc")]),
                 noise=sample_noise(motion.effort, dt),
                 blur=1 / (self.cutoff * dt),
-                ends=turned_round(motion.position_noise, float(scale.values[PARAMETERS.index("M")]), dt),
+                ends=turned_round(float(np.abs(motion.velocity).max()), float(scale.values[PARAMETERS.index("M")]), dt),
             )
             found.append(untold_while_sticking(sticking, motion.moving, self.filtered, 1 / (self.bandwidth * dt)))
         return found

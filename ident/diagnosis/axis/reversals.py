@@ -7,7 +7,8 @@ like a spring. How early or late it may turn is known: as long as the axis may s
 and one when it ends, are random effects of a known size, and what rows have of them is weighed down accordingly.
 
 So is an impulse at either end of the record: beyond it the terms of the equation go on as in a mirror, in which the
-speed turns round. What is measured of the speed there is noisy, and its inertia's part of the turn is not in the terms.
+motion turns round, and not every term of it turns in the same way: the inertia's part is not there at all, and that of
+a load behind a spring has a slope that breaks.
 """
 
 from __future__ import annotations
@@ -100,19 +101,18 @@ def untold_while_sticking(
     return Untold(impulses, linalg.factorized((impulses.T @ impulses + sparse.identity(len(found))).tocsc()))
 
 
-def turned_round(position_noise: float, inertia: float, sample_time: float) -> float:
-    """Deviation of the impulse at an end of a record, where the speed turns round: twice its own, times inertia.
+def turned_round(speed: float, inertia: float, sample_time: float) -> float:
+    """Deviation of the impulse at an end of a record, where the motion turns round: twice its momentum.
 
     Args:
-        position_noise: of a sample [m or rad].
+        speed: largest of the record [m/s or rad/s].
         inertia: [kg or kg m²].
         sample_time: [s].
 
     Returns:
         Force or torque times samples [N or Nm].
     """
-    speed_noise = math.sqrt(2) * position_noise / sample_time
-    return 2 * abs(inertia) * speed_noise / sample_time
+    return 2 * abs(inertia) * speed / sample_time
 
 
 def _ends(where: Mask) -> Iterator[tuple[int, int]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from dataclasses import replace
@@ -91,6 +92,31 @@ def test_a_wave_behind_a_spring_is_as_much_larger_as_its_resonance_says() -> Non
     expected = np.real(gain * np.exp(1j * omega * time))
     found = sprung(np.cos(omega * time), resonance, 1e-3)
     np.testing.assert_allclose(found[4000:-4000], expected[4000:-4000], atol=0.01 * abs(gain))
+
+
+def test_a_load_that_hardly_loses_anything_rings_on_and_not_before_it_was_pushed() -> None:
+    """A push at 2 s of a record of 4 s, at 0.005 of critical damping: what rings at its end does not at its start."""
+    time, resonance, damping = np.arange(4000) * 1e-3, 2 * np.pi * 8, 0.005
+    push = np.exp(-(((time - 2.0) / 0.02) ** 2))
+    found = sprung(push, resonance, 1e-3, damping)
+    amplitude = np.sqrt(found**2 + (np.gradient(found, 1e-3) / resonance) ** 2)
+    ringing = amplitude[(time > 2.2) & (time < 3.9)]
+    assert np.abs(found[time < 1.8]).max() < 2e-3 * ringing.max()
+    assert ringing[-1] / ringing[0] == pytest.approx(np.exp(-damping * resonance * 1.7), rel=0.02)
+
+
+@pytest.mark.parametrize("seed", [21, 31])
+def test_a_resonance_that_rows_do_not_tell_is_as_uncertain_as_the_share_of_the_inertia(
+    machine: Make, seed: int
+) -> None:
+    """77 Hz, of which rows see the compliance. Behind the spring is anything between no inertia and all of it."""
+    made = machine(compliance=1 / (20.0 * (2 * np.pi * 60.0) ** 2), noise=0.4, repeats=1, strokes=24, duration=16.0)
+    findings = diagnose_axis([made.drive(seed)], [made.drive(seed + 1)], seed=1)
+    compliance, std = _value(findings, "elasticity")
+    resonance, unsure = _value(findings, "elasticity", 1)
+    assert abs(compliance - 0.6**2 * made.compliance) < 2 * std
+    assert 0.1 * resonance < unsure < 0.5 * resonance
+    assert abs(resonance - 2 * np.pi * 60.0 / math.sqrt(0.6)) < 2 * unsure
 
 
 def test_a_delay_of_two_samples_is_named_with_its_length(machine: Make) -> None:
