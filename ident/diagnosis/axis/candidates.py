@@ -33,9 +33,6 @@ STRIBECK_SPEEDS: Final = (0.02, 0.03, 0.045, 0.065, 0.1, 0.15, 0.2, 0.3, 0.4, 0.
 RESONANCES: Final = (*(0.8 * 1.1**step for step in range(13)), 3.2, 4.5, 20.0)
 """Tried first, over the bandwidth of the rows; the last is a spring that shows as a compliance alone. Near the band the
 rows hold the resonance itself, in a valley that is a tenth wide: from beside it a descent ends elsewhere."""
-HELD_FORCE: Final = 1 / 24
-"""Of T²/M, the compliance that an effort seems to have that is held over the sample interval: its spectrum is that of
-the effort times a sinc, 1 - (ωT)²/24."""
 SHARE: Final = 1 / math.sqrt(12)
 """Standard deviation of the share of the inertia that is behind a spring: anything between none and all."""
 LEAST_DAMPING: Final = 0.002
@@ -170,12 +167,7 @@ def _elasticity(axis: AxisModel) -> Candidate:
     candidate = shaped_by(
         axis, EffectName.ELASTICITY, parameters, series, tried, along=[DAMPING], price=price, scale=heavier
     )
-    return replace(
-        candidate,
-        negligible=(sampling, SAMPLED * sampling),
-        spread=(HELD_FORCE * sampling, 0.0),
-        expected=expected,
-    )
+    return replace(candidate, negligible=(sampling, SAMPLED * sampling), expected=expected)
 
 
 def _backlash(axis: AxisModel) -> Candidate:

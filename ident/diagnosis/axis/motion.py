@@ -23,8 +23,8 @@ ROWS_CUTOFF: Final = 0.4
 """Cutoff of the rows over that of the position filter: sign(v) then sees the velocity itself."""
 LARGEST_ROWS_CUTOFF: Final = 1.0
 """Largest cutoff of the rows times the sample time."""
-NOISE_SHARE: Final = 0.1
-"""Of the effort's noise that the noise of the acceleration may reach."""
+GAINED: Final = 3.0
+"""Log evidence that an acceleration without its noise may bring: odds of 20 to 1, at which a name is sure."""
 LEAST_ROWS: Final = 300
 """Rows that the shortest repeat, or a record without any, shall have."""
 MOST_ROWS: Final = 4000
@@ -77,28 +77,40 @@ class AxisMotion:
     moving: NDArray[np.bool_]
 
 
-def noise_limit(
-    axis: AxisSignals, inertia: float, left: float, cutoff: float, duration: float, sample_time: float
-) -> float:
-    """Frequency [rad/s] below which the noise of the acceleration, times the inertia, is well below that of the effort.
+def noise_limit(record: AxisRecord, axis: AxisSignals, inertia: float, left: float, cutoff: float) -> float:
+    """Frequency [rad/s] up to which the noise of the acceleration cannot be taken for an effect.
 
-    Beyond it, errors of the regressor look like an elastic drive, or like a law of the acceleration: what is measured
-    of it where there is little is noise, and the best prediction of the effort from that is none. Rows below it are
-    fewer, LEAST_ROWS at least, and none are beyond the position's cutoff. An effort may hold more than noise where its
-    noise is looked for, and so may what a model leaves: the smaller of the two is taken.
+    While an axis hardly accelerates, what is measured of it is noise, and the best prediction of the effort from that
+    is none: what says so looks like an elastic drive, or like a law of the acceleration. To take a noise of power N out
+    of rows whose effort has E turns their variance from E + N into E: a log evidence of ln(1 + N / E) at every
+    frequency of a record, which may add up to `GAINED`. No rows are beyond the position's cutoff. An effort may hold
+    more than noise where its noise is looked for, and so may what a model leaves: the smaller of the two is taken.
 
     Args:
+        record: to which it belongs.
         axis: with its noise.
         inertia: of it [kg or kg m²].
         left: power density of what a first estimate leaves of the effort in the rows [per Hz].
         cutoff: of the position filter [rad/s].
-        duration: of a repeat, or of the record without any [s].
-        sample_time: [s].
+
+    Raises:
+        EstimationError: too little is left of a record of its duration.
     """
-    position, effort = (_noise_power(series, sample_time) for series in (axis.position, axis.effort))
-    level = NOISE_SHARE * min(effort, left) / max(inertia**2 * position, np.finfo(float).tiny)
-    fewest = min(2 * math.pi * LEAST_ROWS / (ROWS_PER_CUTOFF * duration), ROWS_CUTOFF * cutoff)
-    return float(np.clip(level**0.25, fewest, min(cutoff, LARGEST_ROWS_CUTOFF / sample_time)))
+    dt, duration = record.sample_time, len(record) * record.sample_time
+    position, effort = (_noise_power(series, dt) for series in (axis.position, axis.effort))
+    frequency = np.fft.rfftfreq(len(record), dt)
+    noise = inertia**2 * position * (2 * math.pi * frequency) ** 4
+    gained = np.cumsum(np.log1p(noise / max(min(effort, left), np.finfo(float).tiny)))
+    highest = 2 * math.pi * float(frequency[np.searchsorted(gained[:-1], GAINED)])
+    limit = min(highest, cutoff, LARGEST_ROWS_CUTOFF / dt)
+    if limit < 2 * math.pi * ROWS_CUTOFF * LEAST_BAND / duration:
+        raise EstimationError(
+            f"{record.source}: above {limit / (2 * math.pi):.3g} Hz the acceleration of {axis.label}, differences of a "
+            f"position with {math.sqrt(position / (2 * dt)):.2g} {axis.kind.position_unit} of noise, is less sure than "
+            f"its effort, and {duration:.3g} s of less than that are too few independent rows.",
+            "Record longer, or measure the position more finely.",
+        )
+    return limit
 
 
 def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth: float) -> AxisMotion:

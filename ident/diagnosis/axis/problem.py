@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -18,6 +19,7 @@ from ident.diagnosis.axis.reference import (
     Scale,
     Signals,
     axis_signals,
+    nominal,
     own_columns,
     refuse_other_axes,
 )
@@ -39,6 +41,13 @@ LOW_SPEED = 0.15
 STEP = "motion"
 LAG = "lag"
 """Parameter of the baseline: of a motion behind its effort, by sampling."""
+HOLD = "hold"
+"""Parameter of the baseline: of the second derivative of the effort, by sampling."""
+HOLDS = 1 / 12
+"""Deviation of that over T²: an effort that is held over the interval acts as one with T²/24 of it less, a position
+that is averaged over the interval as one with as much more."""
+LAGS = 1 / math.sqrt(12)
+"""Deviation of a lag over T: a position may be read at any part of an interval, at each rate at another one."""
 SURELY = 2.0
 """Standard deviations by which a lag must exceed what sampling explains."""
 
@@ -47,7 +56,7 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
     """Rows M a + Fv v + Fc sign(v) + offset = effort of every axis of the records, and what might be missing in them.
 
     With several axes, the acceleration of each stands in the rows of all: inertia couples them, and that is no gap.
-    So does, in its own rows, a lag of each axis that sampling can explain.
+    So does, in its own rows, a lag of each axis that sampling can explain, and what holding an effort does to it.
 
     Raises:
         RecordError: the records do not have the same axes, or not those of the reference.
@@ -59,16 +68,20 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
     blocks = tuple(block for blocks, _, _ in parts for block in blocks)
     candidates = _joined([candidates for _, candidates, _ in parts])
     dependences = tuple(across(each) for each in zip(*(those for _, _, those in parts), strict=True))
-    parameters, units = zip(*_baseline_names(records[0].axes, reference.scales), strict=True)
-    return Problem(parameters, units, blocks, candidates, dependences=dependences)
+    axes = records[0].axes
+    parameters, units = zip(*_baseline_names(axes, reference), strict=True)
+    spreads = {axis.named(HOLD): HOLDS for axis in axes}
+    spreads |= {axis.named(_lag_at(time)): LAGS for axis in axes for time in reference.strange}
+    return Problem(parameters, units, blocks, candidates, spreads=spreads, dependences=dependences)
 
 
 def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]], list[Dependence]]:
     period = with_repeats(signals.record)
     scales, width = reference.scales, len(PARAMETERS) + len(reference.scales) - 1
-    first = np.cumsum([0, *(width + (scale.hold is not None) for scale in scales)]).tolist()
+    sampled = 1 + len(reference.strange)
+    first = np.cumsum([0, *(width + sampled + (scale.hold is not None) for scale in scales)]).tolist()
     models = [_model(signals, index, scale, first[index]) for index, scale in enumerate(scales)]
-    baselines = _baselines(models, signals, reference.scales)
+    baselines = _baselines(models, signals, reference)
     blocks = [_block(signals, model, columns, period) for model, columns in zip(models, baselines, strict=True)]
     candidates = [_candidates(model, scale) for model, scale in zip(models, reference.scales, strict=True)]
     return blocks, candidates, [one for model in models for one in axis_dependences(model)]
@@ -137,24 +150,35 @@ def _block(signals: Signals, model: AxisModel, baseline: Array, period: NDArray[
     )
 
 
-def _baseline_names(axes: Sequence[AxisSignals], scales: Sequence[Scale]) -> list[tuple[str, str]]:
+def _lag_at(sample_time: float) -> str:
+    """Parameter of the baseline: of a motion behind its effort at a rate of no record to fit, beyond that at theirs."""
+    return f"{LAG}_{1 / sample_time:.4g}_Hz"
+
+
+def _baseline_names(axes: Sequence[AxisSignals], reference: Reference) -> list[tuple[str, str]]:
     """Name and unit of every parameter of all axes, each axis' own ones behind each other."""
     named = []
-    for axis, scale in zip(axes, scales, strict=True):
+    for axis, scale in zip(axes, reference.scales, strict=True):
         inertia = PARAMETER_UNITS[axis.kind]["M"]
         named += [(axis.named(name), PARAMETER_UNITS[axis.kind][name]) for name in PARAMETERS]
         named += [(f"M_{axis.name}_{other.name}", inertia) for other in axes if other is not axis]
+        named += [(axis.named(HOLD), "samples^2")]
+        named += [(axis.named(_lag_at(time)), "samples") for time in reference.strange]
         named += [(axis.named(LAG), "samples")] if scale.hold is not None else []
     return named
 
 
-def _baselines(models: Sequence[AxisModel], signals: Signals, scales: Sequence[Scale]) -> list[Array]:
+def _baselines(models: Sequence[AxisModel], signals: Signals, reference: Reference) -> list[Array]:
     """Columns (N, p) of the baseline in the rows of each axis, unfiltered, zero where they are not its own."""
     own = [own_columns(signals.motions, index) for index in range(len(models))]
-    for index, (model, scale) in enumerate(zip(models, scales, strict=True)):
-        if scale.hold is not None:
-            change = model.sample_time * differentiate(model.effort, model.sample_time, SEVEN)
-            own[index] = np.column_stack([own[index], change])
+    for index, (model, scale) in enumerate(zip(models, reference.scales, strict=True)):
+        dt = model.sample_time
+        change = dt * differentiate(model.effort, dt, SEVEN)
+        force = model.inertia * model.motion.acceleration
+        sampled = [dt**2 * differentiate(differentiate(force, dt, SEVEN), dt, SEVEN)]
+        sampled += [change if nominal(dt) == time else np.zeros_like(change) for time in reference.strange]
+        sampled += [change] if scale.hold is not None else []
+        own[index] = np.column_stack([own[index], *sampled])
     return [
         np.hstack([columns if place == index else np.zeros_like(columns) for place, columns in enumerate(own)])
         for index in range(len(own))

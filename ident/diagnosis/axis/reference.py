@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.axis.motion import (
     FEWEST_ROWS,
-    LARGEST_ROWS_CUTOFF,
     LEAST_BAND,
     ROWS_CUTOFF,
     AxisMotion,
@@ -54,8 +53,8 @@ class Scale:
         reach: range of its position [m or rad].
         hold: sample intervals by which its motion follows its effort as recorded, if sampling can be why: an effort
             that is held over the interval acts half of one late. None: longer, and a cause of its own.
-        holds: the same of records that confirm at another rate, by sample time [s]: a position may be read at another
-            part of those intervals.
+        holds: by how many their motion follows in records that confirm at another rate, by nominal sample time [s]: a
+            position may be read at another part of those intervals.
         lag: the same as a time, a first estimate [s].
         noise: power density of what the first estimate leaves of the rows, one-sided [N² or (Nm)², per Hz].
     """
@@ -70,8 +69,16 @@ class Scale:
     holds: Mapping[float, float] = field(default_factory=dict)
 
     def hold_at(self, sample_time: float) -> float | None:
-        """The hold of records of a sample time [s], in such intervals."""
-        return None if self.hold is None else self.holds.get(sample_time, self.hold)
+        """The hold of records of a sample time [s], in such intervals.
+
+        Where the motion is later than sampling can explain, that is left to a cause, and what differs at another rate
+        is sampling, if it can be.
+        """
+        own = self.holds.get(nominal(sample_time))
+        if self.hold is not None or own is None:
+            return self.hold if own is None else own
+        beyond = own - self.lag / sample_time
+        return beyond if abs(beyond) <= LARGEST_HOLD else None
 
 
 @dataclass(frozen=True)
@@ -82,11 +89,13 @@ class Reference:
         cutoff: of the position filter [rad/s].
         bandwidth: of the filter that all columns and the effort pass [rad/s].
         scales: of every axis.
+        strange: nominal sample times of records that confirm, of which none of the fit is [s].
     """
 
     cutoff: float
     bandwidth: float
     scales: tuple[Scale, ...]
+    strange: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -175,17 +184,17 @@ def axis_reference(
     everyone = [*records, *others]
     chosen = cutoff or min(largest_cutoff(everyone), *(position_cutoff(record, LEAST_BAND) for record in records))
     signals = [axis_signals(record, chosen, ROWS_CUTOFF * chosen) for record in records]
-    known = {record.sample_time for record in records}
-    strange = [record for record in others if record.sample_time not in known]
+    known = {nominal(record.sample_time) for record in records}
+    strange = [record for record in others if nominal(record.sample_time) not in known]
     apart = [axis_signals(record, chosen, ROWS_CUTOFF * chosen) for record in strange]
     alike = [_scale(signals, index) for index in range(len(records[0].axes))]
     scales = tuple(replace(scale, holds=_holds(apart, index, scale.values)) for index, scale in enumerate(alike))
     limits = [
-        noise_limit(axis, scale.values[0], scale.noise, chosen, repeat_duration(record), record.sample_time)
-        for record in records
+        noise_limit(record, axis, scale.values[0], scale.noise, chosen)
+        for record in everyone
         for axis, scale in zip(record.axes, scales, strict=True)
     ]
-    limit = min([*limits, *(LARGEST_ROWS_CUTOFF / record.sample_time for record in others)])
+    limit = min(limits)
     bandwidth = max(
         effort_bandwidth(
             one.smoothed_columns(index) @ scale.values, repeat_duration(one.record), limit, one.record.sample_time
@@ -193,7 +202,17 @@ def axis_reference(
         for one in signals
         for index, scale in enumerate(scales)
     )
-    return Reference(max(chosen, min(bandwidth / ROWS_CUTOFF, largest_cutoff(everyone))), bandwidth, scales)
+    return Reference(
+        max(chosen, min(bandwidth / ROWS_CUTOFF, largest_cutoff(everyone))),
+        bandwidth,
+        scales,
+        tuple(sorted({nominal(record.sample_time) for record in strange})),
+    )
+
+
+def nominal(sample_time: float) -> float:
+    """A sample time [s] to a thousandth: that of two clocks of one rate."""
+    return float(f"{sample_time:.4g}")
 
 
 def largest_cutoff(records: Sequence[AxisRecord]) -> float:
@@ -277,7 +296,8 @@ def _holds(signals: Sequence[Signals], index: int, values: Array) -> dict[float,
         left, right = one.equations(index)
         bend = _lagging(one, index, values)[moving]
         added = np.array([bend @ (right - left @ values), bend @ bend])
-        sums[one.record.sample_time] = sums.get(one.record.sample_time, np.zeros(2)) + added
+        time = nominal(one.record.sample_time)
+        sums[time] = sums.get(time, np.zeros(2)) + added
     return {time: float(product / power) for time, (product, power) in sums.items() if power > 0}
 
 

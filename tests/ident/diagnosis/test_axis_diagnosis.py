@@ -43,6 +43,7 @@ def test_a_machine_that_is_the_model_lacks_nothing(machine: Make) -> None:
     assert findings.verdict is Verdict.NONE
     found = dict(zip(findings.problem.names, findings.after.baseline.tolist(), strict=True))
     assert found.pop("lag") == pytest.approx(0.0, abs=0.05)
+    assert found.pop("hold") == pytest.approx(-1 / 24, abs=1 / 12)
     assert found == pytest.approx({"M": 20.0, "Fv": 60.0, "Fc": 8.0, "offset": -1.0}, rel=0.01)
 
 

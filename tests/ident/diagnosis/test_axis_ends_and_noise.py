@@ -16,6 +16,7 @@ from ident.diagnosis.axis.diagnose import diagnose_axis, pose_axis
 from ident.diagnosis.axis.reference import axis_reference
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.problem import Problem
+from ident.errors import EstimationError
 
 Make = Callable[..., Any]
 
@@ -41,11 +42,32 @@ def test_the_noise_of_a_position_is_no_law_of_the_acceleration(coarse: Machine, 
     assert diagnose_axis([coarse.drive(seed)], [coarse.drive(seed + 1)], seed=1).verdict is Verdict.NONE
 
 
-def test_rows_end_where_the_noise_of_the_acceleration_has_a_tenth_of_the_power_of_the_effort_s(coarse: Machine) -> None:
-    """Or not much beyond: what the effort's noise is taken from holds some of that of the acceleration."""
+def test_rows_end_where_the_noise_of_the_acceleration_could_be_taken_for_an_effect(coarse: Machine) -> None:
+    """ln(1 + N/E) of all frequencies of the record is 3: with N / E = (f / f₀)⁴, f⁵ = 15 f₀⁴ / T where N is small.
+
+    Or somewhat beyond: what the effort's noise is taken from holds some of that of the acceleration.
+    """
     *_, bandwidth = _problems(coarse, 71)
-    wanted = (0.1 * coarse.noise**2 / (coarse.mass * coarse.encoder) ** 2) ** 0.25
+    as_much = math.sqrt(coarse.noise / (coarse.mass * coarse.encoder)) / (2 * math.pi)
+    wanted = 2 * math.pi * (15 * as_much**4 / (coarse.duration * coarse.repeats)) ** 0.2
     assert 0.95 * wanted < bandwidth < 1.5 * wanted
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+def test_rows_end_there_for_the_record_that_confirms_too(coarse: Machine, mixed: bool) -> None:
+    """A quarter of its rate: the noise of a position has four times the power per hertz."""
+    fit = coarse.drive(71)
+    slow = replace(coarse, rate=coarse.rate / 4, substeps=4 * coarse.substeps).drive(72)
+    bandwidth = axis_reference([fit], None, [slow] if mixed else [coarse.drive(72)]).bandwidth
+    alone = axis_reference([fit], None, []).bandwidth
+    assert (bandwidth < 0.85 * alone) is mixed
+
+
+def test_a_record_of_which_noise_leaves_nothing_is_refused_with_the_reason(machine: Make) -> None:
+    """Two seconds of a heavy carriage whose scale reads to 3 μm: up to 7 Hz, 42 rows."""
+    coarse = machine(mass=20.0, noise=0.07, encoder=2.7e-6, repeats=1, strokes=2, duration=2.0)
+    with pytest.raises(EstimationError, match=r"(?s)above 7 Hz.*2\.7e-06 m of noise.*Record longer, or measure"):
+        diagnose_axis([coarse.drive(5)], [], seed=1)
 
 
 @pytest.mark.parametrize("seed", [9023, 9035, 9055])
