@@ -94,18 +94,28 @@ def diagnose_exam(
     """
     forbid_emulator()
     exam = read_exam(folder)
-    there = [identifier for identifier in exam.identifiers if folder.complete(identifier)]
+    there = with_records(folder, exam.identifiers)
     if removed is not None and exam.sealed:
         refuse_undiagnosed(folder, there)
-    if not there:
-        raise UserError(
-            f"{folder.path} holds no records yet.", "Seal first: quasiomni exam seal goes on where it stopped."
-        )
     asked = [identifier for identifier in there if removed is None or identifier in removed]
     task = _axis_task(folder, removed or {}) if exam.of_axes else _vehicle_task(folder, removed or {})
     function = diagnose_axis_case if exam.of_axes else diagnose_case
     places = {identifier: folder.diagnosis(identifier, removed is not None) for identifier in asked}
     keep_answers(function, task, places, jobs=jobs, scheduler=scheduler, progress=progress)
+
+
+def with_records(folder: ExamFolder, identifiers: Sequence[str]) -> list[str]:
+    """The cases whose records are there.
+
+    Raises:
+        UserError: there are none.
+    """
+    there = [identifier for identifier in identifiers if folder.complete(identifier)]
+    if not there:
+        raise UserError(
+            f"{folder.path} holds no records yet.", "Seal first: quasiomni exam seal goes on where it stopped."
+        )
+    return there
 
 
 def keep_answers(

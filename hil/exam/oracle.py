@@ -22,6 +22,7 @@ from hil.exam.diagnosing import (
     keep_answers,
     refuse_undiagnosed,
     vehicle_records,
+    with_records,
 )
 from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.statistics import Rate, rate
@@ -58,18 +59,19 @@ def ask_oracle(
         progress: called with cases done and in all.
 
     Raises:
-        UserError: there is no exam, or cases of a sealed one have not been diagnosed yet.
+        UserError: there is no exam, it has no records yet, or cases of a sealed one have not been diagnosed.
     """
     forbid_emulator()
     exam = read_exam(folder)
+    there = with_records(folder, exam.identifiers)
     if exam.sealed:
-        refuse_undiagnosed(folder, [one for one in exam.identifiers if folder.complete(one)])
+        refuse_undiagnosed(folder, there)
     texts = None if exam.of_axes else tuple(path.read_text(encoding="utf-8") for path in (folder.vehicle, folder.model))
 
     def task(identifier: str) -> tuple[object, ...]:
         return identifier, *both_records(folder, identifier), texts, tuple(asked[identifier])
 
-    places = {identifier: folder.oracle(identifier) for identifier in asked if folder.complete(identifier)}
+    places = {identifier: folder.oracle(identifier) for identifier in there if identifier in asked}
     keep_answers(evidence_of_case, task, places, jobs=jobs, scheduler=scheduler, progress=progress)
 
 

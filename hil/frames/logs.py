@@ -32,11 +32,11 @@ def read_log(path: Path, accept_truncated: bool = False) -> FrameTable:
     Raises:
         RecordError: the file is missing, too large, empty, of no known format, damaged, or truncated.
     """
+    refuse_unreadable(path, LARGEST_RECORD, RecordError)
     try:
         log_format = LogFormat(path.suffix.lower())
     except ValueError as error:
         raise RecordError(f"{path} is no log of a known format.", f"Use one of {', '.join(LogFormat)}.") from error
-    refuse_unreadable(path, LARGEST_RECORD, RecordError)
     try:
         table, cut = _READERS[log_format](path)
     except PARSER_ERRORS as error:

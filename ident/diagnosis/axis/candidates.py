@@ -142,16 +142,18 @@ def _elasticity(axis: AxisModel) -> Candidate:
     """A load on a spring: u = M q'' + ... + c M ω²/(1 - (ω/ω_a)²) M q''; far below ω_a, only c is seen."""
     force, slowest = axis.inertia * axis.motion.acceleration, RESONANCES[0] * axis.bandwidth
 
+    def within(resonance: float) -> float:
+        return float(np.clip(abs(resonance), slowest, RESONANCES[-1] * axis.bandwidth))
+
     def series(resonance: float, damping: float = DAMPING) -> Array:
-        within = np.clip(abs(resonance), slowest, RESONANCES[-1] * axis.bandwidth)
-        return axis.inertia * sprung(force, float(within), axis.sample_time, max(abs(damping), LEAST_DAMPING))
+        return axis.inertia * sprung(force, within(resonance), axis.sample_time, max(abs(damping), LEAST_DAMPING))
 
     def heavier(baseline: Array) -> float:
         return float((baseline[axis.first] / axis.inertia) ** 2)
 
     def expected(values: Array) -> Array:
         """Of all inertia, what is behind the spring is c M ω_a², anything between nothing and all."""
-        share = max(values[0], 0.0) * abs(axis.inertia) * values[1] ** 2
+        share = max(values[0], 0.0) * abs(axis.inertia) * within(values[1]) ** 2
         damping = math.log(max(abs(values[2]), LEAST_DAMPING) / USUAL_DAMPING)
         return np.array([(share - 0.5) / SHARE, damping / DAMPINGS])
 

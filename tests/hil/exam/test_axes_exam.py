@@ -98,6 +98,12 @@ def test_it_is_sealed_diagnosed_and_scored(tmp_path: Path) -> None:
     score = json.loads((tmp_path / "exam" / "score.json").read_text())
     assert (score["cases"], score["sealed"], score["missing"]) == (3, True, {})
     assert sum(name.startswith(ORACLE) for name in score["rates"]) == 1
+    for record in (tmp_path / "exam" / "cases").iterdir():
+        record.unlink()
+    for option in ([], ["--oracle", *key]):
+        empty = quasiomni("exam", "diagnose", out, *option)
+        assert empty.returncode == 2
+        assert "holds no records yet" in " ".join(empty.stderr.split())
 
 
 def test_an_oracle_that_knows_the_truth_is_not_asked_without_it(tmp_path: Path) -> None:

@@ -321,8 +321,12 @@ def test_a_file_that_is_no_log_is_refused_with_its_name(tmp_path: Path, content:
 def test_a_missing_file_and_an_unknown_format_are_told_apart(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match="does not exist"):
         read_log(tmp_path / "nowhere.blf")
+    with pytest.raises(RecordError, match="does not exist"):
+        read_log(tmp_path / "a_folder_that_is_not_there")
+    there = tmp_path / "somewhere.xyz"
+    there.write_text("no frames")
     with pytest.raises(RecordError, match="no log of a known format"):
-        read_log(tmp_path / "nowhere.xyz")
+        read_log(there)
 
 
 def without(source: Path, target: Path, drop) -> Path:
