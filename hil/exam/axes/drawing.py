@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from hil.exam.axes.effects import LAWS, MISSING, NAMED, PLACE
+from hil.exam.axes.effects import LAWS, MISSING, NAMED, PLACE, machine_with
 from hil.exam.axes.sizes import ruler_of
 from hil.exam.cases import SIZES, Case, Injected, Kind
 from hil.exam.drawing import LAW_SIZES, Composition, identifiers_of
@@ -146,4 +146,6 @@ def _sized(question: Question, seed: int, attempt: int) -> tuple[Injected, ...]:
             if abs(size) > LARGEST * missing.probe(machine):
                 raise UserError(f"{name} of {size:g} is none that one meets.", "Draw another machine.")
         effects.append(Injected(name, PLACE, MISSING[name].parameter, size, values))
+    if not ruler.follows(machine_with(machine, tuple(effects))):
+        raise UserError(f"A machine with {' and '.join(question.names)} runs away.", "Draw another machine.")
     return tuple(effects)

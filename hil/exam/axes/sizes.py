@@ -31,6 +31,9 @@ TRIES: Final = 6
 NEAR: Final = 0.02
 """Of that number, at which a size is taken."""
 
+RUNAWAY: Final = 2.0
+"""Travel over that of the plain machine, beyond which a machine does not do what it is told."""
+
 
 class Ruler:
     """Noise units on one machine in one motion.
@@ -47,7 +50,9 @@ class Ruler:
         self._quiet, self._seed = replace(machine, noise=0.0, encoder=0.0), seed
         record = machine.drive(seed)
         self._bandwidth = axis_problem([record], axis_reference([record], None, [])).blocks[0].bandwidth
-        self._plain = self._left(self._quiet.drive(seed))
+        plain = self._quiet.drive(seed)
+        self._travel = float(np.ptp(plain.axes[0].position))
+        self._plain = self._left(plain)
         noise = np.random.default_rng(seed).normal(size=len(record)) * machine.noise
         self._noise = rms(self._filtered(noise)[self._plain.moving])
 
@@ -59,6 +64,11 @@ class Ruler:
         gap = (left.force - self._plain.force)[kept]
         beside = gap - self._plain.columns[kept] @ least_squares(self._plain.columns[kept], gap)
         return rms(np.asarray(beside)) / self._noise if np.isfinite(beside).all() else math.inf
+
+    def follows(self, machine: Machine) -> bool:
+        """Whether a machine, with what it lacks, goes where it is told: a loop may be stable with each of two alone."""
+        position = replace(machine, noise=0.0, encoder=0.0).drive(self._seed).axes[0].position
+        return bool(np.isfinite(position).all() and np.ptp(position) < RUNAWAY * self._travel)
 
     def size(self, name: str, units: float, values: Mapping[str, float]) -> float:
         """Size that is so many noise units.

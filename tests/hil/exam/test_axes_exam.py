@@ -8,6 +8,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hil.exam.axes.drawing import Question, draw_axis_cases, machine_of, sized_case
@@ -42,6 +43,15 @@ def test_what_is_as_large_as_one_meets_it_shows_above_the_noise(name: str) -> No
     machine, _ = machine_of(case.seed, case.excitation)
     (effect,) = case.effects
     assert Ruler(machine, case.seed).units(name, effect.size, effect.values) >= 1.0
+
+
+@pytest.mark.parametrize("seed", range(SEED, SEED + 6))
+def test_a_machine_with_two_things_amiss_still_goes_where_it_is_told(seed: int) -> None:
+    """A late drive and a soft spring make some loops unstable that are stable with either."""
+    case = sized_case(Question(Kind.PAIR, ("time_delay", "elasticity"), 1.0, (1.0, 1.0)), "case", seed)
+    machine, _ = machine_of(case.seed, case.excitation)
+    position = machine_with(machine, case.effects).drive(case.seed).axes[0].position
+    assert np.ptp(position) < 2 * np.ptp(machine.drive(case.seed).axes[0].position)
 
 
 def test_everything_follows_from_the_seed() -> None:
