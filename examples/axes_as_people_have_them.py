@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import enum
+import itertools
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -39,6 +40,10 @@ NAMES = {
     Lacking.SECOND_MASS: {LAW, "elasticity"},
 }
 """What may rightly be said of a machine, beside `unknown`."""
+
+
+FARTHEST = 100.0
+"""Beyond which a machine runs away [m]."""
 
 
 class Trouble(enum.StrEnum):
@@ -68,11 +73,25 @@ class Outcome:
     wrong: tuple[str, ...] = ()
 
 
-def drawn(seed: int) -> tuple[Trouble, DrawnAxis, Sequence[AxisRecord], Sequence[AxisRecord]]:
-    """Trouble, machine, records to fit and to confirm."""
-    generator = np.random.default_rng([seed, 7])
+Drawn = tuple[Trouble, DrawnAxis, Sequence[AxisRecord], Sequence[AxisRecord]]
+
+
+def drawn(seed: int) -> Drawn:
+    """Trouble, machine, records to fit and to confirm; of machines that run away at a rate, the next one."""
+    machines = (_drawn(seed, attempt) for attempt in itertools.count())
+    return next(found for found in machines if all(_follows(record) for record in (*found[2], *found[3])))
+
+
+def _follows(record: AxisRecord) -> bool:
+    """Whether an axis goes where it is told, within metres."""
+    return bool(np.abs(record.axes[0].position).max() < FARTHEST)
+
+
+def _drawn(seed: int, attempt: int) -> Drawn:
+    generator = np.random.default_rng([seed, 7, attempt] if attempt else [seed, 7])
     trouble = list(Trouble)[seed % len(Trouble)]
-    axis = draw_axis(seed, Lacking.NOTHING if generator.random() < 0.5 else None)
+    number = seed if not attempt else int(generator.integers(2**31))
+    axis = draw_axis(number, Lacking.NOTHING if generator.random() < 0.5 else None)
     machine = axis.machine
     if trouble is Trouble.SLOW:
         speeds = tuple(0.1 * speed for speed in machine.speeds)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -110,26 +111,62 @@ def directions(white: White, layout: Sequence[Column], rows: Mask | None = None)
     base = orthonormal(white.baseline[chosen])
     target, columns = white.target[chosen], white.columns[chosen]
     residual = target - base @ (base.T @ target)
-    left = columns - base @ (base.T @ columns)
+    left = np.asfortranarray(columns - base @ (base.T @ columns))
     full = np.linalg.norm(white.columns, axis=0)
-    parts, places, volumes, end = [np.zeros((len(target), 0))], [], [], 0
-    bounds: list[tuple[float, ...]] = []
-    bounded: list[Bounded] = []
-    for column in layout:
-        scale = np.where(full[column.place] > 0, full[column.place], 1.0)
-        vectors, singular, turn = np.linalg.svd(left[:, column.place] / scale, full_matrices=False)
-        count = int(np.sum(singular > VISIBLE))
-        single = count == 1 and vectors.shape[1] == 1
-        length = float(vectors[:, 0] @ left[:, column.place.start]) if single else 1.0
-        parts.append(vectors[:, :count] * np.sign(length))
-        least = column.least if single else -math.inf
-        bounds += [(least * abs(length), *(size * abs(length) for size in column.negligible))] * count
-        places.append(slice(end, end + count))
-        if count and not single and math.isfinite(column.least):
-            coefficients = (turn[:count].T / singular[:count]) / scale[:, None]
-            bounded.append(Bounded(len(places) - 1, places[-1], coefficients, column.least))
-        volumes.append(2 * float(np.sum(np.log(np.maximum(singular, VISIBLE)))))
-        end += count
+    scale = np.where(full > 0, full, 1.0)
+    length = np.linalg.norm(left, axis=0)
+    found = [
+        _alone(left, scale, length, column) if column.width == 1 else _together(left, scale, column)
+        for column in layout
+    ]
+    ends = np.cumsum([0, *(one.count for one in found)]).tolist()
+    places = tuple(slice(start, stop) for start, stop in itertools.pairwise(ends))
+    basis = np.empty((len(target), ends[-1]), order="F")
+    for one, place in zip(found, places, strict=True):
+        basis[:, place] = one.vectors
+    bounds = [one.bounds for one in found for _ in range(one.count)]
     limits = np.array(bounds).reshape(-1, 3)
-    low, small = limits[:, 0], limits[:, 1:]
-    return Directions(np.hstack(parts), tuple(places), low, small, residual, np.array(volumes), tuple(bounded))
+    bounded = tuple(
+        Bounded(number, place, one.turn, column.least)
+        for number, (one, place, column) in enumerate(zip(found, places, layout, strict=True))
+        if one.turn is not None
+    )
+    volumes = np.array([one.volume for one in found])
+    return Directions(basis, places, limits[:, 0], limits[:, 1:], residual, volumes, bounded)
+
+
+@dataclass(frozen=True)
+class _Added:
+    """What one variant adds: directions (n, count), limits of their amplitudes, log determinant, bounded ones' turn."""
+
+    vectors: Array
+    bounds: tuple[float, float, float]
+    volume: float
+    turn: Array | None = None
+
+    @property
+    def count(self) -> int:
+        return int(self.vectors.shape[1])
+
+
+def _alone(left: Array, scale: Array, length: Array, column: Column) -> _Added:
+    """Of a single column, which needs no decomposition."""
+    place = column.place
+    whole = float(length[place.start])
+    relative = whole / float(scale[place.start])
+    seen = relative > VISIBLE
+    vectors = left[:, place] / whole if seen else left[:, :0]
+    low, high = column.negligible
+    bounds = (column.least * whole, low * whole, high * whole)
+    return _Added(vectors, bounds, 2 * math.log(max(relative, VISIBLE)))
+
+
+def _together(left: Array, scale: Array, column: Column) -> _Added:
+    """Of several columns."""
+    unit = scale[column.place]
+    vectors, singular, turn = np.linalg.svd(left[:, column.place] / unit, full_matrices=False)
+    count = int(np.sum(singular > VISIBLE))
+    volume = 2 * float(np.sum(np.log(np.maximum(singular, VISIBLE))))
+    bound = count > 0 and math.isfinite(column.least)
+    coefficients = (turn[:count].T / singular[:count]) / unit[:, None] if bound else None
+    return _Added(vectors[:, :count], (-math.inf, *column.negligible), volume, coefficients)

@@ -72,12 +72,11 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
     amplitudes = found.basis.T @ found.residual
     sizes = found.sizes
     ratios = found.ratios(amplitudes)
-    own = 0.5 * np.array([_own(white, column, found, amplitudes, v) for v, column in enumerate(layout)])
+    own = 0.5 * _own(white, layout, found, amplitudes)
     competing = (ratios > 0) & ~excluded
     best = int(np.argmax(np.where(competing, ratios, -1.0)))
     surrogates = signs @ _sums(found.basis * _without(found, amplitudes, best)[:, None], white.stretch)
-    scale = np.array([scatter(found.basis[:, place], found.residual, white.stretch) for place in found.places])
-    scale = _shared(found, amplitudes, best, scale)
+    scale = _shared(found, amplitudes, best, _scatters(found, amplitudes, white.stretch))
     spread = np.maximum(found.ratios(surrogates).mean(axis=0) / np.maximum(sizes, 1), 1.0)
     beside = np.minimum([column.beside for column in layout], np.maximum(sizes - 1, 0))
     price = 0.5 * sizes * math.log(len(white.target))
@@ -92,7 +91,7 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
         scale=scale,
         log_evidence=np.where(competing, 0.5 * ratios / scale - price, -np.inf),
         log_predictive=_in_turn(white, layout, found, amplitudes, scale),
-        confirming=np.array([_confirming(white, column, found, amplitudes, v) for v, column in enumerate(layout)]),
+        confirming=_confirming(white, layout, found, amplitudes),
         significance=significance(tested.max(initial=-np.inf), by_chance.max(axis=1, initial=-np.inf)),
     )
 
@@ -120,6 +119,20 @@ def scatter(basis: Array, residual: Array, stretch: NDArray[np.int64]) -> float:
         return 1.0
     sums = _sums(basis * (residual - basis @ (basis.T @ residual))[:, None], stretch)
     return float(max(1.0, np.sum(sums**2) / basis.shape[1]))
+
+
+def _scatters(found: Directions, amplitudes: Array, stretch: NDArray[np.int64]) -> Array:
+    """Of the directions of every variant (V,); those of one direction at once."""
+    sizes = found.sizes
+    alone = np.flatnonzero(sizes == 1)
+    places = [found.places[variant].start for variant in alone.tolist()]
+    basis = found.basis[:, places]
+    sums = _sums(basis * (found.residual[:, None] - basis * amplitudes[places]), stretch)
+    scale = np.ones(len(found.places))
+    scale[alone] = np.maximum(1.0, np.sum(sums**2, axis=0))
+    for variant in np.flatnonzero(sizes > 1).tolist():
+        scale[variant] = scatter(found.basis[:, found.places[variant]], found.residual, stretch)
+    return scale
 
 
 def significance(found: float, by_chance: Array) -> float:
@@ -164,23 +177,33 @@ def _in_turn(white: White, layout: Sequence[Column], found: Directions, amplitud
     return np.asarray(0.5 * gained / scale - 0.5 * (found.volume - fitted.volume))
 
 
-def _confirming(white: White, column: Column, found: Directions, amplitudes: Array, variant: int) -> float:
-    place, whole = found.places[variant], white.columns[:, column.place]
-    if place.stop == place.start:
-        return 0.0
-    coefficients = np.linalg.lstsq(found.basis[:, place].T @ whole, amplitudes[place], rcond=None)[0]
-    power = (whole @ coefficients) ** 2
-    return float(power[white.confirming].sum() / max(power.sum(), np.finfo(float).tiny))
+def _confirming(white: White, layout: Sequence[Column], found: Directions, amplitudes: Array) -> Array:
+    """Share (V,) of the confirming rows in the power of what every variant adds, as it was fitted."""
+    squares = white.columns**2
+    part, whole = squares[white.confirming].sum(axis=0), squares.sum(axis=0)
+    shares = part / np.maximum(whole, np.finfo(float).tiny)
+    share = np.zeros(len(layout))
+    for variant, (column, place) in enumerate(zip(layout, found.places, strict=True)):
+        if column.width == 1 and place.stop > place.start:
+            share[variant] = shares[column.place.start]
+        elif place.stop > place.start:
+            columns = white.columns[:, column.place]
+            coefficients = np.linalg.lstsq(found.basis[:, place].T @ columns, amplitudes[place], rcond=None)[0]
+            power = (columns @ coefficients) ** 2
+            share[variant] = power[white.confirming].sum() / max(power.sum(), np.finfo(float).tiny)
+    return share
 
 
-def _own(white: White, column: Column, found: Directions, amplitudes: Array, variant: int) -> float:
-    """What a variant has of its ratio beside what comes along with the effect."""
-    amplitude = amplitudes[found.places[variant]]
-    if column.beside and column.itself and amplitude.size:
-        along = white.columns[:, column.own.stop : column.place.stop]
-        base = orthonormal(found.basis[:, found.places[variant]].T @ along)
-        amplitude = amplitude - base @ (base.T @ amplitude)
-    return float(amplitude @ amplitude)
+def _own(white: White, layout: Sequence[Column], found: Directions, amplitudes: Array) -> Array:
+    """What every variant (V,) has of its ratio beside what comes along with the effect."""
+    own = found.lengths(amplitudes)
+    for variant, (column, place) in enumerate(zip(layout, found.places, strict=True)):
+        if column.beside and column.itself and place.stop > place.start:
+            along = white.columns[:, column.own.stop : column.place.stop]
+            base = orthonormal(found.basis[:, place].T @ along)
+            amplitude = amplitudes[place] - base @ (base.T @ amplitudes[place])
+            own[variant] = amplitude @ amplitude
+    return own
 
 
 def cosines(evidence: Evidence, index: int) -> Array:

@@ -103,7 +103,7 @@ def noise_limit(record: AxisRecord, axis: AxisSignals, inertia: float, left: flo
     gained = np.cumsum(np.log1p(noise / max(min(effort, left), np.finfo(float).tiny)))
     highest = 2 * math.pi * float(frequency[np.searchsorted(gained[:-1], GAINED)])
     limit = min(highest, cutoff, LARGEST_ROWS_CUTOFF / dt)
-    if limit < 2 * math.pi * ROWS_CUTOFF * LEAST_BAND / duration:
+    if ROWS_PER_CUTOFF * limit * duration < 2 * math.pi * FEWEST_ROWS:
         raise EstimationError(
             f"{record.source}: above {limit / (2 * math.pi):.3g} Hz the acceleration of {axis.label}, differences of a "
             f"position with {math.sqrt(position / (2 * dt)):.2g} {axis.kind.position_unit} of noise, is less sure than "

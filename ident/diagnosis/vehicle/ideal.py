@@ -26,7 +26,6 @@ from ident.vehicle.quantities import GRAVITY
 Array = NDArray[np.float64]
 
 SAMPLE_TIME: Final = 0.004
-PERIODS: Final = 2
 TURN_TIME: Final = 6.0
 """Of half a turn on the spot [s]."""
 INCLINED: Final = 0.0175
@@ -127,15 +126,14 @@ def ideal_record(drives: Sequence[Drive], vehicle: VehicleDescription, seed: int
 def _segment(drive: Drive, vehicle: VehicleDescription, generator: np.random.Generator) -> Segment:
     spec = drive.spec
     series = _series(spec, generator)
-    per_period = round(spec.period / SAMPLE_TIME)
-    time = np.linspace(0.0, PERIODS * spec.period, PERIODS * per_period, endpoint=False)
+    time = np.linspace(0.0, spec.period, round(spec.period / SAMPLE_TIME), endpoint=False)
     motion = series.evaluate(time)
     alpha, beta, torques = (
         _lifted(motion, vehicle) if spec.mode is None else _on_the_floor(spec, spec.mode, motion, vehicle, drive)
     )
     if drive.dither:
         torques = torques + dither_torques(time, spec.period, vehicle)
-    period = np.repeat(np.arange(PERIODS), per_period)
+    period = np.zeros(len(time), dtype=np.int64)
     extra = {PAYLOAD: np.full(len(time), drive.payload)} if drive.payload else {}
     return make_segment(Segment(drive.name, 0.0, time, torques, beta, alpha, period, extra=extra), "ideal")
 
