@@ -194,11 +194,14 @@ class Answer:
         """No confident single name."""
         return all(len(_set(effect)) > 1 or effect["probability"] < CONFIDENT for effect in self.said.effects)
 
-    @property
-    def near(self) -> bool:
-        """All that is named is at the joint of the case, and closes all but what a cosine of ALIKE leaves."""
+    def near(self, closed: float = 1.0) -> bool:
+        """All that is named is at the joint of the case, and closes all but what a cosine of ALIKE leaves.
+
+        Args:
+            closed: what the true cause closes of the same gap, as noise has it.
+        """
         there = [_corner(str(effect["where"])) == _corner(self.single.where) for effect in self.said.effects]
-        return bool(there) and all(there) and self.said.closed >= ALIKE**2
+        return bool(there) and all(there) and self.said.closed >= ALIKE**2 * min(closed, 1.0)
 
     @property
     def fault_named(self) -> bool:

@@ -49,7 +49,9 @@ SECONDS: Final = "processor time of a diagnosis, mean [s]"
 SECONDS_MOST: Final = "- longest [s]"
 WITHOUT_OPEN: Final = "true candidate removed: `unknown` or a set"
 WITHOUT_OPEN_LARGE: Final = "- `unknown` or a set at size 0.5 and above"
-WITHOUT_NEAR: Final = "- `unknown`, a set, or names there that close as much (cosine 0.98), size 0.5 and above"
+WITHOUT_NEAR: Final = (
+    "- `unknown`, a set, or names there that close as much as the true one (cosine 0.98), size 0.5 and above"
+)
 WITHOUT_FAR: Final = "- a confident name that closes less, size 0.5 and above"
 WITHOUT_MODEST: Final = "- no confident wrong name"
 WITHOUT_MODEST_ALL: Final = "- no confident wrong name, cases with an identical candidate left included"

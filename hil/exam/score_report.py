@@ -95,7 +95,7 @@ def score_exams(folders: Sequence[ExamFolder], generator: np.random.Generator, k
         score=score(answers, missing),
         permuted=score(permuted(answers, generator)).rates[RIGHT],
         chance=chance(answers),
-        without=removal_rates(without) if without else {},
+        without=removal_rates(without, answers) if without else {},
         oracle=_summed([one.oracle for one in opened]),
         worlds=worlds,
         first_seeds=tuple(one.first_seed for one in opened if one.first_seed is not None),

@@ -105,14 +105,25 @@ def score(answers: Sequence[Answer], missing: Mapping[str, int] | None = None) -
     )
 
 
-def removal_rates(answers: Sequence[Answer]) -> dict[str, Rate]:
-    """What is said of cases whose true candidate is not in the library."""
+def removal_rates(answers: Sequence[Answer], whole: Sequence[Answer] = ()) -> dict[str, Rate]:
+    """What is said of cases whose true candidate is not in the library.
+
+    Args:
+        answers: without the true candidate.
+        whole: with all of them. Of a small gap noise is a part, and the true cause does not close all of it: where it
+            was found, a name in its place is asked for as much.
+    """
     alone = [answer for answer in answers if answer.splits_name]
+    closed = {a.case.identifier: a.said.closed for a in whole if a.case.kind is Kind.EFFECT and a.right}
+
+    def near(answer: Answer) -> bool:
+        return answer.near(closed.get(answer.case.identifier, 1.0))
+
     return {
         names.WITHOUT_OPEN: rate([answer.open for answer in alone]),
         names.WITHOUT_OPEN_LARGE: rate([answer.open for answer in _large(alone)]),
-        names.WITHOUT_NEAR: rate([answer.open or answer.near for answer in _large(alone)]),
-        names.WITHOUT_FAR: rate([not answer.modest and not answer.near for answer in _large(alone)]),
+        names.WITHOUT_NEAR: rate([answer.open or near(answer) for answer in _large(alone)]),
+        names.WITHOUT_FAR: rate([not answer.modest and not near(answer) for answer in _large(alone)]),
         names.WITHOUT_MODEST: rate([answer.modest for answer in alone]),
         names.WITHOUT_MODEST_ALL: rate([answer.modest for answer in answers]),
         names.WITHOUT_UNKNOWN: rate([answer.rejected for answer in alone]),

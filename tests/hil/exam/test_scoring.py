@@ -261,6 +261,28 @@ def test_small_removed_causes_are_counted_apart() -> None:
     assert (rates[names.WITHOUT_OPEN_LARGE].value, rates[names.WITHOUT_OPEN_LARGE].cases) == (1.0, 1)
 
 
+@pytest.mark.parametrize(
+    ("true_closes", "closes", "there", "near"),
+    [
+        (0.99, 0.97, "drive_fl", True),
+        (0.99, 0.90, "drive_fl", False),
+        (0.75, 0.73, "drive_fl", True),
+        (0.75, 0.60, "drive_fl", False),
+        (0.75, 0.73, "drive_rr", False),
+        (1.3, 0.97, "drive_fl", True),
+    ],
+)
+def test_a_name_in_the_place_of_a_removed_cause_is_near_where_it_closes_as_much_as_that_did(
+    true_closes: float, closes: float, there: str, near: bool
+) -> None:
+    """Of a small gap noise is a part, and not even the true cause closes all of it."""
+    whole = answer(entry("torque_bias"), identity=apart(), closed=true_closes)
+    without = answer(entry("scrub", there), identity=apart(), closed=closes)
+    rates = removal_rates([without], [whole])
+    assert rates[names.WITHOUT_NEAR].value == near
+    assert rates[names.WITHOUT_FAR].value == (not near)
+
+
 def test_unknown_is_the_answer_to_a_removed_cause() -> None:
     rates = removal_rates([answer(identity=apart(), verdict="unknown")])
     assert rates[names.WITHOUT_OPEN].value == 1.0
