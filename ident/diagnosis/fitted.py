@@ -95,6 +95,14 @@ class Fitted:
         """With all effects, as their exact forms."""
         return held_out_gap(self.rows, self.floors, self.untouched, self._extended_models, self.told)
 
+    @cached_property
+    def settled(self) -> Gap:
+        """The same where there are no effects, beside what the fit leaves open of the baseline."""
+        if self.found.variants or self._is_given:
+            return self.exactly
+        models = self._settled(self._held_out_refit(()))
+        return held_out_gap(self.rows, self.floors, self._drifting(models), models, self.told)
+
     def measured(self, floors: Array, labels: Collection[str], told: Told) -> Gap:
         """The same of the means over the repeats, in blocks of some labels, with noise and samples of all as given."""
         return held_out_gap_of_means(self.rows, floors, self.untouched, self._extended_models, labels, told)
@@ -190,6 +198,25 @@ class Fitted:
         if not variants and self._is_given:
             return self.judged()
         return self._held_out_refit(variants, held=held).blocks
+
+    def _settled(self, found: Refit) -> Sequence[Array]:
+        """Models of all blocks, the baseline in confirming ones moved as they ask, within what the fit leaves open.
+
+        A record of one speed does not tell viscous friction from dry one, and says nothing of another speed.
+        """
+        rows, confirming = self.rows, self.rows.confirming
+        powers, turn = np.linalg.eigh(found.covariance)
+        known = powers > np.finfo(float).eps * powers.max(initial=0.0)
+        prior = turn[:, known].T / np.sqrt(powers[known])[:, None]
+        left = rows.target - rows.stack(list(found.blocks))
+        white = self._weights.apply(rows, np.column_stack([rows.baseline @ turn[:, known], left]))[confirming]
+        asked = np.append(white[:, -1], np.zeros(len(prior)))
+        moved = turn[:, known] @ least_squares(np.vstack([white[:, :-1], prior @ turn[:, known]]), asked)
+        first = len(self.problems[0].blocks)
+        return [
+            model + (block.baseline @ moved if index >= first else 0.0)
+            for index, ((block, _), model) in enumerate(zip(rows.blocks, found.blocks, strict=True))
+        ]
 
     def _held_out_refit(self, variants: Sequence[int], *, held: bool = False) -> Refit:
         """With some effects, as their columns, without the confirming rows; several questions need the same one."""

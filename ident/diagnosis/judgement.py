@@ -61,7 +61,7 @@ class Judgement:
             causes=causes,
             doubtful=self._doubtful(),
             events=tuple(self.problems[0].candidates[owner].key for owner in self.found.rest.events),
-            gap=self.fitted.exactly,
+            gap=self.fitted.settled if verdict is Verdict.NONE else self.fitted.exactly,
             where=shares(self.rows, self.fitted.floors, self.fitted.judged()),
             invisible=invisible_names(self.regression),
             before=self.fitted.before,
@@ -185,7 +185,7 @@ class Judgement:
     def _far_off(self) -> bool:
         """Whether the held-out gap is too large to be called noise, whatever can be predicted of it."""
         count = max(int(self.rows.confirming.sum()), 1)
-        return self.fitted.exactly.after > 1 + max(self.limits.far_off, self.limits.scarce / math.sqrt(count))
+        return self.fitted.settled.after > 1 + max(self.limits.far_off, self.limits.scarce / math.sqrt(count))
 
     def _short(self) -> bool:
         """Whether the model with all effects, refitted exactly, is further from the held-out rows than without any.

@@ -54,15 +54,21 @@ class Refit:
     """Everything fitted jointly.
 
     Attributes:
-        baseline, baseline_std: of the model's parameters (p,).
+        baseline: of the model's parameters (p,).
+        covariance: of those (p, p).
         parts: of the effects.
         blocks: model of the target of every block, (N,), all samples.
     """
 
     baseline: Array
-    baseline_std: Array
+    covariance: Array
     parts: tuple[Part, ...]
     blocks: tuple[Array, ...]
+
+    @property
+    def baseline_std(self) -> Array:
+        """Standard deviations (p,) of the model's parameters."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
 
 @dataclass(frozen=True)
@@ -204,8 +210,7 @@ class _Model:
             stated = slice(len(unknown.candidate.parameters))
             total = np.hypot(deviations[stated], _beyond(unknown.candidate, numbers))
             parts.append(Part(unknown.candidate.key, numbers[stated], total, numbers, deviations, tuple(series)))
-        baseline_std = np.sqrt(np.diag(covariance)[: self.size])
-        return Refit(values[: self.size], baseline_std, tuple(parts), tuple(blocks))
+        return Refit(values[: self.size], covariance[: self.size, : self.size], tuple(parts), tuple(blocks))
 
     def _linear(self, variants: Sequence[int]) -> Array:
         design = np.hstack([self.rows.baseline, self.regression.columns_of(variants)])

@@ -105,3 +105,15 @@ def test_a_position_may_be_read_at_another_part_of_the_interval_where_the_rate_i
     findings = diagnose_axis([fast.drive(61)], [slow.drive(62)], seed=1)
     assert findings.verdict is Verdict.NONE
     assert findings.gap.before < 1.05
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_a_record_of_one_speed_says_nothing_of_another_and_that_is_no_gap(machine: Make, seed: int) -> None:
+    """Of viscous and dry friction only the sum is told; the record that confirms splits them."""
+    fit = machine(speeds=(0.1,), repeats=1, duration=8.0)
+    confirm = replace(fit, speeds=(0.05, 0.1, 0.2))
+    plain = diagnose_axis([fit.drive(seed)], [confirm.drive(seed + 1)], seed=1)
+    assert plain.verdict is Verdict.NONE
+    assert plain.gap.before < 1.2
+    lacking = [replace(one, asymmetry=4.0).drive(seed + place) for place, one in enumerate((fit, confirm))]
+    assert diagnose_axis(lacking[:1], lacking[1:], seed=1).verdict is not Verdict.NONE
