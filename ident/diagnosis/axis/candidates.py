@@ -185,7 +185,8 @@ def _backlash(axis: AxisModel) -> Candidate:
         EffectParameter("gap", axis.kind.position_unit, "whole play"),
         EffectParameter("share", "1", "of the effort that lies behind it"),
     )
-    variants = tuple(variant(share * axis.reach) for share in BACKLASH_GAPS)
+    gaps = [gap for share in BACKLASH_GAPS if (gap := share * axis.reach) > axis.nearest]
+    variants = tuple(variant(gap) for gap in gaps or [2 * axis.nearest])
     return Candidate(EffectName.BACKLASH, axis.place, parameters, variants, least=LEAST_SHARE, part=GRID)
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
-from ident.diagnosis.axis.reference import NEAREST
 from ident.diagnosis.delays import HELD, RARER, led
 from ident.diagnosis.law.dependence import path_since_reversal
 from ident.diagnosis.names import EffectName
@@ -34,9 +33,7 @@ def presliding(axis: AxisModel) -> Candidate:
     """Bristles that bend before they slide (Dahl 1968): beyond the friction in motion, exp(-s/d) over the path s."""
     direction = np.sign(axis.motion.velocity)
     path = path_since_reversal(axis.motion.position, axis.motion.velocity)
-    used = path[axis.motion.moving]
-    # What is over before the rows begin, none of them can bound.
-    shortest = max(PATHS[0] * axis.reach, float(np.quantile(used, NEAREST)) if used.size else 0.0)
+    shortest = max(PATHS[0] * axis.reach, axis.nearest)
 
     def series(distance: float) -> Array:
         within = np.clip(abs(distance), shortest, PATHS[-1] * axis.reach * WIDER)

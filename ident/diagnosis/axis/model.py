@@ -59,6 +59,7 @@ class AxisModel:
         absorbed: (N,) the same, of the columns of the baseline itself.
         speed: of which the axis is seldom faster [m/s or rad/s].
         slowest: than which it is seldom slower in a row [m/s or rad/s].
+        nearest: path since a reversal within which few rows are [m or rad].
         reach: range of its position [m or rad].
         others: name and motion of the other axes.
     """
@@ -78,6 +79,7 @@ class AxisModel:
     absorbed: Array
     speed: float
     slowest: float
+    nearest: float
     reach: float
     others: tuple[tuple[str, AxisMotion], ...]
 

@@ -127,6 +127,7 @@ def _model(signals: Signals, index: int, scale: Scale, first: int) -> AxisModel:
         absorbed=np.asarray(own_columns(signals.motions, index) @ scale.values),
         speed=scale.speed,
         slowest=scale.slowest,
+        nearest=scale.nearest,
         reach=scale.reach,
         others=tuple((o.name, m) for o, m in zip(signals.record.axes, signals.motions, strict=True) if m is not motion),
     )

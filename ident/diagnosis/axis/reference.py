@@ -24,6 +24,7 @@ from ident.diagnosis.axis.motion import (
 )
 from ident.diagnosis.axis.reversals import Sticking, Untold, turned_round, untold_while_sticking
 from ident.diagnosis.delays import delayed
+from ident.diagnosis.law.dependence import path_since_reversal
 from ident.errors import EstimationError, RecordError
 from ident.estimate.axis.cutoff import LARGEST_CUTOFF, position_cutoff
 from ident.estimate.axis.processing import BUTTERWORTH_ORDER, PARAMETERS
@@ -50,6 +51,7 @@ class Scale:
         values: own baseline parameters of the axis, a first estimate.
         speed: of which the axis is seldom faster [m/s or rad/s].
         slowest: than which it is seldom slower in a row [m/s or rad/s].
+        nearest: path since a reversal within which few rows are: what is over by then, none can bound [m or rad].
         reach: range of its position [m or rad].
         hold: sample intervals by which its motion follows its effort as recorded, if sampling can be why: an effort
             that is held over the interval acts half of one late. None: longer, and a cause of its own.
@@ -62,6 +64,7 @@ class Scale:
     values: Array
     speed: float
     slowest: float
+    nearest: float
     reach: float
     hold: float | None
     lag: float
@@ -274,6 +277,7 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
     *refined, lag = np.linalg.lstsq(np.column_stack([left, bend]), right, rcond=None)[0]
     speed = max(float(np.percentile(np.abs(motion.velocity), 95)) for motion in motions)
     slowest = float(np.quantile(np.concatenate([np.abs(one.velocity[one.moving]) for one in motions]), NEAREST))
+    paths = [path_since_reversal(one.position, one.velocity)[one.moving] for one in motions]
     reach = float(np.ptp(np.concatenate([motion.position for motion in motions])))
     sampled = abs(lag) <= LARGEST_HOLD
     rest = right - np.column_stack([left, bend]) @ [*refined, lag]
@@ -281,6 +285,7 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
         np.array(refined) if sampled else values,
         speed,
         slowest,
+        float(np.quantile(np.concatenate(paths), NEAREST)),
         reach,
         float(lag) if sampled else None,
         lag * record.sample_time,
