@@ -162,11 +162,14 @@ def _alone(left: Array, scale: Array, length: Array, column: Column) -> _Added:
 
 
 def _together(left: Array, scale: Array, column: Column) -> _Added:
-    """Of several columns."""
+    """Of several columns, few beside the rows: by the eigenvectors of their products, as far as they are visible."""
     unit = scale[column.place]
-    vectors, singular, turn = np.linalg.svd(left[:, column.place] / unit, full_matrices=False)
+    columns = left[:, column.place] / unit
+    powers, turn = np.linalg.eigh(columns.T @ columns)
+    singular, turn = np.sqrt(np.maximum(powers[::-1], 0.0)), turn[:, ::-1]
     count = int(np.sum(singular > VISIBLE))
     volume = 2 * float(np.sum(np.log(np.maximum(singular, VISIBLE))))
+    by_length = turn[:, :count] / singular[:count]
     bound = count > 0 and math.isfinite(column.least)
-    coefficients = (turn[:count].T / singular[:count]) / unit[:, None] if bound else None
-    return _Added(vectors[:, :count], (-math.inf, *column.negligible), volume, coefficients)
+    coefficients = by_length / unit[:, None] if bound else None
+    return _Added(columns @ by_length, (-math.inf, *column.negligible), volume, coefficients)

@@ -112,10 +112,13 @@ class Regression:
         unit = self.rows.columns / np.where(norms > 0, norms, 1.0)
         layout = self.rows.layout
         alone = {column.place.start: column.candidate for column in layout if column.width == 1}
+        singles = unit[:, list(alone)]
         found = []
         for variant, column in enumerate(layout):
-            cosines = np.abs(unit[:, column.place].T @ unit[:, list(alone)])
-            if column.width > 1 and np.all(cosines.max(axis=1, initial=0.0) > SAME):
+            if column.width < 2:
+                continue
+            cosines = np.abs(unit[:, column.place].T @ singles)
+            if np.all(cosines.max(axis=1, initial=0.0) > SAME):
                 several = frozenset(list(alone.values())[best] for best in cosines.argmax(axis=1).tolist())
                 found += [(variant, several)] if column.candidate not in several else []
         return found
