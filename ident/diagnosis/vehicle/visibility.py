@@ -141,9 +141,11 @@ class Visibility:
         return self._found[asked]
 
     def _four(self, effects: frozenset[str]) -> Problem:
-        if effects not in self._plain:
-            self._plain[effects] = _problem(FOUR, (), self.vehicle, effects)
-        return self._plain[effects]
+        """Of what has been made for more effects already, the part that is asked for."""
+        made = next((problem for more, problem in self._plain.items() if effects <= more), None)
+        if made is None:
+            made = self._plain[effects] = _problem(FOUR, (), self.vehicle, effects)
+        return replace(made, candidates=tuple(one for one in made.candidates if one.effect in effects))
 
 
 def _problem(
