@@ -32,8 +32,10 @@ EPSILON: Final = 3e-4
 """ε of Coulomb friction at the start [rad/s]: how far a held joint creeps is proportional to it, and wheels off
 straight ahead slip, which a campaign would take for friction (docs/fmu.md, "In the loop")."""
 
-_INCLUDED: Final = {"fmi3.c": "plant_fmi3.h"}
-"""A unit of the plant alone -> the name under which the unit of the bus includes it."""
+_INCLUDED: Final = {
+    name: f"plant_{name.removesuffix('.c')}.h" for name in ("fmi3.c", "fmi3_solving.c", "fmi3_values.c")
+}
+"""A unit of the plant alone -> the name under which `plant.c` includes it."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import numpy as np
 from fmu.model.effect_sizes import felt_by, sized
 from fmu.model.elimination import Elimination, elimination
 from fmu.model.equations import equations
-from fmu.model.straight_code import Routine, c_function
+from fmu.model.straight_code import HEADERS, Routine, c_function
 from fmu.variables import Block, Inputs, Variable, VariableTable
 from ident.effects import Effect
 from ident.plant.creeping import Equations
@@ -30,7 +30,10 @@ TOLERANCE: Final = 1e-4
 FIRST_STEP: Final = 1e-3
 """Length that the first internal step tries [s]."""
 
-_WRITTEN: Final = ("core.h", "core.c", "solver.c", "linear.c", "fastest.c", "qo_internal.h", "qo_linear.h")
+_WRITTEN: Final = (
+    *("core.h", "core.c", "solver.c", "linear.c", "fastest.c"),
+    *("qo_internal.h", "qo_linear.h", "qo_tanh.h"),
+)
 """Files of the core that are written by hand."""
 
 _ROWS: Final = (("states", "NX", Block.STATE), ("inputs", "NU", Block.INPUT), ("parameters", "NP", Block.PARAMETER))
@@ -157,7 +160,8 @@ def guarded(guard: str, comment: str, lines: Sequence[str]) -> str:
 
 
 def _definitions(routines: Sequence[Routine], sizes: Collection[int]) -> str:
-    head = ["/* The equations of the model. Generated. */", '#include "qo_equations.h"', "", "#include <math.h>", ""]
+    included = [f"#include {header}" for header in HEADERS]
+    head = ["/* The equations of the model. Generated. */", '#include "qo_equations.h"', "", *included, ""]
     return "\n".join([*head, *(c_function(each, sizes if each.name in _OFTEN else ()) for each in routines)])
 
 

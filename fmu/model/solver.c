@@ -4,7 +4,9 @@
  * solvers, Atmospheric Environment 31 (1997) 3459-3472: four stages, order 3, embedded order 2. In the form without
  * products by the Jacobian (Hairer, Wanner, Solving Ordinary Differential Equations II, section IV.7) stage i solves
  *
- *     (I/(g h) - J) k_i = f(x + sum a_ij k_j) + sum c_ij k_j / h
+ *     (I/(g h) - J) k_i = f(x + sum a_j k_j) + sum c_ij k_j / h
+ *
+ * with sums over the stages j before i. Of this method each k has the same part in all arguments after it.
  */
 #include <math.h>
 #include <string.h>
@@ -30,10 +32,9 @@
 #define UNLIKE 0.5
 
 static const double GAMMA = 0.5;
-static const double A[STAGES][STAGES] = {{0.0}, {0.0}, {2.0}, {2.0, 0.0, 1.0}};
+/* Part of each k in the argument of all stages after it, and in the state at the end; the error is the last k. */
+static const double A[STAGES] = {2.0, 0.0, 1.0, 1.0};
 static const double C[STAGES][STAGES] = {{0.0}, {4.0}, {1.0, -1.0}, {1.0, -1.0, -8.0 / 3.0}};
-static const double B[STAGES] = {2.0, 0.0, 1.0, 1.0};
-static const double E[STAGES] = {0.0, 0.0, 0.0, 1.0};
 /* Whether a stage has an argument of its own; the second one shares that of the first. */
 static const int EVALUATES[STAGES] = {1, 0, 1, 1};
 /* Where in the step a stage sees the inputs, and how much of what their rates change in the derivatives it adds. */
@@ -133,20 +134,18 @@ static void evaluate(const qo_model *model, const departure *from, const double 
 static double attempt(const qo_model *model, qo_linear *system, const departure *from, double h, double *next,
                       int *worst) {
     double k[STAGES][QO_NX];
-    double slope[QO_NX], error[QO_NX];
+    double slope[QO_NX];
     int stage;
     if (!qo_prepare(system, 1.0 / (GAMMA * h))) {
         *worst = 0;
         return INFINITY;
     }
+    memcpy(next, model->x, QO_NX * sizeof *next);
     memcpy(slope, from->slope, sizeof slope);
     for (stage = 0; stage < STAGES; ++stage) {
         double right[QO_NX];
         if (EVALUATES[stage] && stage > 0) {
-            double argument[QO_NX];
-            memcpy(argument, model->x, sizeof argument);
-            add(argument, A[stage], k, stage, 1.0);
-            evaluate(model, from, argument, MOMENT[stage] * h, slope);
+            evaluate(model, from, next, MOMENT[stage] * h, slope);
         }
         memcpy(right, slope, sizeof right);
         add(right, C[stage], k, stage, 1.0 / h);
@@ -154,12 +153,11 @@ static double attempt(const qo_model *model, qo_linear *system, const departure 
             add_scaled(right, from->drift, DRIFT[stage] * h);
         }
         qo_solve(system, right, k[stage]);
+        if (A[stage] != 0.0) {
+            add_scaled(next, k[stage], A[stage]);
+        }
     }
-    memcpy(next, model->x, QO_NX * sizeof *next);
-    add(next, B, k, STAGES, 1.0);
-    memset(error, 0, sizeof error);
-    add(error, E, k, STAGES, 1.0);
-    return error_ratio(model, next, error, worst);
+    return error_ratio(model, next, k[STAGES - 1], worst);
 }
 
 /* Factor on the step length after an error ratio. */

@@ -19,9 +19,10 @@ PARAMETERS: Final = "p"
 _WRITTEN: Final[Mapping[str, str]] = MappingProxyType(
     {
         **{name: f"{{0}} {sign} {{1}}" for name, sign in (("add", "+"), ("sub", "-"), ("mul", "*"), ("div", "/"))},
-        **{name: f"{name}({{0}})" for name in ("sqrt", "fabs", "sin", "cos", "tan", "asin", "acos", "atan", "tanh")},
+        **{name: f"{name}({{0}})" for name in ("sqrt", "fabs", "sin", "cos", "tan", "asin", "acos", "atan")},
         **{name: f"{name}({{0}})" for name in ("exp", "log")},
         **{name: f"{{0}} {sign} {{1}}" for name, sign in (("lt", "<"), ("le", "<="), ("eq", "=="), ("ne", "!="))},
+        "tanh": "qo_tanh({0})",
         "neg": "-{0}",
         "sq": "{0} * {0}",
         "twice": "2.0 * {0}",
@@ -38,7 +39,10 @@ _WRITTEN: Final[Mapping[str, str]] = MappingProxyType(
         "if_else_zero": "{0} != 0.0 ? {1} : 0.0",
     }
 )
-"""Operations in C, of operands that are names or numbers."""
+"""Operations in C, of operands that are names or numbers; they need `HEADERS`."""
+
+HEADERS: Final = ("<math.h>", '"qo_tanh.h"')
+"""What a file of such functions includes."""
 
 _GIVEN: Final = (INPUT, CONSTANT)
 

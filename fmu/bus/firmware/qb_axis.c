@@ -1,7 +1,7 @@
 /* One axis: torque of the bus, velocity loop of the stops, limits, and what is looked after. */
 #include <math.h>
 
-#include "qb.h"
+#include "qb_calls.h"
 
 #define TICK 0.001 /* period of the drive's own loops [s] */
 #define TAU 6.283185307179586

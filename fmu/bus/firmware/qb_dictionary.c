@@ -1,5 +1,5 @@
 /* The object dictionary of a node: rows of the EDS, values that live elsewhere, and who may refuse one. */
-#include "qb.h"
+#include "qb_calls.h"
 
 const qb_object *qb_row(int node, int row) { return &qb_devices[qb_places[node].device].objects[row]; }
 

@@ -1,7 +1,7 @@
 /* Emergency producer: error register 1001h, history 1003h, EMCY 1014h, inhibit time 1015h (CiA 301, 7.2.7). */
 #include <string.h>
 
-#include "qb.h"
+#include "qb_calls.h"
 
 #define INVALID 0x80000000u
 #define INHIBIT_UNIT (QB_MILLISECOND / 10)

@@ -1,7 +1,7 @@
 /* CiA 406: scaled absolute position with preset, code sequence, speed, cyclic timer. */
 #include <math.h>
 
-#include "qb.h"
+#include "qb_calls.h"
 
 #define COUNTER_CLOCKWISE 1
 #define SCALING 4

@@ -1,7 +1,7 @@
 /* All devices on one bus: frames in, frames out, and time. */
 #include <string.h>
 
-#include "qb.h"
+#include "qb_calls.h"
 
 #define FRAME_TIME 135000LL /* when the other nodes hear a frame of a node: 135 bits at 1 Mbit/s [ns] */
 #define IDENTIFIER 0x1FFFFFFFu

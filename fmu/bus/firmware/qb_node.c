@@ -1,5 +1,5 @@
 /* NMT slave, heartbeat both ways, and guarding answers of a node (CiA 301, 7.2.8, 7.3.2). */
-#include "qb.h"
+#include "qb_calls.h"
 
 #define SYNC_PRODUCES 0x40000000u
 #define EXTENDED 0x20000000u

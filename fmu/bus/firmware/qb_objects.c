@@ -1,7 +1,7 @@
 /* The objects of the device profiles: what reading and writing them does. */
 #include <math.h>
 
-#include "qb.h"
+#include "qb_calls.h"
 
 #define POSITION_REVERSED 0x80
 #define VELOCITY_REVERSED 0x40

@@ -1,7 +1,7 @@
 /* PDO parameters with live mapping by SDO (CiA 301, 7.5.2.35 to 7.5.2.38): what may be written, and when. */
 #include <string.h>
 
-#include "qb.h"
+#include "qb_calls.h"
 
 #define INVALID 0x80000000u
 #define NO_REMOTE 0x40000000u

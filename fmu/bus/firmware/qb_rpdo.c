@@ -1,7 +1,7 @@
 /* Receive PDOs: applied at once or with the next SYNC, watched for length and for missing (CiA 301, 7.2.2). */
 #include <string.h>
 
-#include "qb.h"
+#include "qb_calls.h"
 
 #define SYNCHRONOUS_MAX 240
 #define TOO_SHORT 0x8210

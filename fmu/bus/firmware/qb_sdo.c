@@ -1,7 +1,7 @@
 /* The default SDO server (CiA 301, 7.2.4): expedited and segmented transfer, one at a time, whatever the client sends. */
 #include <string.h>
 
-#include "qb.h"
+#include "qb_calls.h"
 
 #define TIMEOUT (1000 * QB_MILLISECOND) /* without a frame of the client */
 #define SEGMENT 7

@@ -1,7 +1,7 @@
 /* Hardware of the drives: current loop, DC link with brake chopper, protection, motor encoder. */
 #include <math.h>
 
-#include "qb.h"
+#include "qb_calls.h"
 
 #define STALL_SPEED 1.0 /* of the shaft, below which it counts as standing [rad/s] */
 #define THERMAL_LIMIT 1.05

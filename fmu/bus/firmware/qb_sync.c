@@ -1,5 +1,5 @@
 /* SYNC of a node, both ways, and what happens at one (CiA 301, 7.2.5). */
-#include "qb.h"
+#include "qb_calls.h"
 
 #define SYNC_PRODUCES 0x40000000u
 #define IDENTIFIER 0x1FFFFFFFu

@@ -1,7 +1,7 @@
 /* Transmit PDOs: with every n-th SYNC, with the SYNC after an event, on the event, or on request (CiA 301, 7.2.2). */
 #include <string.h>
 
-#include "qb.h"
+#include "qb_calls.h"
 
 #define LOOKS_EVERY QB_MILLISECOND /* mapped values are compared with those sent last */
 

@@ -1,4 +1,4 @@
-/* Before fmi3.c is included: what it calls these is reached under other names. */
+/* After the header of FMI 3.0, before the functions of the plant: what they call these is reached under other names. */
 #undef fmi3InstantiateModelExchange
 #define fmi3InstantiateModelExchange plant_InstantiateModelExchange
 #undef fmi3InstantiateCoSimulation

@@ -69,9 +69,13 @@ class Twin:
     devices: Devices | None = None
     sent: list[Frame] = field(default_factory=list)
 
+    @property
+    def time(self) -> float:
+        """The instant that the devices have reached [s]."""
+        return 0.0 if self.devices is None else round(self.devices.time, 9)
+
     def hear(self, can_id: int, data: bytes) -> None:
-        instant = 0.0 if self.devices is None else round(self.devices.time, 9)
-        self.sent.append((instant, can_id, bytes(data)))
+        self.sent.append((self.time, can_id, bytes(data)))
 
     def take(self, stimulus: Stimulus) -> list[Frame]:
         assert self.devices is not None
@@ -111,11 +115,23 @@ def open_twins(bus_fmu: Path, platform: Path) -> Iterator[Twins]:
     with ExitStack() as stack:
         instance = stack.enter_context(BusFmuInstance(bus_fmu, {}))
         vehicle = stack.enter_context(FmuVehicle(platform, silent_prototype(), seed=1))
-        in_fmu, emulated = Twin(), Twin()
+        in_fmu, emulated = Twin(), _emulated(vehicle)
         in_fmu.devices = LsBusDevices(instance, in_fmu.hear)
-        emulated.devices = DeviceNetwork(vehicle, read_network_description(DEFAULT_NETWORK), emulated.hear)
         twins = Twins(in_fmu, emulated, instance, vehicle)
         boot_up = [(0.0, 0x700 + node_id, b"\x00") for node_id in range(1, 7)]
         assert in_fmu.sent == emulated.sent == boot_up
         in_fmu.sent, emulated.sent = [], []
         yield twins
+
+
+@contextmanager
+def emulated_twin(platform: Path) -> Iterator[Twin]:
+    """The emulator's firmware alone, freshly booted; nothing of it has been looked at."""
+    with FmuVehicle(platform, silent_prototype(), seed=1) as vehicle:
+        yield _emulated(vehicle)
+
+
+def _emulated(vehicle: FmuVehicle) -> Twin:
+    twin = Twin()
+    twin.devices = DeviceNetwork(vehicle, read_network_description(DEFAULT_NETWORK), twin.hear)
+    return twin
