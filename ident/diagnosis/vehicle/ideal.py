@@ -26,6 +26,7 @@ from ident.vehicle.quantities import GRAVITY
 Array = NDArray[np.float64]
 
 SAMPLE_TIME: Final = 0.004
+PERIODS: Final = 2
 TURN_TIME: Final = 6.0
 """Of half a turn on the spot [s]."""
 INCLINED: Final = 0.0175
@@ -112,28 +113,31 @@ DIAGNOSTIC: Final[Mapping[str, Experiment]] = MappingProxyType(
 """Experiments by name, the easiest first."""
 
 
-def ideal_record(drives: Sequence[Drive], vehicle: VehicleDescription, seed: int = 1) -> Record:
+def ideal_record(
+    drives: Sequence[Drive], vehicle: VehicleDescription, seed: int = 1, *, periods: int = PERIODS
+) -> Record:
     """A record without noise of the plain model with the vehicle file's parameters; random excitation by `seed`."""
     generator = np.random.default_rng(seed)
     segments: list[Segment] = []
     for drive in drives:
         if drive.turned:
             segments.append(_turn(vehicle))
-        segments.append(_segment(drive, vehicle, generator))
+        segments.append(_segment(drive, vehicle, generator, periods))
     return Record(segments, "ideal")
 
 
-def _segment(drive: Drive, vehicle: VehicleDescription, generator: np.random.Generator) -> Segment:
+def _segment(drive: Drive, vehicle: VehicleDescription, generator: np.random.Generator, periods: int) -> Segment:
     spec = drive.spec
     series = _series(spec, generator)
-    time = np.linspace(0.0, spec.period, round(spec.period / SAMPLE_TIME), endpoint=False)
+    per_period = round(spec.period / SAMPLE_TIME)
+    time = np.linspace(0.0, periods * spec.period, periods * per_period, endpoint=False)
     motion = series.evaluate(time)
     alpha, beta, torques = (
         _lifted(motion, vehicle) if spec.mode is None else _on_the_floor(spec, spec.mode, motion, vehicle, drive)
     )
     if drive.dither:
         torques = torques + dither_torques(time, spec.period, vehicle)
-    period = np.zeros(len(time), dtype=np.int64)
+    period = np.repeat(np.arange(periods), per_period)
     extra = {PAYLOAD: np.full(len(time), drive.payload)} if drive.payload else {}
     return make_segment(Segment(drive.name, 0.0, time, torques, beta, alpha, period, extra=extra), "ideal")
 

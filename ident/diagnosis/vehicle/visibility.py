@@ -153,7 +153,9 @@ def _problem(
 ) -> Problem:
     # At the vehicle file's parameters: an experiment of few steps does not show all of them.
     names = [name for name in EffectName if name in effects and name in _FORETOLD]
-    problem = build_problem([ideal_record(drives, vehicle)], vehicle, vehicle.prior, given=given, effects=names)
+    problem = build_problem(
+        [ideal_record(drives, vehicle, periods=1)], vehicle, vehicle.prior, given=given, effects=names
+    )
     return replace(problem, nominal=None)
 
 
