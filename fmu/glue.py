@@ -20,6 +20,9 @@ _ENTRY: Final = {
 }
 """The functions of the standard, and what they need."""
 
+_MARK_SIZE: Final = 16
+"""Bytes at the head of saved states."""
+
 _ROLES: Final[Mapping[Block, str]] = MappingProxyType(
     {
         Block.TIME: "QO_TIME",
@@ -41,18 +44,18 @@ def wrapper_sources(table: VariableTable, version: FmiVersion, token: str) -> di
     written = {name: (resources.files("fmu") / "wrapper" / name).read_bytes() for name in names}
     if version is FmiVersion.FMI3:
         written["arrays_of_wheels.c"] = arrays_source(table).encode()
-    return {**written, "variables.h": _header(table, token).encode(), "variables.c": _rows(table, token).encode()}
+    return {**written, "variables.h": _header(table).encode(), "variables.c": _rows(table, token).encode()}
 
 
-def _header(table: VariableTable, token: str) -> str:
+def _header(table: VariableTable) -> str:
+    """Nothing of one vehicle alone: what includes it is compiled once for all."""
     roles = ",\n".join(f"    {role}" for role in _ROLES.values())
     return f"""/* The variables by their value references. Generated. */
 #ifndef QO_VARIABLES_H
 #define QO_VARIABLES_H
 
-#define QO_TOKEN "{token}"
 #define QO_VARIABLES {len(table.variables)}
-#define QO_MARK_SIZE {len(_mark(token))}
+#define QO_MARK_SIZE {_MARK_SIZE}
 #define QO_MODEL_EXCHANGED {int(bool(table.block(Block.DERIVATIVE)))} /* whether there is a model to exchange */
 
 typedef enum {{
@@ -67,6 +70,7 @@ typedef struct {{
 
 extern const qo_variable qo_variables[QO_VARIABLES];
 extern const double qo_nominals[];
+extern const char qo_token[]; /* of the model description */
 extern const unsigned char qo_mark[QO_MARK_SIZE]; /* at the head of saved states */
 
 #endif
@@ -86,9 +90,11 @@ const qo_variable qo_variables[QO_VARIABLES] = {{
 
 const double qo_nominals[] = {{{nominals}}};
 
+const char qo_token[] = "{token}";
+
 const unsigned char qo_mark[QO_MARK_SIZE] = {{{mark}}};
 """
 
 
 def _mark(token: str) -> bytes:
-    return hashlib.sha256(token.encode()).digest()[:16]
+    return hashlib.sha256(token.encode()).digest()[:_MARK_SIZE]

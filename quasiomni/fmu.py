@@ -78,9 +78,10 @@ def build(
     force: ForceOption = False,
 ) -> None:
     """Package the identified model, with its confirmed effects, as an FMU for co-simulation and model exchange."""
-    order = Order(fmi, inputs, parse_platforms(platforms), contacts, limits, arrays, effects)
     if bus:
         _refuse_of_plants(context)
+    order = Order(fmi, inputs, parse_platforms(platforms), contacts, limits, arrays, effects)
+    if bus:
         from hil.lsbus.export import export_bus_fmu  # needs the emulator's tables, which other FMUs do without
     elif drive is not None or tx_clock is not TxClock.COUNTDOWN:
         raise UserError("--drive and --tx-clock are of an FMU on a bus.", "Add --bus, or leave them out.")

@@ -44,7 +44,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     if (me == NULL) {
         return NULL;
     }
-    if (fmuGUID == NULL || strcmp(fmuGUID, QO_TOKEN) != 0) {
+    if (fmuGUID == NULL || strcmp(fmuGUID, qo_token) != 0) {
         qo_tell(me, QO_ANSWER_ERROR, "The GUID is not that of this model: the description belongs to another FMU.");
         qo_free(me);
         return NULL;

@@ -41,7 +41,7 @@ static qo_instance *instantiate(qo_interface interface, fmi3String name, fmi3Str
 {
     qo_instance *me =
         qo_new(interface, name, logging, environment, (void (*)(void))log_message, write_message);
-    if (me != NULL && (token == NULL || strcmp(token, QO_TOKEN) != 0)) {
+    if (me != NULL && (token == NULL || strcmp(token, qo_token) != 0)) {
         qo_tell(me, QO_ANSWER_ERROR, "The instantiation token is not that of this model: the description belongs to "
                                      "another FMU.");
         qo_free(me);

@@ -190,11 +190,12 @@ def test_a_run_becomes_an_fmu_with_its_devices_on_a_bus(
 
 def test_options_that_do_not_go_with_a_bus_are_refused(quasi: Quasi, run: Path, tmp_path: Path) -> None:
     version = quasi("fmu", run, "--bus", "--fmi", "2", "-o", tmp_path / "none.fmu")
+    arrays = quasi("fmu", run, "--bus", "--arrays", "-o", tmp_path / "none.fmu")
     alone = quasi("fmu", run, "--drive", "drive_fl", "-o", tmp_path / "none.fmu")
     unknown = quasi("fmu", run, "--bus", "--drive", "drive_middle", "-o", tmp_path / "none.fmu", "--platforms", "host")
     served = quasi("emulate", "--plant", "fmu-bus:bus.fmu", "--bus", "unix:nowhere")
-    told = ["--fmi", "--bus", "drive_rr", "fmu:FILE"]
-    for answer, said in zip((version, alone, unknown, served), told, strict=True):
+    told = ["--fmi", "--arrays is of FMUs without devices", "--bus", "drive_rr", "fmu:FILE"]
+    for answer, said in zip((version, arrays, alone, unknown, served), told, strict=True):
         assert answer.code == 2
         assert said in answer.err
     assert not (tmp_path / "none.fmu").exists()

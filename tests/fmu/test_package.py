@@ -14,12 +14,13 @@ import pytest
 
 from fmu.compiling import HEADERS, Compiler, check_platforms, compile_libraries, find_compiler, universal_binary
 from fmu.description import FmiVersion
-from fmu.packaging import Order, build_fmu
+from fmu.packaging import Order, build_fmu, fmu_interface, fmu_sources, token_of
 from fmu.platforms import PLATFORMS, host_platform, parse_platforms
-from fmu.source import ModelSource
+from fmu.source import ModelSource, make_model
 from fmu.units import unit_of
 from fmu.variables import Inputs
 from ident.errors import UserError
+from ident.vehicle.description import load_vehicle
 from ident.vehicle.geometry import GEOMETRY_UNITS
 from ident.vehicle.parameters import PARAMETER_NAMES
 
@@ -216,3 +217,21 @@ def test_every_platform_is_built_and_warm_in_less_than_five_seconds(
         universal = name == "binaries/darwin64/quasiomni.dylib"
         assert content.startswith(b"\xca\xfe\xba\xbe" if universal else MAGIC[Path(name).suffix])
         assert b"fmi2DoStep" in content or b"fmi3DoStep" in content
+
+
+@pytest.mark.parametrize("version", FmiVersion)
+def test_another_vehicle_has_tables_of_its_own_and_nothing_else_to_compile(version: FmiVersion) -> None:
+    """A compiled unit is kept by its content and that of all that it includes."""
+    made = [_sources_of(name, version) for name in ("prototype", "compact")]
+    differing = {name for name in made[0] if made[0][name] != made[1][name]}
+    assert made[0].keys() == made[1].keys()
+    assert differing == {"qo_table.c", "variables.c"}
+
+
+def _sources_of(vehicle: str, version: FmiVersion) -> dict[str, bytes]:
+    described = load_vehicle(vehicle)
+    source = ModelSource(described, described.prior, (), {}, {})
+    order = Order(version, Inputs.TORQUE, (host_platform(),))
+    model = make_model(source, order.inputs)
+    interface = fmu_interface(source, model, order)
+    return fmu_sources(model, interface, version, token_of(model, interface, version))

@@ -475,7 +475,7 @@ static void change_mode(void)
 static void begin(void)
 {
     static fmi2CallbackFunctions callbacks = {hear2, calloc, free, NULL, NULL};
-    const char *token = below(50) == 0 ? "another" : QO_TOKEN;
+    const char *token = below(50) == 0 ? "another" : qo_token;
     const int logging = (int)below(2);
     memset(&now, 0, sizeof now);
     now.is3 = (int)below(2);
@@ -489,7 +489,7 @@ static void begin(void)
     } else {
         now.instance = fmi3InstantiateModelExchange("fuzz", token, "", fmi3False, logging, NULL, hear3);
     }
-    if ((now.instance == NULL) != (token != (const char *)QO_TOKEN && strcmp(token, QO_TOKEN) != 0)) {
+    if ((now.instance == NULL) != (token != (const char *)qo_token && strcmp(token, qo_token) != 0)) {
         fail("the token decides whether there is an instance");
     }
 }

@@ -75,7 +75,7 @@ int main(int count, char *arguments[])
     for (i = 0; i < 7; i++) {
         watched[i] = reference_of(outputs[i]);
     }
-    vehicle = fmi2Instantiate("vehicle", fmi2CoSimulation, QO_TOKEN, "", &callbacks, fmi2False, fmi2False);
+    vehicle = fmi2Instantiate("vehicle", fmi2CoSimulation, qo_token, "", &callbacks, fmi2False, fmi2False);
     if (vehicle == NULL || fmi2SetupExperiment(vehicle, fmi2False, 0.0, 0.0, fmi2False, 0.0) != fmi2OK ||
         fmi2EnterInitializationMode(vehicle) != fmi2OK || fmi2ExitInitializationMode(vehicle) != fmi2OK) {
         return 1;

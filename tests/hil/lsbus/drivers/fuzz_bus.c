@@ -259,7 +259,7 @@ int main(int count, char **arguments)
     unsigned long rounds = 0;
     seed = count > 1 ? strtoull(arguments[1], NULL, 10) : 1;
     random_state = seed * 0x9E3779B97F4A7C15ULL + 1;
-    instance = fmi3InstantiateCoSimulation("fuzz", QO_TOKEN, NULL, 0, 0, 1, 0, NULL, 0, NULL, hear, NULL);
+    instance = fmi3InstantiateCoSimulation("fuzz", qo_token, NULL, 0, 0, 1, 0, NULL, 0, NULL, hear, NULL);
     must(instance == NULL ? fmi3Error : fmi3OK, "fmi3InstantiateCoSimulation");
     must(fmi3EnterInitializationMode(instance, 0, 0.0, 0.0, 0, 0.0), "fmi3EnterInitializationMode");
     must(fmi3ExitInitializationMode(instance), "fmi3ExitInitializationMode");
