@@ -77,14 +77,17 @@ class AxisMotion:
     moving: NDArray[np.bool_]
 
 
-def noise_limit(record: AxisRecord, axis: AxisSignals, inertia: float, left: float, cutoff: float) -> float:
+def noise_limit(
+    record: AxisRecord, axis: AxisSignals, inertia: float, left: float, cutoff: float, moving: float
+) -> float:
     """Frequency [rad/s] up to which the noise of the acceleration cannot be taken for an effect.
 
     While an axis hardly accelerates, what is measured of it is noise, and the best prediction of the effort from that
     is none: what says so looks like an elastic drive, or like a law of the acceleration. To take a noise of power N out
     of rows whose effort has E turns their variance from E + N into E: a log evidence of ln(1 + N / E) at every
-    frequency of a record, which may add up to `GAINED`. No rows are beyond the position's cutoff. An effort may hold
-    more than noise where its noise is looked for, and so may what a model leaves: the smaller of the two is taken.
+    frequency of a record, as far as it has rows, which may add up to `GAINED`. No rows are beyond the position's
+    cutoff. An effort may hold more than noise where its noise is looked for, and so may what a model leaves: the
+    smaller of the two is taken.
 
     Args:
         record: to which it belongs.
@@ -92,6 +95,7 @@ def noise_limit(record: AxisRecord, axis: AxisSignals, inertia: float, left: flo
         inertia: of it [kg or kg m²].
         left: power density of what a first estimate leaves of the effort in the rows [per Hz].
         cutoff: of the position filter [rad/s].
+        moving: part of the record that has rows.
 
     Raises:
         EstimationError: too little is left of a record of its duration.
@@ -100,7 +104,7 @@ def noise_limit(record: AxisRecord, axis: AxisSignals, inertia: float, left: flo
     position, effort = (_noise_power(series, dt) for series in (axis.position, axis.effort))
     frequency = np.fft.rfftfreq(len(record), dt)
     noise = inertia**2 * position * (2 * math.pi * frequency) ** 4
-    gained = np.cumsum(np.log1p(noise / max(min(effort, left), np.finfo(float).tiny)))
+    gained = moving * np.cumsum(np.log1p(noise / max(min(effort, left), np.finfo(float).tiny)))
     highest = 2 * math.pi * float(frequency[np.searchsorted(gained[:-1], GAINED)])
     limit = min(highest, cutoff, LARGEST_ROWS_CUTOFF / dt)
     if ROWS_PER_CUTOFF * limit * duration < 2 * math.pi * FEWEST_ROWS:

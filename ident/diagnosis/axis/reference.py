@@ -192,10 +192,11 @@ def axis_reference(
     apart = [axis_signals(record, chosen, ROWS_CUTOFF * chosen) for record in strange]
     alike = [_scale(signals, index) for index in range(len(records[0].axes))]
     scales = tuple(replace(scale, holds=_holds(apart, index, scale.values)) for index, scale in enumerate(alike))
+    moving = [np.mean(np.concatenate([one.motions[index].moving for one in signals])) for index in range(len(scales))]
     limits = [
-        noise_limit(record, axis, scale.values[0], scale.noise, chosen)
+        noise_limit(record, axis, scale.values[0], scale.noise, chosen, float(part))
         for record in everyone
-        for axis, scale in zip(record.axes, scales, strict=True)
+        for axis, scale, part in zip(record.axes, scales, moving, strict=True)
     ]
     limit = min(limits)
     bandwidth = max(

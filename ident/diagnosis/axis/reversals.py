@@ -26,6 +26,9 @@ from scipy.sparse import linalg
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+UNKNOWN: Final = 1e6
+"""Deviation of an impulse over the noise from which it is unknown altogether; rounding counts beyond."""
+
 MEMORY: Final = 25.0
 """Time constants of the rows' filter after which nothing is left of an impulse."""
 
@@ -93,7 +96,7 @@ def untold_while_sticking(
     for at, deviation in [*turns, (0, sticking.ends), (len(moving) - 1, sticking.ends)]:
         first, last = max(at - reach, 0), min(at + reach + 1, len(moving))
         seen = np.where(moving[first:last], response[first - at + reach : last - at + reach], 0.0)
-        found.append((np.arange(first, last), seen * deviation / sticking.noise))
+        found.append((np.arange(first, last), seen * min(deviation / sticking.noise, UNKNOWN)))
     rows = np.concatenate([places for places, _ in found])
     columns = np.repeat(np.arange(len(found)), [len(places) for places, _ in found])
     values = np.concatenate([seen for _, seen in found])
