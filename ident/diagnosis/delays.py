@@ -26,12 +26,12 @@ HELD: Final = 0.55
 
 def delayed(series: Array, delay: float, sample_time: float) -> Array:
     """A series (N,) as it was `delay` seconds before, by its spectrum; its end is led back to its start."""
-    return _answered(series, sample_time, lambda angular: np.exp(-1j * angular * delay))
+    return answered(series, sample_time, lambda angular: np.exp(-1j * angular * delay))
 
 
 def led(series: Array, time: float, sample_time: float) -> Array:
     """A series (N,) before a filter of first order, as it must have been: u + T u', by its spectrum."""
-    return _answered(series, sample_time, lambda angular: 1 + 1j * angular * time)
+    return answered(series, sample_time, lambda angular: 1 + 1j * angular * time)
 
 
 def sprung(series: Array, resonance: float, sample_time: float) -> Array:
@@ -47,10 +47,10 @@ def sprung(series: Array, resonance: float, sample_time: float) -> Array:
         share = angular / resonance
         return np.asarray(angular**2 / (1 - share**2 + 2j * DAMPING * share), dtype=np.complex128)
 
-    return _answered(series, sample_time, response)
+    return answered(series, sample_time, response)
 
 
-def _answered(
+def answered(
     series: Array, sample_time: float, response: Callable[[Array], NDArray[np.complexfloating[Any, Any]]]
 ) -> Array:
     length = fft.next_fast_len(len(series) + LED_BACK, real=True)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.special import logsumexp
 
-from ident.diagnosis.core.hypotheses import Hypothesis
+from ident.diagnosis.core.hypotheses import Hypothesis, following
 from ident.diagnosis.core.noise import Whitener
 from ident.diagnosis.core.observations import Observation
 
@@ -92,7 +92,13 @@ class Design:
 
     def __init__(self, observations: Sequence[Observation], hypotheses: Sequence[Hypothesis]) -> None:
         self.observations, self.hypotheses = observations, hypotheses
-        self.plant = [np.column_stack([one.plant, one.late]) for one in observations]
+        rates = sorted({one.sample_time for one in observations})
+        self.plant = [
+            np.column_stack([one.plant, *(one.late * (one.sample_time == rate) for rate in rates)])
+            for one in observations
+        ]
+        self.width = self.plant[0].shape[1]
+        self.following = [one.rows(following(one)) for one in observations]
         self.targets = [one.target for one in observations]
         pieces: list[list[Array]] = []
         blocks: list[Block] = []
@@ -134,59 +140,72 @@ class Evidence:
     Args:
         design: of the rows.
         whiteners: of every record.
-        temperature: by which squares of the noise are larger than its own.
+        led: whether the efforts follow what is reported as a filter of their lag does, and not later by it.
     """
 
-    def __init__(self, design: Design, whiteners: Sequence[Whitener], temperature: float = 1.0) -> None:
-        self.design, self.temperature = design, temperature
+    def __init__(self, design: Design, whiteners: Sequence[Whitener], led: bool = False) -> None:
+        self.design, self.whiteners, self.led = design, tuple(whiteners), led
         white = [
-            whitener.white(np.column_stack([plant, columns, target]))
-            for whitener, plant, columns, target in zip(
-                whiteners, design.plant, design.columns, design.targets, strict=True
+            whitener.white(np.column_stack([plant, columns, target - follows if led else target]))
+            for whitener, plant, columns, target, follows in zip(
+                whiteners, design.plant, design.columns, design.targets, design.following, strict=True
             )
         ]
-        self.white = np.vstack(white) / math.sqrt(temperature)
+        self.white = np.vstack(white)
+        self._volume = sum(
+            float(np.sum(np.log(np.diag(one.factor)))) + 0.5 * len(one.factor) * math.log(one.level)
+            for one in whiteners
+        )
         floor = math.sqrt(float(np.mean([one.level for one in whiteners])))
         smallest = floor / math.sqrt(design.count)
         count = 1 + max(1, math.ceil(math.log2(max(design.effort / smallest, 2.0)) / OCTAVES))
         self.scales = np.geomspace(smallest, max(design.effort, 2 * smallest), count)
 
     @cached_property
-    def _beside_plant(self) -> tuple[Array, float]:
-        """Products of all columns and the target, the plant projected out."""
-        width = self.design.plant[0].shape[1]
-        basis = linalg.qr(self.white[:, :width], mode="economic")[0]
-        left = self.white[:, width:] - basis @ (basis.T @ self.white[:, width:])
-        return left.T @ left, float(left[:, -1] @ left[:, -1])
+    def _plant(self) -> tuple[Array, Array]:
+        """Orthonormal basis of the plant's columns, and their triangle."""
+        basis, triangle = linalg.qr(self.white[:, : self.design.width], mode="economic")
+        return basis, triangle
+
+    @cached_property
+    def _products(self) -> Array:
+        """Of all columns and the target, the plant projected out."""
+        basis, _ = self._plant
+        left = self.white[:, self.design.width :] - basis @ (basis.T @ self.white[:, self.design.width :])
+        return np.asarray(left.T @ left)
+
+    @cached_property
+    def nothing(self) -> float:
+        """Log likelihood of the rows without any hypothesis, the plant's parameters integrated."""
+        triangle = np.abs(np.diag(self._plant[1]))
+        return -0.5 * float(self._products[-1, -1]) - self._volume - float(np.sum(np.log(triangle)))
 
     def beside(self, members: Mapping[int, Member]) -> Array:
         """Products (K + 1, K + 1) of all columns and the target, members integrated, by hypothesis."""
-        found, _ = self._beside_plant
+        found = self._products
         if not members:
             return found
-        own, _ = self._stacked(members)
+        own = self._stacked(members)
         inner = np.eye(own.shape[1]) + own.T @ found[:-1, :-1] @ own
         across = found[:, :-1] @ own
         return np.asarray(found - across @ linalg.solve(inner, across.T, assume_a="pos"))
 
-    def _stacked(self, members: Mapping[int, Member]) -> tuple[Array, list[slice]]:
-        """(K, R) factors of all members beside each other, and where each stands."""
-        parts, places, end = [], [], 0
+    def _stacked(self, members: Mapping[int, Member]) -> Array:
+        """(K, R) factors of all members beside each other."""
+        parts = [np.zeros((len(self.design.sizes), 0))]
         for member in members.values():
             block = self.design.blocks[member.block]
             part = np.zeros((len(self.design.sizes), block.factor.shape[1]))
             part[block.place] = member.scale * block.factor
             parts.append(part)
-            places.append(slice(end, end + part.shape[1]))
-            end += part.shape[1]
-        return np.hstack(parts), places
+        return np.hstack(parts)
 
     def log_likelihood(self, members: Mapping[int, Member]) -> float:
         """Of the target with members of these numbers, against none."""
-        found, _ = self._beside_plant
+        found = self._products
         if not members:
             return 0.0
-        own, _ = self._stacked(members)
+        own = self._stacked(members)
         inner = np.eye(own.shape[1]) + own.T @ found[:-1, :-1] @ own
         amplitude = own.T @ found[:-1, -1]
         factor = linalg.cho_factor(inner)
@@ -213,16 +232,20 @@ class Evidence:
             logs[row] = 0.5 * np.sum(gains * amplitudes**2 - np.log1p(squares * powers), axis=1)
         return Table(own, self.scales, logs)
 
-    def coefficients(self, members: Mapping[int, Member]) -> dict[int, tuple[Array, Array]]:
-        """Mean (K,) and covariance (K, K) of the columns of every member, of unit size, in the unit of the effort."""
-        found, _ = self._beside_plant
-        own, places = self._stacked(members)
-        inner = np.eye(own.shape[1]) + own.T @ found[:-1, :-1] @ own
-        covariance = linalg.inv(inner)
-        mean = covariance @ (own.T @ found[:-1, -1])
-        result = {}
-        for (hypothesis, member), place in zip(members.items(), places, strict=True):
-            block = self.design.blocks[member.block]
-            turn = member.scale * block.factor
-            result[hypothesis] = (turn @ mean[place], turn @ covariance[place, place] @ turn.T)
-        return result
+    def plant_parameters(self, members: Mapping[int, Member]) -> tuple[Array, Array]:
+        """Mean (p,) and covariance (p, p) of the plant's parameters, members integrated."""
+        width = self.design.width
+        whole = self.white.T @ self.white
+        own = self._whole(members)
+        inner = np.eye(own.shape[1]) + own.T @ whole @ own
+        across = whole @ own
+        left = whole - across @ linalg.solve(inner, across.T, assume_a="pos")
+        size = np.sqrt(np.diag(left)[:width])
+        covariance = np.linalg.inv(left[:width, :width] / np.outer(size, size)) / np.outer(size, size)
+        return covariance @ left[:width, -1], covariance
+
+    def _whole(self, members: Mapping[int, Member]) -> Array:
+        """Factors of members among all white columns: of the plant, of hypotheses, the target."""
+        own = self._stacked(members)
+        before, behind = np.zeros((self.design.width, own.shape[1])), np.zeros((1, own.shape[1]))
+        return np.vstack([before, own, behind])

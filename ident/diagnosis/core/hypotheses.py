@@ -24,7 +24,7 @@ from ident.diagnosis.core.functions import (
     waves,
 )
 from ident.diagnosis.core.observations import MASS, Observation
-from ident.diagnosis.delays import sprung
+from ident.diagnosis.delays import answered, delayed, led
 from ident.diagnosis.names import EffectName
 
 Array = NDArray[np.float64]
@@ -36,8 +36,9 @@ EVERY: Final = 1.2
 RIGID: Final = 100.0
 """Resonance over the bandwidth, of a spring that shows as a compliance alone: it adds a ten-thousandth else."""
 
-DAMPING: Final = 0.01
-"""Of what is behind a spring, over the critical damping: that of steel; only rows next to a resonance know it."""
+DAMPING: Final = 0.02
+"""Of what is behind a spring, over the critical damping: what bolted steel has. Less would let the noise of a position,
+and the unknown motion of the load before the record, ring on in what is reckoned from it."""
 
 
 @dataclass(frozen=True)
@@ -152,13 +153,23 @@ def _elasticity(observations: Observations) -> Hypothesis:
 
 
 def spring_response(force: Array, resonance: float, sample_time: float) -> Array:
-    """What a compliance of one adds to a force (N,) behind it, the load resonating at `resonance` [rad/s]."""
-    return sprung(force, resonance, sample_time)
+    """What a compliance of one adds to a force (M,) behind it, the load resonating at `resonance` [rad/s]."""
+
+    def response(angular: Array) -> Array:
+        share = angular / resonance
+        return np.asarray(angular**2 / (1 - share**2 + 2j * DAMPING * share))
+
+    return answered(force, sample_time, response)
 
 
 def _centred(one: Observation) -> Array:
     position = one.position
     return np.asarray(position - (position.max() + position.min()) / 2)
+
+
+def following(one: Observation) -> Array:
+    """(M,) what a filter of the lag's time constant adds to an effort that is that late."""
+    return led(delayed(one.effort, one.lag, one.interval), one.lag, one.interval) - one.effort
 
 
 _FAMILIES: Final[Sequence[Callable[[Observations], Hypothesis]]] = (
@@ -167,7 +178,6 @@ _FAMILIES: Final[Sequence[Callable[[Observations], Hypothesis]]] = (
     _one(EffectName.QUADRATIC_DRAG, lambda one: one.velocity * np.abs(one.velocity)),
     _ripple,
     _elasticity,
-    _one(EffectName.TORQUE_FILTER, lambda one: one.effort_rate),
     _presliding,
     _warming,
     _one(EffectName.FRICTION_POSITION, lambda one: _centred(one) * one.direction),

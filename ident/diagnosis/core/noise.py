@@ -7,7 +7,7 @@ that colour is no free function; a drift of some corner frequency has whatever p
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -25,7 +25,7 @@ CORNERS: Final = 3
 POWERS: Final = (0.1, 1.0, 10.0, 100.0)
 """Of a drift in the rows over that of the noise, tried; what is far less changes nothing."""
 
-SCALED: Final = 3
+SCALED: Final = 2
 """Times that the level of the noise is corrected."""
 
 HELD: Final = 1 / 24
@@ -43,6 +43,9 @@ class Drift:
     power: float
 
 
+NONE: Final = Drift(0.0, 0.0)
+
+
 class Colours:
     """Covariances of the rows of one record."""
 
@@ -54,6 +57,7 @@ class Colours:
         encoder = self._autocovariance((observation.values[MASS] * self._frequency**2) ** 2)
         unsure = np.column_stack([observation.unsure, _held(observation)])
         self._effort = effort[self._lags] / effort[0] + JITTER * np.eye(len(observation))
+        self._kept: dict[float, Array] = {}
         self._known = observation.encoder**2 * encoder[self._lags] + unsure @ unsure.T
 
     def covariance(self, drift: Drift, level: float) -> Array:
@@ -61,8 +65,13 @@ class Colours:
         found = self._effort + self._known / level
         if not drift.power:
             return found
-        slow = self._autocovariance(1 / (1 + (self._frequency / drift.corner) ** 2))
-        return np.asarray(found + drift.power * slow[self._lags] / slow[0])
+        return np.asarray(found + drift.power * self._slow(drift.corner))
+
+    def _slow(self, corner: float) -> Array:
+        if corner not in self._kept:
+            slow = self._autocovariance(1 / (1 + (self._frequency / corner) ** 2))
+            self._kept[corner] = slow[self._lags] / slow[0]
+        return self._kept[corner]
 
     def _autocovariance(self, spectrum: Array) -> Array:
         """By lag in samples, of noise with a spectrum behind the filter."""
@@ -71,18 +80,14 @@ class Colours:
 
 def _held(observation: Observation) -> Array:
     """(n,) what it adds that an effort may be held over a sample interval."""
-    interval = observation.sample_time
-    bent = np.gradient(observation.effort_rate, observation.interval)
-    return HELD * interval**2 * observation.rows(bent)
+    return HELD * observation.sample_time**2 * observation.bent[:, 0]
 
 
-def drifts(observation: Observation) -> Iterator[Drift]:
+def drifts(observation: Observation) -> list[Drift]:
     """None, and all that are tried."""
-    yield Drift(0.0, 0.0)
     slowest = 2 * np.pi / (observation.count * observation.sample_time)
-    for corner in np.geomspace(slowest, observation.filter.bandwidth, CORNERS + 1)[:-1]:
-        for power in POWERS:
-            yield Drift(float(corner), power)
+    corners = np.geomspace(slowest, observation.filter.bandwidth, CORNERS + 1)[:-1]
+    return [NONE, *(Drift(float(corner), power) for corner in corners for power in POWERS)]
 
 
 @dataclass(frozen=True)
@@ -93,48 +98,61 @@ class Whitener:
         factor: (n, n) lower triangular, of the covariance.
         level: power of the noise of the effort in a row.
         drift: beside it.
-        log_likelihood: of the rows, restricted to what their design does not absorb.
     """
 
     factor: Array
     level: float
     drift: Drift
-    log_likelihood: float
 
     def white(self, columns: Array) -> Array:
         """Columns (n, k) in units of the noise."""
         return np.asarray(linalg.solve_triangular(self.factor, columns, lower=True) / math.sqrt(self.level))
 
 
-def fit_whitener(observation: Observation, colours: Colours, design: Array, start: float) -> Whitener:
-    """The most likely noise of a record beside columns (n, k).
+@dataclass(frozen=True)
+class Rows:
+    """Rows of one record, whose noise is looked for.
+
+    Attributes:
+        colours: of the noise.
+        design: (n, p) columns that are absorbed, whatever their size.
+        target: (n,).
+        members: (n, m) columns beside the noise, of unit variance.
+    """
+
+    colours: Colours
+    design: Array
+    target: Array
+    members: Array
+
+
+def fit_whitener(rows: Rows, tried: Sequence[Drift], level: float) -> Whitener:
+    """The most likely noise of a record.
 
     Args:
-        observation: with the rows.
-        colours: of its noise.
-        design: columns that are absorbed, whatever their size.
-        start: power of the noise of a row that is tried first.
+        rows: of it.
+        tried: drifts, the first of them the most likely.
+        level: power of the noise of a row, to begin with.
     """
-    found = [_levelled(observation, colours, design, start, drift) for drift in drifts(observation)]
-    return max(found, key=lambda one: one.log_likelihood)
-
-
-def _levelled(observation: Observation, colours: Colours, design: Array, level: float, drift: Drift) -> Whitener:
+    beside = rows.members @ rows.members.T
     for _ in range(SCALED):
-        whitener, power = _with(observation, colours, design, level, drift)
-        level *= power
-    return whitener
+        level *= _power(rows, rows.colours.covariance(tried[0], level) + beside / level, level)[0]
+    found = {}
+    for drift in tried:
+        power, log = _power(rows, rows.colours.covariance(drift, level) + beside / level, level)
+        found[drift] = log - (math.log(len(POWERS) * CORNERS) if drift.power else 0.0), power
+    best = max(found, key=lambda drift: found[drift][0])
+    level *= found[best][1]
+    factor = linalg.cholesky(rows.colours.covariance(best, level), lower=True, check_finite=False)
+    return Whitener(factor, level, best)
 
 
-def _with(
-    observation: Observation, colours: Colours, design: Array, level: float, drift: Drift
-) -> tuple[Whitener, float]:
-    """Whitener of a level, and the power of the white rows, by which the level is too small."""
-    factor = linalg.cholesky(colours.covariance(drift, level), lower=True, check_finite=False)
-    white = linalg.solve_triangular(factor, np.column_stack([design, observation.target]), lower=True)
+def _power(rows: Rows, covariance: Array, level: float) -> tuple[float, float]:
+    """Of the white rows of a covariance, by which the level is too small, and their log likelihood."""
+    factor = linalg.cholesky(covariance, lower=True, check_finite=False)
+    white = linalg.solve_triangular(factor, np.column_stack([rows.design, rows.target]), lower=True)
     turned = linalg.qr(white, mode="r")[0]
-    width = design.shape[1]
+    width = rows.design.shape[1]
     count, left = len(white) - width, float(turned[width, width] ** 2) / level
     volume = float(np.sum(np.log(np.diag(factor))) + np.sum(np.log(np.abs(np.diag(turned)[:width]))))
-    log = -0.5 * left - 0.5 * count * math.log(level) - volume
-    return Whitener(factor, level, drift, log), left / count
+    return left / count, -0.5 * left - 0.5 * count * math.log(level) - volume

@@ -97,6 +97,7 @@ class Observation:
 
     Attributes:
         filter: of the rows.
+        motion: of the whole record.
         samples: (n,) of the rows in the record, `sample_time` [s] apart.
         count: samples of the record.
         stride: time between neighbouring rows [s].
@@ -112,6 +113,7 @@ class Observation:
     """
 
     filter: Filter
+    motion: AxisMotion
     samples: NDArray[np.int64]
     sample_time: float
     count: int
@@ -158,6 +160,12 @@ class Observation:
         return self.rows(self.effort_rate)
 
     @cached_property
+    def bent(self) -> Array:
+        """(n, 2) second and third derivative of the effort, that a spring adds."""
+        second = differentiate(self.effort_rate, self.interval, SEVEN)
+        return self.rows(np.column_stack([second, differentiate(second, self.interval, SEVEN)]))
+
+    @cached_property
     def path(self) -> Array:
         """(M,) since the last reversal [m or rad]."""
         return path_since_reversal(self.position, self.velocity)
@@ -180,27 +188,42 @@ def observe(fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord]) -> tuple[t
     if len(records[0].axes) != 1:
         raise RecordError(f"{records[0].source} has several axes.", "The core knows one: record or cut out one axis.")
     reference = axis_reference(fit, None, confirm)
-    return tuple(_observation(record, reference) for record in records), records[0].axes[0].kind
+    found = [_observation(record, reference) for record in records]
+    for _ in range(LAGS):
+        *values, lag = _estimated(found)
+        found = [
+            _shifted(one, record, lag, np.array(values)) for one, record in zip(found, records, strict=True)
+        ]
+    return tuple(found), records[0].axes[0].kind
+
+
+def _shifted(observation: Observation, record: AxisRecord, lag: float, values: Array) -> Observation:
+    """With its effort taken earlier by a lag [s], and everything scaled by an estimate."""
+    dt, whole = record.sample_time, observation.lag + lag
+    effort = delayed(record.axes[0].effort, whole, dt)
+    target = observation.filter.apply(effort, dt)[observation.samples]
+    shifted = replace(observation, target=target, lag=whole, values=values)
+    return replace(shifted, unsure=_unsure(shifted, observation.motion))
 
 
 def _observation(record: AxisRecord, reference: Reference) -> Observation:
     filters = Filter(reference.cutoff, reference.bandwidth)
-    dt, effort = record.sample_time, record.axes[0].effort
+    dt = record.sample_time
     motion = axis_motion(record, record.axes[0], filters.cutoff, filters.bandwidth)
     stride = max(1, math.floor(2 * math.pi / (ROWS_PER_CUTOFF * filters.bandwidth * dt)))
     samples = np.arange(0, len(record), stride)
     samples = samples[motion.moving[samples]]
     block = max(1, math.floor(1 / (COARSE * filters.cutoff * dt)))
-    count = len(record) // block
     signs = np.sign(motion.velocity)
     plant = np.column_stack([motion.linear, signs, np.ones_like(signs)])
-    found = Observation(
+    return Observation(
         filter=filters,
+        motion=motion,
         samples=samples,
         sample_time=dt,
         count=len(record),
         stride=stride * dt,
-        target=filters.apply(effort, dt)[samples],
+        target=filters.apply(record.axes[0].effort, dt)[samples],
         plant=filters.apply(plant, dt)[samples],
         values=reference.scales[0].values,
         lag=0.0,
@@ -211,13 +234,8 @@ def _observation(record: AxisRecord, reference: Reference) -> Observation:
         velocity=_means(motion.velocity, block),
         acceleration=_means(motion.acceleration, block),
         direction=_means(signs, block),
-        weights=filters.weights((samples + 0.5) * dt, count, block * dt),
+        weights=filters.weights((samples + 0.5) * dt, len(record) // block, block * dt),
     )
-    for _ in range(LAGS):
-        *values, lag = _estimated(found)
-        target = filters.apply(delayed(effort, found.lag + lag, dt), dt)[samples]
-        found = replace(found, target=target, lag=found.lag + lag, values=np.array(values))
-    return replace(found, unsure=_unsure(found, motion))
 
 
 def _means(series: Array, block: int) -> Array:
@@ -233,11 +251,12 @@ def _encoder_noise(position: Array) -> float:
     return math.sqrt(0.5 * float(np.median(power[upper] / (2 * np.sin(np.pi * frequency[upper])) ** 4)))
 
 
-def _estimated(observation: Observation) -> Array:
-    """(5,) parameters of the plant and the lag that is left, by least squares."""
-    columns = np.column_stack([observation.plant, observation.late])
+def _estimated(observations: Sequence[Observation]) -> Array:
+    """(5,) parameters of the plant and the lag that is left, by least squares beside a compliance and its rate."""
+    columns = np.vstack([np.column_stack([one.plant, one.late, one.bent]) for one in observations])
     size = np.linalg.norm(columns, axis=0)
-    return np.asarray(np.linalg.lstsq(columns / size, observation.target, rcond=None)[0] / size)
+    target = np.concatenate([one.target for one in observations])
+    return np.asarray(np.linalg.lstsq(columns / size, target, rcond=None)[0] / size)[:5]
 
 
 def _unsure(observation: Observation, motion: AxisMotion) -> Array:
