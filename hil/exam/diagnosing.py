@@ -15,11 +15,12 @@ from types import MappingProxyType, ModuleType
 from typing import Any, Final
 
 from hil.exam.axes.record_bytes import axis_record_of
-from hil.exam.folder import RECORDS, ExamFolder, read_exam
+from hil.exam.folder import RECORDS, Core, ExamFolder, read_exam
 from hil.exam.record_bytes import record_from_bytes
 from hil.exam.workers import run_all
 from ident.diagnosis.alone import closed_alone
 from ident.diagnosis.axis.diagnose import diagnose_axis
+from ident.diagnosis.core.answer import diagnose_by_core
 from ident.diagnosis.diagnosis import faulty
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.names import EffectName
@@ -103,7 +104,10 @@ def diagnose_exam(
         )
     asked = [identifier for identifier in there if removed is None or identifier in removed]
     task = _axis_task(folder, removed or {}) if exam.of_axes else _vehicle_task(folder, removed or {})
-    function = diagnose_axis_case if exam.of_axes else diagnose_case
+    if folder.core is Core.ONE and not exam.of_axes:
+        raise UserError("The core `one` diagnoses axes alone.", "Leave --core out, or diagnose an exam of axes.")
+    of_axes = diagnose_axis_by_core if folder.core is Core.ONE else diagnose_axis_case
+    function = of_axes if exam.of_axes else diagnose_case
     places = {identifier: folder.diagnosis(identifier, removed is not None) for identifier in asked}
     keep_answers(function, task, places, jobs=jobs, scheduler=scheduler, progress=progress)
 
@@ -212,6 +216,18 @@ def diagnose_axis_case(identifier: str, fit: bytes, confirm: bytes, removed: str
         records = axis_records(fit, confirm)
         found = diagnose_axis(records[:1], records[1:], seed=1, lacking=() if removed is None else (removed,))
         return found.diagnosis().as_json()
+
+    return identifier, _timed(answer)
+
+
+def diagnose_axis_by_core(identifier: str, fit: bytes, confirm: bytes, removed: str | None) -> tuple[str, bytes]:
+    """The same by the core `one`."""
+    forbid_emulator()
+
+    def answer() -> dict[str, Any]:
+        records = axis_records(fit, confirm)
+        lacking = () if removed is None else (removed,)
+        return diagnose_by_core(records[:1], records[1:], lacking=lacking).as_json()
 
     return identifier, _timed(answer)
 

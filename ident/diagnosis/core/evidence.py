@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -34,15 +35,17 @@ class Block:
 
     Attributes:
         hypothesis: its number among all.
-        number: its place among the numbers of the family.
+        number: of the family, or length of the function.
         place: among all columns of the design.
         factor: (K, R) of the prior of the columns.
+        weight: log of the prior mass that it stands for.
     """
 
     hypothesis: int
-    number: int
+    number: float
     place: slice
     factor: Array
+    weight: float
 
 
 @dataclass(frozen=True)
@@ -61,17 +64,19 @@ class Table:
         blocks: (G,) of its numbers.
         scales: (S,) tried.
         logs: (G, S) against its absence.
+        weights: (G,) log of the prior mass of each number.
         total: of it, all of them integrated.
     """
 
     blocks: tuple[int, ...]
     scales: Array
     logs: Array
+    weights: Array
 
     @property
     def total(self) -> float:
         """Log evidence, numbers and scale integrated."""
-        return float(logsumexp(self.logs) - math.log(self.logs.size))
+        return float(logsumexp(self.logs + self.weights[:, None]) - math.log(len(self.scales)))
 
     @property
     def best(self) -> tuple[Member, float]:
@@ -100,34 +105,48 @@ class Design:
         self.width = self.plant[0].shape[1]
         self.following = [one.rows(following(one)) for one in observations]
         self.targets = [one.target for one in observations]
-        pieces: list[list[Array]] = []
-        blocks: list[Block] = []
-        end = 0
+        self.count = sum(len(one) for one in observations)
+        self.effort = math.sqrt(sum(float(np.sum(one.rows(one.effort) ** 2)) for one in observations) / self.count)
+        self.columns = [np.zeros((len(one), 0)) for one in observations]
+        self.sizes = np.zeros(0)
+        self.blocks: tuple[Block, ...] = ()
         for index, hypothesis in enumerate(hypotheses):
-            numbers = hypothesis.numbers[:1] if hypothesis.free else hypothesis.numbers
-            for number, value in enumerate(numbers):
-                rows = [one.rows(hypothesis.series(one, float(value))) for one in observations]
-                pieces.append(rows)
-                place = slice(end, end + rows[0].shape[1])
-                if hypothesis.free:
-                    blocks += [Block(index, n, place, factor) for n, factor in enumerate(hypothesis.factors)]
+            weight = -math.log(len(hypothesis.numbers))
+            for number, value in enumerate(hypothesis.numbers.tolist()):
+                if hypothesis.free and number:
+                    place, factor = self.blocks[-1].place, hypothesis.factors[number]
+                    self.blocks += (Block(index, value, place, factor, weight),)
                 else:
-                    blocks.append(Block(index, number, place, np.eye(rows[0].shape[1])))
-                end = place.stop
-        self.columns = [np.hstack([rows[record] for rows in pieces]) for record in range(len(observations))]
-        squares = sum(np.sum(part**2, axis=0) for part in self.columns)
-        count = sum(len(one) for one in observations)
-        self.sizes = np.sqrt(squares / count)
-        self.sizes[self.sizes == 0] = 1.0
-        for block in blocks:
+                    self._append(index, value, weight)
+        for block in self.blocks:
             if hypotheses[block.hypothesis].free:
-                # A function has one unit: what its own prior makes of the rows, of unit rms.
-                prior = self.sizes[block.place] @ (block.factor**2) @ self.sizes[block.place]
-                self.sizes[block.place] = max(math.sqrt(float(prior)), np.finfo(float).tiny)
-        self.columns = [part / self.sizes for part in self.columns]
-        self.blocks = tuple(blocks)
-        self.effort = math.sqrt(sum(float(one.rows(one.effort) @ one.rows(one.effort)) for one in observations) / count)
-        self.count = count
+                self._normalise(block)
+
+    def _append(self, index: int, value: float, weight: float) -> None:
+        """Columns of a hypothesis at one more number."""
+        hypothesis = self.hypotheses[index]
+        rows = [one.rows(hypothesis.series(one, value)) for one in self.observations]
+        sizes = np.sqrt(sum(np.sum(part**2, axis=0) for part in rows) / self.count)
+        sizes[sizes == 0] = 1.0
+        place = slice(len(self.sizes), len(self.sizes) + len(sizes))
+        self.columns = [np.hstack([part, more / sizes]) for part, more in zip(self.columns, rows, strict=True)]
+        self.sizes = np.append(self.sizes, sizes)
+        factor = hypothesis.factors[0] if hypothesis.free else np.eye(len(sizes))
+        self.blocks += (Block(index, value, place, factor, weight),)
+
+    def _normalise(self, block: Block) -> None:
+        """A function has one unit: that in which what its own prior makes of the rows has unit rms."""
+        raw = [part[:, block.place] * self.sizes[block.place] for part in self.columns]
+        prior = sum(float(np.sum((part @ block.factor) ** 2)) for part in raw) / self.count
+        self.sizes[block.place] = max(math.sqrt(prior), np.finfo(float).tiny)
+        for part, whole in zip(self.columns, raw, strict=True):
+            part[:, block.place] = whole / self.sizes[block.place]
+
+    def with_number(self, index: int, value: float, weight: float) -> Design:
+        """The same, one more number of a hypothesis being tried, of so much prior mass."""
+        found = copy(self)
+        found._append(index, value, weight)
+        return found
 
     def of(self, hypothesis: int) -> tuple[int, ...]:
         """Blocks of a hypothesis."""
@@ -224,13 +243,29 @@ class Evidence:
         for row, index in enumerate(own):
             block = self.design.blocks[index]
             inner = block.factor.T @ products[block.place, block.place] @ block.factor
-            powers, turn = np.linalg.eigh(inner)
-            amplitudes = turn.T @ (block.factor.T @ products[block.place, -1])
-            powers = np.maximum(powers, 0.0)
-            squares = self.scales[:, None] ** 2
-            gains = squares / (1 + squares * powers)
-            logs[row] = 0.5 * np.sum(gains * amplitudes**2 - np.log1p(squares * powers), axis=1)
-        return Table(own, self.scales, logs)
+            logs[row] = self._logs(inner, block.factor.T @ products[block.place, -1])
+        return Table(own, self.scales, logs, np.array([self.design.blocks[index].weight for index in own]))
+
+    def trial(self, columns: Sequence[Array], members: Mapping[int, Member]) -> float:
+        """Largest log evidence over the scales of columns (n, k) of every record, beside members."""
+        basis, _ = self._plant
+        pieces = zip(self.whiteners, columns, strict=True)
+        white = np.vstack([whitener.white(part) for whitener, part in pieces])
+        rest = self.white[:, self.design.width :]
+        beside = np.column_stack([rest[:, :-1] @ self._stacked(members), white, rest[:, -1]])
+        beside = beside - basis @ (basis.T @ beside)
+        products, width = beside.T @ beside, beside.shape[1] - white.shape[1] - 1
+        inner = np.eye(width) + products[:width, :width]
+        products = products - products[:, :width] @ linalg.solve(inner, products[:width], assume_a="pos")
+        return float(np.max(self._logs(products[width:-1, width:-1], products[width:-1, -1])))
+
+    def _logs(self, inner: Array, amplitude: Array) -> Array:
+        """(S,) log evidence by scale, of columns of unit prior with products (R, R) and (R,) with the target."""
+        powers, turn = np.linalg.eigh(inner)
+        amplitudes, powers = turn.T @ amplitude, np.maximum(powers, 0.0)
+        squares = self.scales[:, None] ** 2
+        gains = squares / (1 + squares * powers)
+        return np.asarray(0.5 * np.sum(gains * amplitudes**2 - np.log1p(squares * powers), axis=1))
 
     def plant_parameters(self, members: Mapping[int, Member]) -> tuple[Array, Array]:
         """Mean (p,) and covariance (p, p) of the plant's parameters, members integrated."""

@@ -28,6 +28,10 @@ LENGTHS: Final = 6
 """Tried between that and the range itself, every factor as likely."""
 
 
+LEAST: Final = 1e-6
+"""Share of the power of a function that a column must have: less changes no row."""
+
+
 @dataclass(frozen=True)
 class Function:
     """f(variable) times partner.
@@ -79,17 +83,17 @@ def waves(function: Function, observations: Sequence[Observation]) -> Waves:
     return Waves(function, min(float(x.min()) for x in arguments), max(float(x.max()) for x in arguments))
 
 
-def process_factors(basis: Waves) -> tuple[Array, tuple[Array, ...]]:
-    """Lengths over the range, and the diagonal factor (K, K) of the prior of each, of unit variance."""
-    del basis
+def process_factors() -> tuple[Array, tuple[Array, ...]]:
+    """Lengths over the range, and the factor (K, R) of the prior of each, of unit variance."""
     lengths = np.geomspace(SHORTEST, 1.0, LENGTHS)
-    waves_of = np.pi / BEYOND * np.arange(WAVES + 1)
-    factors = []
-    for length in lengths:
-        power = np.exp(-0.5 * (waves_of * length) ** 2)
-        power[0] *= 0.5
-        factors.append(np.diag(np.sqrt(power / power[: WAVES + 1].sum() * 2)))
-    return lengths, tuple(factors)
+    angular = np.pi / BEYOND * np.arange(WAVES + 1)
+    return lengths, tuple(_factor(np.exp(-0.5 * (angular * length) ** 2)) for length in lengths)
+
+
+def _factor(power: Array) -> Array:
+    """(K, R) of independent columns of some power (K,), without those that have none."""
+    share = power / power.sum()
+    return np.diag(np.sqrt(share))[:, share > LEAST]
 
 
 TAPS: Final = 20
@@ -108,7 +112,7 @@ def filter_factors() -> tuple[Array, tuple[Array, ...]]:
     memories = np.geomspace(2 / TAPS, 1.0, LENGTHS)
     distance = np.abs(np.arange(-TAPS, TAPS + 1)) / TAPS
     powers = [np.exp(-0.5 * (distance / memory) ** 2) for memory in memories]
-    return memories, tuple(np.diag(np.sqrt(power / power.sum())) for power in powers)
+    return memories, tuple(map(_factor, powers))
 
 
 FILTER: Final = Function(Variable.LOAD_SECOND_RATE, Partner.NOTHING, lambda one: one.effort_rate)

@@ -6,6 +6,7 @@ show. A free function is a Gaussian process of one variable, whose length stands
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -76,7 +77,7 @@ def hypotheses(observations: Observations, lacking: Collection[str] = ()) -> tup
 
 def _free(function: Function, observations: Observations) -> Hypothesis:
     basis = waves(function, observations)
-    lengths, factors = process_factors(basis)
+    lengths, factors = process_factors()
     return Hypothesis("law", lengths, lambda one, _: basis.columns(one), factors, function)
 
 
@@ -147,9 +148,10 @@ def _elasticity(observations: Observations) -> Hypothesis:
         return one.values[MASS] * spring_response(force, resonance, one.interval)[:, None]
 
     band = observations[0].filter.bandwidth
-    near = _between(band, 10 * band)
-    finer = np.geomspace(band, 10 * band, 2 * len(near))
-    return Hypothesis(EffectName.ELASTICITY, np.append(finer, RIGID * band), series)
+    # A resonance is as wide as its damping: from beside it, nothing leads there.
+    count = round(math.log(RIGID) / 2 / (2 * DAMPING))
+    resonances = np.geomspace(band, math.sqrt(RIGID) * band, count)
+    return Hypothesis(EffectName.ELASTICITY, np.append(resonances, RIGID * band), series)
 
 
 def spring_response(force: Array, resonance: float, sample_time: float) -> Array:

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import optimize
 
 from ident.diagnosis.core.evidence import Design, Evidence, Member, Table
 from ident.diagnosis.core.noise import NONE, POWERS, Colours, Drift, Rows, Whitener, drifts, fit_whitener
@@ -18,6 +19,9 @@ Array = NDArray[np.float64]
 
 SWEEPS: Final = 4
 """Times that the numbers of all members are chosen anew, each beside the others."""
+
+NEAR: Final = 1.0
+"""Log evidence that neighbouring numbers may differ by: more, and the largest is looked for between them."""
 
 MOST: Final = 4
 """Members of a set."""
@@ -82,6 +86,11 @@ class Search:
             state = further
         return state
 
+    @staticmethod
+    def led(state: State) -> State:
+        """The same, the effort following by a filter and not late."""
+        return State(state.members, Evidence(state.evidence.design, state.evidence.whiteners, led=True))
+
     def posterior(self, state: State) -> float:
         """Log of it, but for a constant."""
         return state.log_evidence - self.price * len(state.members)
@@ -119,23 +128,22 @@ class Search:
         """
         key = frozenset(members)
         if key not in self._kept:
-            found, evidence = dict(members), None if before is None else before.evidence
-            for _ in range(SWEEPS if evidence is not None else 0):
-                assert evidence is not None
-                turned = {index: State(found, evidence).table(index).best[0] for index in found}
-                if turned == found:
-                    break
-                found = turned
-            self._kept[key] = State(found, Evidence(self.design, self._whiteners(found, before)))
+            if before is None:
+                self._kept[key] = State(members, Evidence(self.design, self._whiteners(self.design, members, None)))
+            else:
+                settled = refined(_settled(State(members, before.evidence)))
+                design = settled.evidence.design
+                whiteners = self._whiteners(design, settled.members, before)
+                self._kept[key] = _settled(State(settled.members, Evidence(design, whiteners)))
         return self._kept[key]
 
-    def _whiteners(self, members: Mapping[int, Member], before: State | None) -> list[Whitener]:
+    def _whiteners(self, design: Design, members: Mapping[int, Member], before: State | None) -> list[Whitener]:
         found = []
-        for record, (observation, colours) in enumerate(zip(self.design.observations, self._colours, strict=True)):
-            blocks = [(self.design.blocks[one.block], one.scale) for one in members.values()]
-            columns = [self.design.columns[record][:, block.place] @ (scale * block.factor) for block, scale in blocks]
+        for record, (observation, colours) in enumerate(zip(design.observations, self._colours, strict=True)):
+            blocks = [(design.blocks[one.block], one.scale) for one in members.values()]
+            columns = [design.columns[record][:, block.place] @ (scale * block.factor) for block, scale in blocks]
             beside = np.hstack([np.zeros((len(observation), 0)), *columns])
-            rows = Rows(colours, self.design.plant[record], observation.target, beside)
+            rows = Rows(colours, design.plant[record], observation.target, beside)
             if before is None:
                 left = self._left(rows)
                 found.append(fit_whitener(rows, drifts(observation), float(left @ left) / len(left)))
@@ -150,6 +158,54 @@ class Search:
         size = np.linalg.norm(rows.design, axis=0)
         size[size == 0] = 1.0
         return rows.target - rows.design @ (np.linalg.lstsq(rows.design / size, rows.target, rcond=1e-7)[0] / size)
+
+
+def _settled(state: State) -> State:
+    """With the numbers of every member chosen anew, each beside the others."""
+    for _ in range(SWEEPS):
+        turned = {index: state.table(index).best[0] for index in state.members}
+        if turned == state.members:
+            break
+        state = State(turned, state.evidence)
+    return state
+
+
+def refined(state: State) -> State:
+    """With the number of every family between those of its grid, where that is coarse."""
+    for index in state.members:
+        state = _refined(state, index)
+    return state
+
+
+def _refined(state: State, index: int) -> State:
+    evidence, hypothesis = state.evidence, state.evidence.design.hypotheses[index]
+    if hypothesis.free or len(hypothesis.numbers) < 2:
+        return state
+    table = state.table(index)
+    highest = table.logs.max(axis=1)
+    numbers = np.log([evidence.design.blocks[block].number for block in table.blocks])
+    order = np.argsort(numbers)
+    best = int(np.flatnonzero(order == np.argmax(highest))[0])
+    around = order[max(best - 1, 0) : best + 2]
+    if len(around) < 3 or highest[order[best]] - highest[around].min() < NEAR:
+        return state
+    others = {i: member for i, member in state.members.items() if i != index}
+
+    def value(number: float) -> float:
+        rows = [one.rows(hypothesis.series(one, math.exp(number))) for one in evidence.design.observations]
+        size = math.sqrt(sum(float(np.sum(part**2)) for part in rows) / rows[0].shape[1] / evidence.design.count)
+        return -evidence.trial([part / size for part in rows], others)
+
+    low, high = float(numbers[around[0]]), float(numbers[around[-1]])
+    found = optimize.minimize_scalar(value, bounds=(low, high), method="bounded", options={"xatol": (high - low) / 200})
+    step = (high - low) / 40
+    bend = (value(found.x - step) + value(found.x + step) - 2 * found.fun) / step**2
+    width = math.sqrt(2 * math.pi / max(bend, 1.0 / (high - low) ** 2))
+    weight = math.log(min(width, (high - low) / 2) / float(np.ptp(numbers)))
+    design = evidence.design.with_number(index, math.exp(found.x), weight)
+    whiteners = evidence.whiteners
+    members = {**state.members, index: Member(len(design.blocks) - 1, state.members[index].scale)}
+    return State(members, Evidence(design, whiteners, evidence.led))
 
 
 def _nearby(drift: Drift) -> list[Drift]:
