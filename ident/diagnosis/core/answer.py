@@ -31,6 +31,9 @@ Array = NDArray[np.float64]
 CREDIBLE: Final = 0.95
 """Probability that the names of a set have together."""
 
+EXACT: Final = 0.01
+"""Share of the held-out gap that a member must close beside others, whose columns are exact to about as much."""
+
 PLACE: Final = "axis"
 
 
@@ -108,7 +111,8 @@ def diagnose_by_core(
     late = _lag_slot(lag)
     led = late is not None and late.name == EffectName.TORQUE_FILTER
     found = fitted(state, len(fit), kind, led=led, lag=lag.beyond if late is not None else 0.0)
-    effects = [_named(tried[index], slot, found, index) for index, slot in slots.items()]
+    there = {index: slot for index, slot in slots.items() if found.closed[index] > EXACT or len(slots) == 1}
+    effects = [_named(tried[index], slot, found, index) for index, slot in there.items()]
     if late is not None:
         effects.append(_late(late, lag, found))
     effects.sort(key=lambda effect: -effect.probability)
@@ -156,8 +160,7 @@ def _lag(search: Search, state: State, price: float, lacking: Collection[str]) -
         odds[EffectName.TORQUE_FILTER] = late - RARER + search.led(state).log_evidence - state.log_evidence
     filters = [i for i, each in enumerate(search.design.hypotheses) if each.function is FILTER]
     if filters and filters[0] not in state.members:
-        products = state.evidence.beside(state.members)
-        odds[LAW] = late + state.evidence.table(filters[0], products).total
+        odds[LAW] = late + state.evidence.table(filters[0], state.members).total
     return Lag(value, std, widest, odds)
 
 

@@ -199,15 +199,24 @@ class Evidence:
         triangle = np.abs(np.diag(self._plant[1]))
         return -0.5 * float(self._products[-1, -1]) - self._volume - float(np.sum(np.log(triangle)))
 
-    def beside(self, members: Mapping[int, Member]) -> Array:
-        """Products (K + 1, K + 1) of all columns and the target, members integrated, by hypothesis."""
+    def beside(self, members: Mapping[int, Member], columns: Sequence[int] | None = None) -> Array:
+        """Products of columns and, last, the target, members integrated.
+
+        Args:
+            members: by hypothesis.
+            columns: among all; None: all of them.
+        """
         found = self._products
+        chosen = np.arange(len(found)) if columns is None else np.append(columns, len(found) - 1)
+        part = found[np.ix_(chosen, chosen)]
         if not members:
-            return found
+            return part
         own = self._stacked(members)
-        inner = np.eye(own.shape[1]) + own.T @ found[:-1, :-1] @ own
-        across = found[:, :-1] @ own
-        return np.asarray(found - across @ linalg.solve(inner, across.T, assume_a="pos"))
+        rows = np.flatnonzero(own.any(axis=1))
+        own = own[rows]
+        inner = np.eye(own.shape[1]) + own.T @ found[np.ix_(rows, rows)] @ own
+        across = found[np.ix_(chosen, rows)] @ own
+        return np.asarray(part - across @ linalg.solve(inner, across.T, assume_a="pos"))
 
     def _stacked(self, members: Mapping[int, Member]) -> Array:
         """(K, R) factors of all members beside each other."""
@@ -221,30 +230,48 @@ class Evidence:
 
     def log_likelihood(self, members: Mapping[int, Member]) -> float:
         """Of the target with members of these numbers, against none."""
-        found = self._products
         if not members:
             return 0.0
         own = self._stacked(members)
-        inner = np.eye(own.shape[1]) + own.T @ found[:-1, :-1] @ own
-        amplitude = own.T @ found[:-1, -1]
+        rows = np.flatnonzero(own.any(axis=1))
+        own = own[rows]
+        inner = np.eye(own.shape[1]) + own.T @ self._products[np.ix_(rows, rows)] @ own
+        amplitude = own.T @ self._products[rows, -1]
         factor = linalg.cho_factor(inner)
         gained = 0.5 * float(amplitude @ linalg.cho_solve(factor, amplitude))
         return gained - float(np.sum(np.log(np.diag(factor[0]))))
 
-    def table(self, hypothesis: int, products: Array) -> Table:
-        """Log evidence of a hypothesis over its numbers and scales.
+    def means(self, members: Mapping[int, Member]) -> dict[int, Array]:
+        """Coefficients (K,) of the columns of every member."""
+        if not members:
+            return {}
+        own = self._stacked(members)
+        inner = np.eye(own.shape[1]) + own.T @ self._products[:-1, :-1] @ own
+        mean = own @ linalg.solve(inner, own.T @ self._products[:-1, -1], assume_a="pos")
+        places = {index: self.design.blocks[one.block].place for index, one in members.items()}
+        return {index: mean[place] / self.design.sizes[place] for index, place in places.items()}
 
-        Args:
-            hypothesis: its number.
-            products: of `beside`.
-        """
-        own = self.design.of(hypothesis)
+    def table(self, hypothesis: int, members: Mapping[int, Member]) -> Table:
+        """Log evidence of a hypothesis over its numbers and scales, beside members."""
+        design = self.design
+        own = design.of(hypothesis)
+        columns = np.unique(np.concatenate([np.arange(len(design.sizes))[design.blocks[i].place] for i in own]))
+        products = self.beside(members, columns)
         logs = np.empty((len(own), len(self.scales)))
         for row, index in enumerate(own):
-            block = self.design.blocks[index]
-            inner = block.factor.T @ products[block.place, block.place] @ block.factor
-            logs[row] = self._logs(inner, block.factor.T @ products[block.place, -1])
-        return Table(own, self.scales, logs, np.array([self.design.blocks[index].weight for index in own]))
+            block = design.blocks[index]
+            at = np.searchsorted(columns, np.arange(block.place.start, block.place.stop))
+            if len(at) == 1:
+                logs[row] = self._log(products[at[0], at[0]], products[at[0], -1])
+            else:
+                inner = block.factor.T @ products[np.ix_(at, at)] @ block.factor
+                logs[row] = self._logs(inner, block.factor.T @ products[at, -1])
+        return Table(own, self.scales, logs, np.array([design.blocks[index].weight for index in own]))
+
+    def _log(self, power: float, amplitude: float) -> Array:
+        """(S,) log evidence by scale, of one column of unit prior."""
+        squares = self.scales**2
+        return np.asarray(0.5 * (squares * amplitude**2 / (1 + squares * power) - np.log1p(squares * max(power, 0.0))))
 
     def trial(self, columns: Sequence[Array], members: Mapping[int, Member]) -> float:
         """Largest log evidence over the scales of columns (n, k) of every record, beside members."""
@@ -270,17 +297,11 @@ class Evidence:
     def plant_parameters(self, members: Mapping[int, Member]) -> tuple[Array, Array]:
         """Mean (p,) and covariance (p, p) of the plant's parameters, members integrated."""
         width = self.design.width
-        whole = self.white.T @ self.white
-        own = self._whole(members)
-        inner = np.eye(own.shape[1]) + own.T @ whole @ own
-        across = whole @ own
-        left = whole - across @ linalg.solve(inner, across.T, assume_a="pos")
+        known = np.column_stack([self.white[:, :width], self.white[:, -1]])
+        own = self.white[:, width:-1] @ self._stacked(members)
+        inner = np.eye(own.shape[1]) + own.T @ own
+        across = known.T @ own
+        left = known.T @ known - across @ linalg.solve(inner, across.T, assume_a="pos")
         size = np.sqrt(np.diag(left)[:width])
         covariance = np.linalg.inv(left[:width, :width] / np.outer(size, size)) / np.outer(size, size)
         return covariance @ left[:width, -1], covariance
-
-    def _whole(self, members: Mapping[int, Member]) -> Array:
-        """Factors of members among all white columns: of the plant, of hypotheses, the target."""
-        own = self._stacked(members)
-        before, behind = np.zeros((self.design.width, own.shape[1])), np.zeros((1, own.shape[1]))
-        return np.vstack([before, own, behind])

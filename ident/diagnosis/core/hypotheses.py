@@ -37,7 +37,7 @@ EVERY: Final = 1.2
 RIGID: Final = 100.0
 """Resonance over the bandwidth, of a spring that shows as a compliance alone: it adds a ten-thousandth else."""
 
-DAMPING: Final = 0.02
+DAMPING: Final = 0.03
 """Of what is behind a spring, over the critical damping: what bolted steel has. Less would let the noise of a position,
 and the unknown motion of the load before the record, ring on in what is reckoned from it."""
 
@@ -52,6 +52,8 @@ class Hypothesis:
         series: observation and number -> (N, k) unfiltered columns.
         factors: (K, R) of the prior covariance of the columns by number; empty: the columns are independent.
         function: of which it is one, for a law.
+        response: angular frequencies (F,) and number -> what a coefficient of one adds to the inertia, over it: the
+            noise of the acceleration is amplified by as much.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Hypothesis:
     series: Callable[[Observation, float], Array]
     factors: tuple[Array, ...] = ()
     function: Function | None = None
+    response: Callable[[Array, float], NDArray[np.complex128]] | None = None
 
     @property
     def free(self) -> bool:
@@ -145,23 +148,27 @@ def _ripple(observations: Observations) -> Hypothesis:
 def _elasticity(observations: Observations) -> Hypothesis:
     def series(one: Observation, resonance: float) -> Array:
         force = one.values[MASS] * one.acceleration
-        return one.values[MASS] * spring_response(force, resonance, one.interval)[:, None]
+        return one.values[MASS] * answered(force, one.interval, lambda w: compliant(w, resonance))[:, None]
+
+    def response(angular: Array, resonance: float) -> NDArray[np.complex128]:
+        return observations[0].values[MASS] * compliant(angular, resonance)
 
     band = observations[0].filter.bandwidth
     # A resonance is as wide as its damping: from beside it, nothing leads there.
     count = round(math.log(RIGID) / 2 / (2 * DAMPING))
-    resonances = np.geomspace(band, math.sqrt(RIGID) * band, count)
-    return Hypothesis(EffectName.ELASTICITY, np.append(resonances, RIGID * band), series)
+    resonances = np.append(np.geomspace(band / 2, math.sqrt(RIGID) / 2 * band, count), RIGID * band)
+    return Hypothesis(EffectName.ELASTICITY, resonances, series, response=response)
 
 
-def spring_response(force: Array, resonance: float, sample_time: float) -> Array:
-    """What a compliance of one adds to a force (M,) behind it, the load resonating at `resonance` [rad/s]."""
+def compliant(angular: Array, resonance: float) -> NDArray[np.complex128]:
+    """What a compliance of one adds to a force on what is behind it, at frequencies (F,), in its unit over the mass.
 
-    def response(angular: Array) -> Array:
-        share = angular / resonance
-        return np.asarray(angular**2 / (1 - share**2 + 2j * DAMPING * share))
-
-    return answered(force, sample_time, response)
+    Args:
+        angular: [rad/s].
+        resonance: of the load, the drive held [rad/s].
+    """
+    share = angular / resonance
+    return np.asarray(angular**2 / (1 - share**2 + 2j * DAMPING * share), dtype=np.complex128)
 
 
 def _centred(one: Observation) -> Array:

@@ -7,7 +7,8 @@ that colour is no free function; a drift of some corner frequency has whatever p
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Final
 
@@ -54,11 +55,19 @@ class Colours:
         self._frequency = np.pi * np.arange(len(gain)) / (len(gain) * observation.sample_time)
         self._gain, self._lags = gain, np.abs(np.subtract.outer(observation.samples, observation.samples))
         effort = self._autocovariance(np.ones_like(gain))
-        encoder = self._autocovariance((observation.values[MASS] * self._frequency**2) ** 2)
         unsure = np.column_stack([observation.unsure, _held(observation)])
         self._effort = effort[self._lags] / effort[0] + JITTER * np.eye(len(observation))
         self._kept: dict[float, Array] = {}
-        self._known = observation.encoder**2 * encoder[self._lags] + unsure @ unsure.T
+        self._encoder = (observation.encoder * observation.values[MASS] * self._frequency**2) ** 2
+        self._unsure = unsure @ unsure.T
+        self._known = self._autocovariance(self._encoder)[self._lags] + self._unsure
+
+    def amplified(self, response: Callable[[Array], NDArray[np.complex128]]) -> Colours:
+        """The same, the noise of the encoder amplified by one and a response at frequencies (F,) [rad/s]."""
+        found = copy(self)
+        more = self._encoder * np.abs(1 + response(self._frequency)) ** 2
+        found._known = self._autocovariance(more)[self._lags] + self._unsure
+        return found
 
     def covariance(self, drift: Drift, level: float) -> Array:
         """(n, n) of the rows, over the power `level` of the effort's noise in a row."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -47,18 +47,19 @@ class State:
 
     def table(self, hypothesis: int) -> Table:
         """Evidence of a hypothesis beside the other members."""
-        return self.evidence.table(hypothesis, self._beside(hypothesis))
+        return self.evidence.table(hypothesis, self.without(hypothesis))
 
-    def _beside(self, hypothesis: int) -> Array:
-        return self.evidence.beside({index: one for index, one in self.members.items() if index != hypothesis})
+    def without(self, hypothesis: int) -> dict[int, Member]:
+        """The other members."""
+        return {index: one for index, one in self.members.items() if index != hypothesis}
 
     def slot(self, hypothesis: int) -> dict[int, Table]:
         """Evidence of everything that may stand in the place of a member."""
-        products = self._beside(hypothesis)
+        others = self.without(hypothesis)
         return {
-            index: self.evidence.table(index, products)
+            index: self.evidence.table(index, others)
             for index in range(len(self.evidence.design.hypotheses))
-            if index == hypothesis or index not in self.members
+            if index not in others
         }
 
 
@@ -96,9 +97,8 @@ class Search:
         return state.log_evidence - self.price * len(state.members)
 
     def _expanded(self, state: State) -> Sequence[State]:
-        products = state.evidence.beside(state.members)
         tables = {
-            index: state.evidence.table(index, products)
+            index: state.evidence.table(index, state.members)
             for index in range(len(self.design.hypotheses))
             if index not in state.members
         }
@@ -111,7 +111,7 @@ class Search:
         """Without members that the others make needless."""
         while len(state.members) > 1:
             fewer = max(
-                (self.state({i: m for i, m in state.members.items() if i != index}, state) for index in state.members),
+                (self.state(state.without(index), state) for index in state.members),
                 key=self.posterior,
             )
             if self.posterior(fewer) < self.posterior(state):
@@ -133,14 +133,20 @@ class Search:
             else:
                 settled = refined(_settled(State(members, before.evidence)))
                 design = settled.evidence.design
-                whiteners = self._whiteners(design, settled.members, before)
+                whiteners = self._whiteners(design, settled.members, settled)
                 self._kept[key] = _settled(State(settled.members, Evidence(design, whiteners)))
         return self._kept[key]
 
     def _whiteners(self, design: Design, members: Mapping[int, Member], before: State | None) -> list[Whitener]:
         found = []
+        means = {} if before is None else before.evidence.means(members)
         for record, (observation, colours) in enumerate(zip(design.observations, self._colours, strict=True)):
             blocks = [(design.blocks[one.block], one.scale) for one in members.values()]
+            for index, one in members.items():
+                response = design.hypotheses[index].response
+                if response is not None:
+                    number, mean = design.blocks[one.block].number, float(means[index][0])
+                    colours = colours.amplified(partial(_scaled, response, number, mean))
             columns = [design.columns[record][:, block.place] @ (scale * block.factor) for block, scale in blocks]
             beside = np.hstack([np.zeros((len(observation), 0)), *columns])
             rows = Rows(colours, design.plant[record], observation.target, beside)
@@ -189,7 +195,7 @@ def _refined(state: State, index: int) -> State:
     around = order[max(best - 1, 0) : best + 2]
     if len(around) < 3 or highest[order[best]] - highest[around].min() < NEAR:
         return state
-    others = {i: member for i, member in state.members.items() if i != index}
+    others = state.without(index)
 
     def value(number: float) -> float:
         rows = [one.rows(hypothesis.series(one, math.exp(number))) for one in evidence.design.observations]
@@ -206,6 +212,12 @@ def _refined(state: State, index: int) -> State:
     whiteners = evidence.whiteners
     members = {**state.members, index: Member(len(design.blocks) - 1, state.members[index].scale)}
     return State(members, Evidence(design, whiteners, evidence.led))
+
+
+def _scaled(
+    response: Callable[[Array, float], NDArray[np.complex128]], number: float, coefficient: float, angular: Array
+) -> NDArray[np.complex128]:
+    return coefficient * response(angular, number)
 
 
 def _nearby(drift: Drift) -> list[Drift]:
