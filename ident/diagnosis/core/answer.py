@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from ident.diagnosis.core.evidence import Design, Table
-from ident.diagnosis.core.fit import Fit, fitted
+from ident.diagnosis.core.fit import Fit, fitted, temperature
 from ident.diagnosis.core.functions import FILTER
 from ident.diagnosis.core.hypotheses import Hypothesis, hypotheses
 from ident.diagnosis.core.observations import Observation, observe
@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 
 CREDIBLE: Final = 0.95
 """Probability that the names of a set have together."""
+
+DOUBTED: Final = 0.5
+"""Probability of nothing in its place from which a member is none."""
 
 EXACT: Final = 0.01
 """Share of the held-out gap that a member must close beside others, whose columns are exact to about as much."""
@@ -106,12 +109,15 @@ def diagnose_by_core(
     price = price_of(len(tried) + 2)
     search = Search(design, price)
     state = search.run()
-    slots = {index: _slot(state, index, price) for index in state.members}
-    lag = _lag(search, state, price, lacking)
+    temper = temperature(state, len(fit))
+    tempered = state.tempered(temper)
+    slots = {index: _slot(tempered, index, price) for index in state.members}
+    slots = {index: slot for index, slot in slots.items() if slot.odds[""] < DOUBTED}
+    lag = _lag(search, tempered, price, lacking)
     late = _lag_slot(lag)
     led = late is not None and late.name == EffectName.TORQUE_FILTER
-    found = fitted(state, len(fit), kind, led=led, lag=lag.beyond if late is not None else 0.0)
-    there = {index: slot for index, slot in slots.items() if found.closed[index] > EXACT or len(slots) == 1}
+    found = fitted(state, len(fit), kind, led=led, lag=lag.beyond if late is not None else 0.0, temper=temper)
+    there = {index: slot for index, slot in slots.items() if not found.closed[index] < EXACT or len(slots) == 1}
     effects = [_named(tried[index], slot, found, index) for index, slot in there.items()]
     if late is not None:
         effects.append(_late(late, lag, found))

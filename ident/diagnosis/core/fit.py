@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -23,6 +24,12 @@ from ident.records.axis_record import AxisKind
 from ident.vehicle.quantities import Quantity
 
 Array = NDArray[np.float64]
+
+TRUSTED: Final = 15.0
+"""Parameters that would have to agree between the records, to say as much of the noise as it says itself."""
+
+WIDEST: Final = 1.0
+"""Deviation of the logarithm of a family's number, before the rows."""
 
 STEP: Final = 1e-4
 """Relative step of a family's number, for its derivative."""
@@ -68,14 +75,18 @@ class _Part:
         place: of its columns.
         ridge: (k,) deviation of each, before the rows; inf: any.
         turn: (K, k) from them to the columns of the design.
+        named: whether they are of a family, and not a function's.
     """
 
     place: slice
     ridge: Array
     turn: Array
+    named: bool
 
 
-def fitted(state: State, fitting: int, kind: AxisKind, *, led: bool = False, lag: float = 0.0) -> Fit:
+def fitted(
+    state: State, fitting: int, kind: AxisKind, *, led: bool = False, lag: float = 0.0, temper: float = 1.0
+) -> Fit:
     """The fit of all rows, and of the first `fitting` records alone.
 
     Args:
@@ -84,14 +95,24 @@ def fitted(state: State, fitting: int, kind: AxisKind, *, led: bool = False, lag
         kind: of the axis.
         led: whether the effort follows by a filter.
         lag: that belongs to the set, and is not what sampling does [s].
+        temper: of `temperature`.
     """
     design = state.evidence.design
-    whole = _Equations(state, range(len(design.observations)), led)
-    mean, covariance = whole.solution(state.members)
+    everything = range(len(design.observations))
+    whole = _Equations(state, everything, led)
+    mean, _ = whole.solution(state.members)
+    bends = {
+        index: bend
+        for index, member in state.members.items()
+        if (bend := _bend(design, index, member, mean[whole.parts[index].place])) is not None
+    }
+    bent = _Equations(state, everything, led, bends=bends)
+    covariance = temper * bent.solution(state.members)[1]
     parameters, laws = {}, {}
     for index, member in state.members.items():
         hypothesis, part = design.hypotheses[index], whole.parts[index]
-        a, c = mean[part.place], covariance[part.place, part.place]
+        beside = bent.parts[index].place
+        a, c = mean[part.place], covariance[beside, beside]
         if hypothesis.free:
             laws[index] = _law(hypothesis, design, member, part.turn @ a, part.turn @ c @ part.turn.T, kind)
         else:
@@ -100,10 +121,36 @@ def fitted(state: State, fitting: int, kind: AxisKind, *, led: bool = False, lag
     return Fit(parameters, laws, gap, closed)
 
 
+def temperature(state: State, fitting: int) -> float:
+    """By how much more the confirming records contradict the fit of the others than the noise lets them, at least 1.
+
+    Args:
+        state: a set.
+        fitting: number of records that are fitted.
+    """
+    count = len(state.evidence.design.observations)
+    if fitting >= count:
+        return 1.0
+    fit, confirm = (_Equations(state, part, False) for part in (range(fitting), range(fitting, count)))
+    (predicted, spread), (own, alone) = fit.solution(state.members), confirm.solution(state.members)
+    design = confirm.white[:, :-1]
+    contradicted = float(np.sum((design @ (predicted - own)) ** 2))
+    expected = float(np.sum((design @ (spread + alone)) * design))
+    freedom = fit.width + sum(part.place.stop - part.place.start for part in fit.parts.values() if part.named)
+    return max((TRUSTED + freedom * contradicted / expected) / (TRUSTED + freedom), 1.0)
+
+
 class _Equations:
     """White rows of some records: plant, members with the derivatives of their numbers, target."""
 
-    def __init__(self, state: State, records: range, led: bool, lag: float = 0.0) -> None:
+    def __init__(
+        self,
+        state: State,
+        records: range,
+        led: bool,
+        lag: float = 0.0,
+        bends: Mapping[int, Sequence[Array]] = MappingProxyType({}),
+    ) -> None:
         design = state.evidence.design
         self.width = design.width
         rows = [np.vstack([design.plant[record] for record in records])]
@@ -117,8 +164,11 @@ class _Equations:
                 columns, ridge = columns @ turn, np.ones(turn.shape[1])
             else:
                 turn, ridge = np.eye(columns.shape[1]), np.full(columns.shape[1], np.inf)
+            if index in bends:
+                columns = np.column_stack([columns, np.concatenate([bends[index][record] for record in records])])
+                ridge = np.append(ridge, WIDEST)
             rows.append(columns)
-            self.parts[index] = _Part(slice(end, end + columns.shape[1]), ridge, turn)
+            self.parts[index] = _Part(slice(end, end + columns.shape[1]), ridge, turn, not design.hypotheses[index].free)
             end += columns.shape[1]
         target = np.concatenate(
             [
@@ -161,6 +211,18 @@ class _Equations:
         return float(np.mean(rest**2))
 
 
+def _bend(design: Design, index: int, member: Member, mean: Array) -> list[Array] | None:
+    """(n,) of every record, what another number of a family would add, by its logarithm; None where it has none."""
+    hypothesis, block = design.hypotheses[index], design.blocks[member.block]
+    if hypothesis.free or len(hypothesis.numbers) < 2 or block.number == hypothesis.numbers[-1]:
+        return None
+    size, found = design.sizes[block.place], []
+    for one in design.observations:
+        low, high = (one.rows(hypothesis.series(one, block.number * (1 + side * STEP))) for side in (-1, 1))
+        found.append((high - low) / (2 * STEP) @ (mean / size))
+    return found
+
+
 def _held_out(state: State, fitting: int, led: bool, lag: float) -> tuple[Gap, dict[int, float]]:
     """Of the confirming records, by a fit of the others; of a single record, by itself."""
     count = len(state.evidence.design.observations)
@@ -173,7 +235,7 @@ def _held_out(state: State, fitting: int, led: bool, lag: float) -> tuple[Gap, d
     closed = {}
     for index in state.members:
         without = confirm.left(fit.solution({i: m for i, m in state.members.items() if i != index})[0])
-        closed[index] = (without - after) / removable if removable > 0 else 0.0
+        closed[index] = (without - after) / removable if removable > 0 else math.nan
     return Gap(math.sqrt(before), math.sqrt(after), 1.0), closed
 
 
@@ -184,22 +246,23 @@ def _unit(text: str, kind: AxisKind) -> str:
 def _quantities(
     hypothesis: Hypothesis, design: Design, member: Member, a: Array, covariance: Array, mass: float, kind: AxisKind
 ) -> dict[str, Quantity]:
-    """Parameters of a family, by the coefficients of its columns."""
+    """Parameters of a family, by the coefficients of its columns and what is known of its number."""
     block = design.blocks[member.block]
-    a = a / design.sizes[block.place]
-    std = np.sqrt(np.diag(covariance)) / design.sizes[block.place]
-    words = _WORDS[hypothesis.name]
+    a, std = a / design.sizes[block.place], np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    relative = float(std[-1]) if len(std) > len(a) else math.nan
+    std = std[: len(a)] / design.sizes[block.place]
+    values, errors = [float(a[0]), block.number], [float(std[0]), relative * block.number]
     if hypothesis.name == EffectName.ELASTICITY:
         scale = (design.observations[0].values[MASS] / mass) ** 2
-        values, errors = [a[0] * scale, block.number], [std[0] * scale, math.nan]
+        values[0], errors[0] = values[0] * scale, errors[0] * scale
     elif hypothesis.name == EffectName.TORQUE_RIPPLE:
-        values = [float(np.hypot(*a)), block.number, math.atan2(a[1], a[0])]
-        errors = [float(np.hypot(*(std * a))) / max(values[0], 1e-300), math.nan, math.nan]
-    else:
-        values, errors = [a[0], block.number], [std[0], math.nan]
+        size, both = float(np.hypot(*a)), covariance[:2, :2] / np.outer(design.sizes[block.place], design.sizes[block.place])
+        along, across = a / size, np.array([-a[1], a[0]]) / size
+        values = [size, block.number, math.atan2(a[1], a[0])]
+        errors = [math.sqrt(along @ both @ along), errors[1], math.sqrt(across @ both @ across) / size]
     return {
-        word: Quantity(float(value), _unit(unit, kind), "diagnosis", float(error))
-        for (word, unit), value, error in zip(words, values, errors, strict=False)
+        word: Quantity(value, _unit(unit, kind), "diagnosis", error)
+        for (word, unit), value, error in zip(_WORDS[hypothesis.name], values, errors, strict=False)
     }
 
 

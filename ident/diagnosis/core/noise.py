@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -116,6 +116,10 @@ class Whitener:
     def white(self, columns: Array) -> Array:
         """Columns (n, k) in units of the noise."""
         return np.asarray(linalg.solve_triangular(self.factor, columns, lower=True) / math.sqrt(self.level))
+
+    def tempered(self, temperature: float) -> Whitener:
+        """The same, everything being that many times the power."""
+        return replace(self, level=self.level * temperature)
 
 
 @dataclass(frozen=True)

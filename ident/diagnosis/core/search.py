@@ -53,6 +53,11 @@ class State:
         """The other members."""
         return {index: one for index, one in self.members.items() if index != hypothesis}
 
+    def tempered(self, temperature: float) -> State:
+        """The same, all noise being that many times the power."""
+        whiteners = [one.tempered(temperature) for one in self.evidence.whiteners]
+        return State(self.members, Evidence(self.evidence.design, whiteners))
+
     def slot(self, hypothesis: int) -> dict[int, Table]:
         """Evidence of everything that may stand in the place of a member."""
         others = self.without(hypothesis)
