@@ -90,6 +90,15 @@ class Search:
             if self.posterior(further) <= self.posterior(state):
                 break
             state = further
+        return self._named(state)
+
+    def _named(self, state: State) -> State:
+        """With names in the place of every law that they explain as well."""
+        for index in [i for i in state.members if self.design.hypotheses[i].free]:
+            instead = self.state(state.without(index), state)
+            for _ in range(INSTEAD):
+                instead = max(self._expanded(instead, named=True), key=self.posterior, default=instead)
+            state = max(state, instead, key=self.posterior)
         return state
 
     @staticmethod
@@ -101,11 +110,12 @@ class Search:
         """Log of it, but for a constant."""
         return state.log_evidence - self.price * len(state.members)
 
-    def _expanded(self, state: State) -> Sequence[State]:
+    def _expanded(self, state: State, *, named: bool = False) -> Sequence[State]:
+        """Sets with one member more, of those that promise most; or of those alone that have a name."""
         tables = {
             index: state.evidence.table(index, state.members)
-            for index in range(len(self.design.hypotheses))
-            if index not in state.members
+            for index, hypothesis in enumerate(self.design.hypotheses)
+            if index not in state.members and not (named and hypothesis.free)
         }
         most = max((table.total for table in tables.values()), default=-math.inf)
         best = [i for i, table in tables.items() if table.total > max(self.price, most) - MARGIN]
@@ -232,6 +242,9 @@ def _nearby(drift: Drift) -> list[Drift]:
     at = POWERS.index(drift.power)
     return [drift, *(replace(drift, power=power) for power in POWERS[max(at - 2, 0) : at]), NONE]
 
+
+INSTEAD: Final = 2
+"""Names that may stand for a law."""
 
 SURVIVORS: Final = 4
 """Hypotheses that are fitted exactly at every step."""
