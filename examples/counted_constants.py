@@ -10,8 +10,8 @@ What counts, each number once wherever it stands:
 - *inline*: every other number in a statement.
 - *data*: numbers in TOML and JSON files.
 
-What does not count: 0, 1 and -1, and inline 2, -2, 0.5 and -0.5 as well; subscripts and slices; exponents; arguments that say along
-which axis, how many of something integral, or of which type; texts and documentation.
+What does not count: 0, 1 and -1, and inline 2, -2, 0.5 and -0.5 as well; subscripts and slices; exponents; arguments
+that say along which axis, or how something is laid out (`STRUCTURAL`); texts and documentation.
 """
 
 from __future__ import annotations
@@ -83,22 +83,23 @@ def _children(node: ast.AST, place: Place) -> Iterator[tuple[ast.AST, Place]]:
             yield node.value, place
         case ast.BinOp(op=ast.Pow()):
             yield node.left, place
-        case ast.Call():
-            yield node.func, place
-            yield from ((argument, place) for argument in node.args)
-            yield from ((keyword.value, place) for keyword in node.keywords if keyword.arg not in STRUCTURAL)
+        case ast.keyword(arg=name, value=value):
+            yield from [] if name in STRUCTURAL else [(value, place)]
         case ast.arguments():
             yield from ((default, Place.DEFAULT) for default in [*node.defaults, *node.kw_defaults] if default)
-        case ast.Assign() | ast.AnnAssign():
-            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            if node.value is not None:
-                yield node.value, Place.MODULE if any(map(_in_capitals, targets)) else place
+        case ast.Assign(targets=targets, value=value):
+            yield value, Place.MODULE if any(map(_in_capitals, targets)) else place
+        case ast.AnnAssign(target=target, value=ast.AST() as value):
+            yield value, Place.MODULE if _in_capitals(target) else place
         case ast.ClassDef():
-            for statement in node.body:
-                named = isinstance(statement, ast.AnnAssign) and not _in_capitals(statement.target)
-                yield statement, Place.DEFAULT if named else place
+            yield from ((statement, Place.DEFAULT if _is_field(statement) else place) for statement in node.body)
         case _:
             yield from ((child, place) for child in ast.iter_child_nodes(node))
+
+
+def _is_field(statement: ast.stmt) -> bool:
+    """Whether a statement of a class is a field of it, that may have a default."""
+    return isinstance(statement, ast.AnnAssign) and not _in_capitals(statement.target)
 
 
 def _in_capitals(target: ast.AST) -> bool:

@@ -53,6 +53,13 @@ def sprung(series: Array, resonance: float, sample_time: float) -> Array:
 def answered(
     series: Array, sample_time: float, response: Callable[[Array], NDArray[np.complexfloating[Any, Any]]]
 ) -> Array:
+    """What a filter makes of a series (N,), by its spectrum; its end is led back to its start.
+
+    Args:
+        series: (N,).
+        sample_time: [s].
+        response: of the filter, at angular frequencies (F,) [rad/s].
+    """
     length = fft.next_fast_len(len(series) + LED_BACK, real=True)
     closed = np.pad(series, (0, length - len(series)), mode="linear_ramp", end_values=series[0])
     turn = response(2 * np.pi * fft.rfftfreq(length, sample_time))

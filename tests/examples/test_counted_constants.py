@@ -26,7 +26,15 @@ def test_a_number_counts_where_it_stands(source: str, expected: list[tuple[Place
 
 @pytest.mark.parametrize(
     "source",
-    ["x = y[3:7]", "x = y**4", "x = y.sum(axis=3)", "x = 0.5 * y - 2 * z + 1", "X = True", '"""Of 0.7."""', "x = 'a 9'"],
+    [
+        "x = y[3:7]",
+        "x = y**4",
+        "x = y.sum(axis=3)",
+        "x = 0.5 * y - 2 * z + 1",
+        "X = True",
+        '"""Of 0.7."""',
+        "x = 'a 9'",
+    ],
 )
 def test_structure_is_no_constant(source: str) -> None:
     assert constants_of(source) == []

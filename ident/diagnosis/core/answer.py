@@ -8,25 +8,24 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from ident.diagnosis.core.evidence import Design, Table
+from ident.diagnosis.core.design import Design
+from ident.diagnosis.core.evidence import Member
 from ident.diagnosis.core.fit import Fit, fitted, temperature
 from ident.diagnosis.core.functions import FILTER
 from ident.diagnosis.core.hypotheses import Hypothesis, hypotheses
-from ident.diagnosis.core.observations import Observation, observe
+from ident.diagnosis.core.observations import OFFSET, observe
 from ident.diagnosis.core.search import Search, State, price_of
 from ident.diagnosis.delays import HELD, RARER
-from ident.diagnosis.diagnosis import Diagnosis, Gap, NamedEffect, Verdict
+from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Verdict
 from ident.diagnosis.findings import LAW
 from ident.diagnosis.law.answer import Alternative, LawAnswer
+from ident.diagnosis.law.dependence import Variable
 from ident.diagnosis.names import EffectName
-from ident.records.axis_record import AxisKind, AxisRecord
+from ident.records.axis_record import AxisRecord
 from ident.vehicle.quantities import Quantity
-
-Array = NDArray[np.float64]
 
 CREDIBLE: Final = 0.95
 """Probability that the names of a set have together."""
@@ -37,7 +36,16 @@ DOUBTED: Final = 0.5
 EXACT: Final = 0.01
 """Share of the held-out gap that a member must close beside others, whose columns are exact to about as much."""
 
+LATE: Final = 2
+"""Hypotheses of the lag, a delay and a filter, beside those with columns."""
+
 PLACE: Final = "axis"
+
+NOTHING: Final = ""
+"""Name of no hypothesis."""
+
+_SIZES: Final[Mapping[str, str]] = {EffectName.TIME_DELAY: "delay", EffectName.TORQUE_FILTER: "time"}
+"""Parameter of what makes an effort late."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +53,13 @@ class Slot:
     """What may stand in one place of the best set.
 
     Attributes:
-        odds: probability by name; of nothing, by the empty name.
-        first: the hypothesis with the largest evidence; None: a lag.
+        odds: probability by name, NOTHING among them.
+        first: the best hypothesis of the most probable name, with its numbers; None: a lag has none.
         variables: of the laws among them, the most probable first.
     """
 
     odds: Mapping[str, float]
-    first: int | None
+    first: tuple[int, Member] | None
     variables: tuple[str, ...]
 
     @property
@@ -62,9 +70,8 @@ class Slot:
     @property
     def names(self) -> tuple[str, ...]:
         """Names that have CREDIBLE together of what there is, the most probable first."""
-        there = {name: odds for name, odds in self.odds.items() if name}
-        order = sorted(there, key=lambda name: -there[name])
-        share = np.cumsum([there[name] for name in order]) / sum(there.values())
+        order = sorted((name for name in self.odds if name), key=lambda name: -self.odds[name])
+        share = np.cumsum([self.odds[name] for name in order]) / (1 - self.odds[NOTHING])
         return tuple(order[: int(np.searchsorted(share, CREDIBLE)) + 1])
 
 
@@ -88,6 +95,14 @@ class Lag:
         """What sampling does not explain of it [s]."""
         return math.copysign(max(abs(self.value) - self.widest, 0.0), self.value)
 
+    @property
+    def slot(self) -> Slot | None:
+        """What makes it; None where sampling does."""
+        whole = logsumexp([0.0, *self.odds.values()])
+        odds = {name: math.exp(log - whole) for name, log in self.odds.items()}
+        found = Slot({NOTHING: math.exp(-whole), **odds}, None, (Variable.LOAD_RATE,))
+        return found if found.odds[NOTHING] < DOUBTED else None
+
 
 def diagnose_by_core(
     fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord], *, lacking: Collection[str] = ()
@@ -105,104 +120,105 @@ def diagnose_by_core(
     """
     observations, kind = observe(fit, confirm)
     tried = hypotheses(observations, lacking)
-    design = Design(observations, tried)
-    price = price_of(len(tried) + 2)
-    search = Search(design, price)
+    search = Search(Design(observations, tried), price_of(len(tried) + LATE))
     state = search.run()
     temper = temperature(state, len(fit))
     tempered = state.tempered(temper)
-    slots = {index: _slot(tempered, index, price) for index in state.members}
-    slots = {index: slot for index, slot in slots.items() if slot.odds[""] < DOUBTED}
-    lag = _lag(search, tempered, price, lacking)
-    late = _lag_slot(lag)
+    slots = {index: _slot(tempered, index, search.price) for index in state.members}
+    slots = {index: slot for index, slot in slots.items() if slot.odds[NOTHING] < DOUBTED}
+    state, slots = _with_first(search, state, slots)
+    lag = _lag(tempered, search.price, lacking)
+    late = lag.slot
+    beyond = 0.0 if late is None else lag.beyond
     led = late is not None and late.name == EffectName.TORQUE_FILTER
-    found = fitted(state, len(fit), kind, led=led, lag=lag.beyond if late is not None else 0.0, temper=temper)
-    there = {index: slot for index, slot in slots.items() if not found.closed[index] < EXACT or len(slots) == 1}
-    effects = [_named(tried[index], slot, found, index) for index, slot in there.items()]
-    if late is not None:
-        effects.append(_late(late, lag, found))
+    found = fitted(state, len(fit), kind, led=led, lag=beyond, temper=temper)
+    effects = [
+        _named(tried[index], slot, found, index)
+        for index, slot in slots.items()
+        if not found.closed[index] < EXACT or len(slots) == 1
+    ]
+    effects += [] if late is None else [_late(late, lag, found)]
     effects.sort(key=lambda effect: -effect.probability)
-    verdict = Verdict.NONE
-    if effects:
-        verdict = Verdict.LAW if any(effect.name == LAW for effect in effects) else Verdict.EFFECT
-    return Diagnosis(verdict, tuple(effects), (), found.gap, (), None)
+    return Diagnosis(_verdict(effects), tuple(effects), (), found.gap, (), None)
+
+
+def _with_first(search: Search, state: State, slots: Mapping[int, Slot]) -> tuple[State, dict[int, Slot]]:
+    """The set of the most probable names, and its slots, where that is another than was found."""
+    firsts = {index: slot.first for index, slot in slots.items() if slot.first is not None}
+    members = {number: member for number, member in firsts.values()}
+    if members.keys() == state.members.keys() or len(members) < len(slots):
+        return state, dict(slots)
+    return search.state(members, state), {first[0]: slots[index] for index, first in firsts.items()}
+
+
+def _verdict(effects: Sequence[NamedEffect]) -> Verdict:
+    if not effects:
+        return Verdict.NONE
+    return Verdict.LAW if any(effect.name == LAW for effect in effects) else Verdict.EFFECT
 
 
 def _slot(state: State, index: int, price: float) -> Slot:
-    tables = state.slot(index)
-    design = state.evidence.design
+    """What may stand in the place of a member, by the evidence beside the others."""
+    tried, tables = state.evidence.design.hypotheses, state.slot(index)
     logs = {number: table.total - price for number, table in tables.items()}
     whole = logsumexp([0.0, *logs.values()])
-    odds = {"": math.exp(-whole)}
+    odds = {NOTHING: math.exp(-whole)}
     for number, log in logs.items():
-        name = design.hypotheses[number].name
-        odds[name] = odds.get(name, 0.0) + math.exp(log - whole)
-    laws = [number for number in logs if design.hypotheses[number].free]
-    laws.sort(key=lambda number: -logs[number])
-    variables = [str(design.hypotheses[number].function.variable) for number in laws if _near(logs, laws, number)]  # type: ignore[union-attr]
-    return Slot(odds, index, tuple(dict.fromkeys(variables)))
+        odds[tried[number].name] = odds.get(tried[number].name, 0.0) + math.exp(log - whole)
+    laws = {str(one.variable): logs[n] for n in logs if (one := tried[n].function) is not None}
+    laws = dict(sorted(laws.items(), key=lambda each: each[1]))
+    best = max(laws.values(), default=0.0)
+    near = [variable for variable in reversed(laws) if laws[variable] - best > math.log(1 - CREDIBLE)]
+    name = max((name for name in odds if name), key=lambda name: odds[name])
+    first = max((number for number in logs if tried[number].name == name), key=lambda number: logs[number])
+    return Slot(odds, (first, tables[first].best[0]), tuple(near))
 
 
-def _near(logs: Mapping[int, float], laws: Sequence[int], number: int) -> bool:
-    """Whether a law is among those that the records do not tell from the best one."""
-    return logs[number] - max(logs[law] for law in laws) > math.log(1 - CREDIBLE)
-
-
-def _lag(search: Search, state: State, price: float, lacking: Collection[str]) -> Lag:
+def _lag(state: State, price: float, lacking: Collection[str]) -> Lag:
     """Lag beside a set; what makes it is sampling, a delay, a filter in the drive, or another filter of the load."""
+    design = state.evidence.design
+    one = design.observations[0]
+    column = OFFSET + 1 + design.rates.index(one.sample_time)
     mean, covariance = state.evidence.plant_parameters(state.members)
-    one = state.evidence.design.observations[0]
-    value, std = one.lag + float(mean[4]), math.sqrt(float(covariance[4, 4]))
-    widest = HELD * one.sample_time
-    inside = norm.logcdf(widest, value, std) + math.log1p(-math.exp(min(norm.logcdf(-widest, value, std) - norm.logcdf(widest, value, std), -1e-12)))
-    outside = logsumexp([norm.logsf(widest, value, std), norm.logcdf(-widest, value, std)])
-    longest = 2 * math.pi / one.filter.bandwidth
-    sampled = inside - math.log(2 * widest)
-    late = outside - math.log(2 * longest) - price - sampled
+    value, std = one.lag + float(mean[column]), math.sqrt(float(covariance[column, column]))
+    widest, longest = HELD * one.sample_time, 2 * math.pi / one.filter.bandwidth
+    above, below = float(norm.logsf(widest, value, std)), float(norm.logcdf(-widest, value, std))
+    # Uniform within what sampling does, and within what such rows could show.
+    sampled = math.log(max(-math.expm1(float(np.logaddexp(above, below))), np.finfo(float).tiny)) - math.log(2 * widest)
+    late = float(np.logaddexp(above, below)) - math.log(2 * longest) - price - sampled
     odds: dict[str, float] = {}
     if EffectName.TIME_DELAY not in lacking:
         odds[EffectName.TIME_DELAY] = late
     if EffectName.TORQUE_FILTER not in lacking:
-        odds[EffectName.TORQUE_FILTER] = late - RARER + search.led(state).log_evidence - state.log_evidence
-    filters = [i for i, each in enumerate(search.design.hypotheses) if each.function is FILTER]
-    if filters and filters[0] not in state.members:
-        odds[LAW] = late + state.evidence.table(filters[0], state.members).total
+        odds[EffectName.TORQUE_FILTER] = late - RARER + state.led.log_evidence - state.log_evidence
+    free = next(index for index, each in enumerate(design.hypotheses) if each.function is FILTER)
+    if free not in state.members:
+        odds[LAW] = late + state.evidence.table(free, state.members).total
     return Lag(value, std, widest, odds)
 
 
-def _lag_slot(lag: Lag) -> Slot | None:
-    """None where sampling explains the lag."""
-    whole = logsumexp([0.0, *lag.odds.values()])
-    odds = {name: math.exp(log - whole) for name, log in lag.odds.items()}
-    if sum(odds.values()) < 0.5:
-        return None
-    return Slot({"": math.exp(-whole), **odds}, None, ("load_rate",))
-
-
 def _named(hypothesis: Hypothesis, slot: Slot, found: Fit, index: int) -> NamedEffect:
-    name = slot.name
-    law = None
-    alternatives: tuple[Alternative, ...] = ()
-    if name == LAW and hypothesis.function is not None:
+    law, alternatives = None, list[Alternative]()
+    if slot.name == LAW and hypothesis.free:
         law = found.laws[index]
-        alternatives = tuple(Alternative(None, one, PLACE) for one in slot.variables if one != law.variable)
+        alternatives = [Alternative(None, one, PLACE) for one in slot.variables if one != law.variable]
     return NamedEffect(
-        name=name,
+        name=slot.name,
         where=PLACE,
         parameters=found.parameters.get(index, {}),
-        probability=round(slot.odds[name], 2),
+        probability=round(slot.odds[slot.name], 2),
         ambiguity_set=slot.names,
         gap_closed_held_out=found.closed[index],
-        alternatives=alternatives,
+        alternatives=tuple(alternatives),
         law=law,
     )
 
 
 def _late(slot: Slot, lag: Lag, found: Fit) -> NamedEffect:
-    name = slot.name
-    word = {EffectName.TIME_DELAY: "delay", EffectName.TORQUE_FILTER: "time"}.get(EffectName(name) if name != LAW else EffectName.PAYLOAD)
-    parameters = {} if word is None else {word: Quantity(lag.value, "s", "diagnosis", lag.std)}
-    law = None
-    if name == LAW:
-        law = LawAnswer("load_rate", "", "", "dynamic", None, "", "", np.zeros((0, 3)), None, None, None)
-    return NamedEffect(name, PLACE, parameters, round(slot.odds[name], 2), slot.names, found.gap.closed, (), law)
+    law, parameters = None, {}
+    if slot.name == LAW:
+        law = LawAnswer(slot.variables[0], "", "", "dynamic", None, "", "", np.zeros((0, 3)), None, None, None)
+    else:
+        parameters = {_SIZES[slot.name]: Quantity(lag.value, "s", "diagnosis", lag.std)}
+    probability = round(slot.odds[slot.name], 2)
+    return NamedEffect(slot.name, PLACE, parameters, probability, slot.names, found.gap.closed, (), law)

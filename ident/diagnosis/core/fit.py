@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.model import AxisEffect
-from ident.diagnosis.core.evidence import Design, Member
+from ident.diagnosis.core.design import Design
+from ident.diagnosis.core.evidence import Member
 from ident.diagnosis.core.functions import FILTER, waves
 from ident.diagnosis.core.hypotheses import Hypothesis
 from ident.diagnosis.core.observations import MASS, OFFSET
@@ -168,7 +169,9 @@ class _Equations:
                 columns = np.column_stack([columns, np.concatenate([bends[index][record] for record in records])])
                 ridge = np.append(ridge, WIDEST)
             rows.append(columns)
-            self.parts[index] = _Part(slice(end, end + columns.shape[1]), ridge, turn, not design.hypotheses[index].free)
+            self.parts[index] = _Part(
+                slice(end, end + columns.shape[1]), ridge, turn, not design.hypotheses[index].free
+            )
             end += columns.shape[1]
         target = np.concatenate(
             [
@@ -181,10 +184,7 @@ class _Equations:
         stacked = np.column_stack([*rows, target])
         ends = np.cumsum([0, *(len(design.targets[record]) for record in records)])
         self.white = np.vstack(
-            [
-                state.evidence.whiteners[record].white(stacked[ends[n] : ends[n + 1]])
-                for n, record in enumerate(records)
-            ]
+            [state.evidence.whiteners[record].white(stacked[ends[n] : ends[n + 1]]) for n, record in enumerate(records)]
         )
 
     def solution(self, members: Mapping[int, Member], *, late: bool = True) -> tuple[Array, Array]:
@@ -256,7 +256,10 @@ def _quantities(
         scale = (design.observations[0].values[MASS] / mass) ** 2
         values[0], errors[0] = values[0] * scale, errors[0] * scale
     elif hypothesis.name == EffectName.TORQUE_RIPPLE:
-        size, both = float(np.hypot(*a)), covariance[:2, :2] / np.outer(design.sizes[block.place], design.sizes[block.place])
+        size, both = (
+            float(np.hypot(*a)),
+            covariance[:2, :2] / np.outer(design.sizes[block.place], design.sizes[block.place]),
+        )
         along, across = a / size, np.array([-a[1], a[0]]) / size
         values = [size, block.number, math.atan2(a[1], a[0])]
         errors = [math.sqrt(along @ both @ along), errors[1], math.sqrt(across @ both @ across) / size]

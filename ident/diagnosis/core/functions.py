@@ -97,7 +97,7 @@ def _factor(power: Array) -> Array:
 
 
 TAPS: Final = 20
-"""Rows before and behind, of a free filter of the load: its memory is as long as a cycle of a tenth of the bandwidth."""
+"""Rows before and behind, of a free filter of the load: six periods of the bandwidth."""
 
 
 def filter_taps(observation: Observation) -> Array:
@@ -127,9 +127,7 @@ FUNCTIONS: Final[Sequence[Function]] = (
     Function(Variable.RATE, Partner.NOTHING, lambda one: one.velocity),
     Function(Variable.ANGLE, Partner.NOTHING, lambda one: one.position),
     Function(Variable.ANGLE, Partner.DIRECTION, lambda one: one.position, _direction),
-    Function(
-        Variable.ANGLE, Partner.ACCELERATION, lambda one: one.position, lambda one: one.acceleration
-    ),
+    Function(Variable.ANGLE, Partner.ACCELERATION, lambda one: one.position, lambda one: one.acceleration),
     Function(Variable.TIME, Partner.NOTHING, lambda one: one.time),
     Function(Variable.TIME, Partner.DIRECTION, lambda one: one.time, _direction),
     Function(Variable.PATH_SINCE_REVERSAL, Partner.DIRECTION, lambda one: one.path, _direction),

@@ -190,11 +190,21 @@ def observe(fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord]) -> tuple[t
     reference = axis_reference(fit, None, confirm)
     found = [_observation(record, reference) for record in records]
     for _ in range(LAGS):
-        *values, lag = _estimated(found)
-        found = [
-            _shifted(one, record, lag, np.array(values)) for one, record in zip(found, records, strict=True)
-        ]
+        values, lags = _estimated(found)
+        pairs = zip(found, records, strict=True)
+        found = [_shifted(one, record, lags[record.sample_time], values) for one, record in pairs]
     return tuple(found), records[0].axes[0].kind
+
+
+def rates_of(observations: Sequence[Observation]) -> list[float]:
+    """Sample times of some records [s]: within each, a position may be read at another part of the interval."""
+    return sorted({one.sample_time for one in observations})
+
+
+def plant_columns(observation: Observation, rates: Sequence[float]) -> Array:
+    """(n, 4 + R) of the plant, and of the lag at every rate."""
+    late = [observation.late * (observation.sample_time == rate) for rate in rates]
+    return np.column_stack([observation.plant, *late])
 
 
 def _shifted(observation: Observation, record: AxisRecord, lag: float, values: Array) -> Observation:
@@ -251,12 +261,15 @@ def _encoder_noise(position: Array) -> float:
     return math.sqrt(0.5 * float(np.median(power[upper] / (2 * np.sin(np.pi * frequency[upper])) ** 4)))
 
 
-def _estimated(observations: Sequence[Observation]) -> Array:
-    """(5,) parameters of the plant and the lag that is left, by least squares beside a compliance and its rate."""
-    columns = np.vstack([np.column_stack([one.plant, one.late, one.bent]) for one in observations])
+def _estimated(observations: Sequence[Observation]) -> tuple[Array, dict[float, float]]:
+    """(4,) parameters of the plant, and the lag that is left at every rate [s], beside a compliance and its rate."""
+    rates = rates_of(observations)
+    columns = np.vstack([np.column_stack([plant_columns(one, rates), one.bent]) for one in observations])
     size = np.linalg.norm(columns, axis=0)
     target = np.concatenate([one.target for one in observations])
-    return np.asarray(np.linalg.lstsq(columns / size, target, rcond=None)[0] / size)[:5]
+    found = np.linalg.lstsq(columns / size, target, rcond=None)[0] / size
+    lags = found[OFFSET + 1 : OFFSET + 1 + len(rates)]
+    return np.asarray(found[: OFFSET + 1]), dict(zip(rates, lags.tolist(), strict=True))
 
 
 def _unsure(observation: Observation, motion: AxisMotion) -> Array:

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
-from ident.diagnosis.core.evidence import Design, Evidence, Member, Table
+from ident.diagnosis.core.design import Design
+from ident.diagnosis.core.evidence import Evidence, Member, Table
 from ident.diagnosis.core.noise import NONE, POWERS, Colours, Drift, Rows, Whitener, drifts, fit_whitener
 
 Array = NDArray[np.float64]
@@ -58,6 +59,11 @@ class State:
         whiteners = [one.tempered(temperature) for one in self.evidence.whiteners]
         return State(self.members, Evidence(self.evidence.design, whiteners))
 
+    @cached_property
+    def led(self) -> State:
+        """The same, the effort following by a filter and not late."""
+        return State(self.members, Evidence(self.evidence.design, self.evidence.whiteners, led=True))
+
     def slot(self, hypothesis: int) -> dict[int, Table]:
         """Evidence of everything that may stand in the place of a member."""
         others = self.without(hypothesis)
@@ -100,11 +106,6 @@ class Search:
                 instead = max(self._expanded(instead, named=True), key=self.posterior, default=instead)
             state = max(state, instead, key=self.posterior)
         return state
-
-    @staticmethod
-    def led(state: State) -> State:
-        """The same, the effort following by a filter and not late."""
-        return State(state.members, Evidence(state.evidence.design, state.evidence.whiteners, led=True))
 
     def posterior(self, state: State) -> float:
         """Log of it, but for a constant."""
