@@ -157,8 +157,9 @@ class Evidence:
         if not members:
             return {}
         own = self._stacked(members)
-        inner = np.eye(own.shape[1]) + own.T @ self._products[:-1, :-1] @ own
-        mean = own @ linalg.solve(inner, own.T @ self._products[:-1, -1], assume_a="pos")
+        rows = np.flatnonzero(own.any(axis=1))
+        inner = np.eye(own.shape[1]) + own[rows].T @ self._products[np.ix_(rows, rows)] @ own[rows]
+        mean = own @ linalg.solve(inner, own[rows].T @ self._products[rows, -1], assume_a="pos")
         places = {index: self.design.blocks[one.block].place for index, one in members.items()}
         return {index: mean[place] / self.design.sizes[place] for index, place in places.items()}
 

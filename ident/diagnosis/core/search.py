@@ -28,6 +28,16 @@ MOST: Final = 4
 """Members of a set."""
 
 
+INSTEAD: Final = 2
+"""Names that may stand for a law."""
+
+SURVIVORS: Final = 4
+"""Hypotheses that are fitted exactly at every step."""
+
+MARGIN: Final = 3.0
+"""Log evidence below its price from which a hypothesis is not fitted exactly: another noise hardly gives it more."""
+
+
 @dataclass(frozen=True)
 class State:
     """A set of hypotheses.
@@ -242,16 +252,6 @@ def _nearby(drift: Drift) -> list[Drift]:
         return [NONE]
     at = POWERS.index(drift.power)
     return [drift, *(replace(drift, power=power) for power in POWERS[max(at - 2, 0) : at]), NONE]
-
-
-INSTEAD: Final = 2
-"""Names that may stand for a law."""
-
-SURVIVORS: Final = 4
-"""Hypotheses that are fitted exactly at every step."""
-
-MARGIN: Final = 3.0
-"""Log evidence below its price from which a hypothesis is not fitted exactly: another noise hardly gives it more."""
 
 
 def price_of(count: int) -> float:
