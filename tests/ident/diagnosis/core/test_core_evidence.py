@@ -13,7 +13,7 @@ from hil.exam.sources.machine import Machine
 from ident.diagnosis.core.design import Design
 from ident.diagnosis.core.evidence import Evidence, Member
 from ident.diagnosis.core.hypotheses import hypotheses
-from ident.diagnosis.core.noise import Colours, NONE, Whitener
+from ident.diagnosis.core.noise import NONE, Colours, Whitener
 from ident.diagnosis.core.observations import Observation, observe
 from ident.diagnosis.names import EffectName
 
