@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,20 +56,20 @@ class Design:
         self.effort = math.sqrt(sum(float(np.sum(one.rows(one.effort) ** 2)) for one in observations) / self.count)
         self.columns = [np.zeros((len(one), 0)) for one in observations]
         self.sizes = np.zeros(0)
-        self.blocks: tuple[Block, ...] = ()
+        blocks = list[Block]()
         for index, hypothesis in enumerate(hypotheses):
             weight = -math.log(len(hypothesis.numbers))
             for number, value in enumerate(hypothesis.numbers.tolist()):
                 if hypothesis.free and number:
-                    place, factor = self.blocks[-1].place, hypothesis.factors[number]
-                    self.blocks += (Block(index, value, place, factor, weight),)
+                    blocks.append(replace(blocks[-1], number=value, factor=hypothesis.factors[number]))
                 else:
-                    self._append(index, value, weight)
+                    blocks.append(self._appended(index, value, weight))
+        self.blocks = tuple(blocks)
         for block in self.blocks:
             if hypotheses[block.hypothesis].free:
                 self._normalise(block)
 
-    def _append(self, index: int, value: float, weight: float) -> None:
+    def _appended(self, index: int, value: float, weight: float) -> Block:
         """Columns of a hypothesis at one more number."""
         hypothesis = self.hypotheses[index]
         rows = [one.rows(hypothesis.series(one, value)) for one in self.observations]
@@ -79,7 +79,7 @@ class Design:
         self.columns = [np.hstack([part, more / sizes]) for part, more in zip(self.columns, rows, strict=True)]
         self.sizes = np.append(self.sizes, sizes)
         factor = hypothesis.factors[0] if hypothesis.free else np.eye(len(sizes))
-        self.blocks += (Block(index, value, place, factor, weight),)
+        return Block(index, value, place, factor, weight)
 
     def _normalise(self, block: Block) -> None:
         """A function has one unit: that in which what its own prior makes of the rows has unit rms."""
@@ -92,7 +92,7 @@ class Design:
     def with_number(self, index: int, value: float, weight: float) -> Design:
         """The same, one more number of a hypothesis being tried, of so much prior mass."""
         found = copy(self)
-        found._append(index, value, weight)
+        found.blocks += (found._appended(index, value, weight),)
         return found
 
     def of(self, hypothesis: int) -> tuple[int, ...]:

@@ -22,6 +22,7 @@ from ident.diagnosis.core.design import Design
 from ident.diagnosis.core.noise import Whitener
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 OCTAVES: Final = 1.0
 """Between neighbouring scales, in doublings: the evidence of one is that of the other but for a tenth."""
@@ -110,7 +111,7 @@ class Evidence:
         triangle = np.abs(np.diag(self._plant[1]))
         return -0.5 * float(self._products[-1, -1]) - self._volume - float(np.sum(np.log(triangle)))
 
-    def beside(self, members: Mapping[int, Member], columns: Sequence[int] | None = None) -> Array:
+    def beside(self, members: Mapping[int, Member], columns: Indices | None = None) -> Array:
         """Products of columns and, last, the target, members integrated.
 
         Args:
@@ -119,7 +120,7 @@ class Evidence:
         """
         found = self._products
         chosen = np.arange(len(found)) if columns is None else np.append(columns, len(found) - 1)
-        part = found[np.ix_(chosen, chosen)]
+        part: Array = found[np.ix_(chosen, chosen)]
         if not members:
             return part
         own = self._stacked(members)

@@ -138,7 +138,7 @@ def temperature(state: State, fitting: int) -> float:
     contradicted = float(np.sum((design @ (predicted - own)) ** 2))
     expected = float(np.sum((design @ (spread + alone)) * design))
     freedom = fit.width + sum(part.place.stop - part.place.start for part in fit.parts.values() if part.named)
-    return max((TRUSTED + freedom * contradicted / expected) / (TRUSTED + freedom), 1.0)
+    return float(max((TRUSTED + freedom * contradicted / expected) / (TRUSTED + freedom), 1.0))
 
 
 class _Equations:

@@ -126,7 +126,7 @@ def _presliding(observations: Observations) -> Hypothesis:
 
 def _warming(observations: Observations) -> Hypothesis:
     def series(one: Observation, constant: float) -> Array:
-        return (one.direction * (1 - np.exp(-one.time / constant)))[:, None]
+        return np.asarray(one.direction * (1 - np.exp(-one.time / constant)))[:, None]
 
     longest = max(float(one.time[-1]) for one in observations)
     return Hypothesis(AxisEffect.FRICTION_WARMING, _between(longest / len(observations[0]) * 3, longest), series)
@@ -148,10 +148,10 @@ def _ripple(observations: Observations) -> Hypothesis:
 def _elasticity(observations: Observations) -> Hypothesis:
     def series(one: Observation, resonance: float) -> Array:
         force = one.values[MASS] * one.acceleration
-        return one.values[MASS] * answered(force, one.interval, lambda w: compliant(w, resonance))[:, None]
+        return np.asarray(one.values[MASS] * answered(force, one.interval, lambda w: compliant(w, resonance)))[:, None]
 
     def response(angular: Array, resonance: float) -> NDArray[np.complex128]:
-        return observations[0].values[MASS] * compliant(angular, resonance)
+        return np.asarray(observations[0].values[MASS] * compliant(angular, resonance))
 
     band = observations[0].filter.bandwidth
     # A resonance is as wide as its damping: from beside it, nothing leads there.

@@ -52,7 +52,8 @@ class Colours:
 
     def __init__(self, observation: Observation) -> None:
         gain = observation.filter.gain(observation.count, observation.sample_time)
-        self._frequency = np.pi * np.arange(len(gain)) / (len(gain) * observation.sample_time)
+        frequency = np.pi * np.arange(len(gain)) / (len(gain) * observation.sample_time)
+        self._frequency: Array = np.asarray(frequency, dtype=np.float64)
         self._gain, self._lags = gain, np.abs(np.subtract.outer(observation.samples, observation.samples))
         effort = self._autocovariance(np.ones_like(gain))
         unsure = np.column_stack([observation.unsure, _held(observation)])
@@ -71,7 +72,7 @@ class Colours:
 
     def covariance(self, drift: Drift, level: float) -> Array:
         """(n, n) of the rows, over the power `level` of the effort's noise in a row."""
-        found = self._effort + self._known / level
+        found: Array = self._effort + self._known / level
         if not drift.power:
             return found
         return np.asarray(found + drift.power * self._slow(drift.corner))

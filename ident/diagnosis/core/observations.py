@@ -173,7 +173,7 @@ class Observation:
     @cached_property
     def time(self) -> Array:
         """(M,) [s]."""
-        return np.arange(len(self.velocity)) * self.interval
+        return np.asarray(np.arange(len(self.velocity)) * self.interval, dtype=np.float64)
 
 
 def observe(fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord]) -> tuple[tuple[Observation, ...], AxisKind]:
@@ -244,7 +244,7 @@ def _observation(record: AxisRecord, reference: Reference) -> Observation:
         velocity=_means(motion.velocity, block),
         acceleration=_means(motion.acceleration, block),
         direction=_means(signs, block),
-        weights=filters.weights((samples + 0.5) * dt, len(record) // block, block * dt),
+        weights=filters.weights(np.asarray((samples + 0.5) * dt, dtype=np.float64), len(record) // block, block * dt),
     )
 
 

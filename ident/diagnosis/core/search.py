@@ -189,7 +189,8 @@ class Search:
         """(n,) what the plant leaves of the target."""
         size = np.linalg.norm(rows.design, axis=0)
         size[size == 0] = 1.0
-        return rows.target - rows.design @ (np.linalg.lstsq(rows.design / size, rows.target, rcond=1e-7)[0] / size)
+        found = np.linalg.lstsq(rows.design / size, rows.target, rcond=1e-7)[0] / size
+        return np.asarray(rows.target - rows.design @ found)
 
 
 def _settled(state: State) -> State:
