@@ -72,6 +72,8 @@ def _with_all(answers: Sequence[Answer]) -> dict[str, str]:
     texts = {name: str(rate) for name, rate in found.rates.items() if name in SHOWN and rate.cases}
     texts |= {name: f"{value:.2f}" for name, value in found.numbers.items() if name in SHOWN}
     stated = [each for answer in answers for each in answer.statements]
+    if not stated:
+        return texts
     probabilities, right = (np.array(column) for column in zip(*stated, strict=True))
     texts["log score of every name [nat]"] = f"{log_score(probabilities.astype(float), right.astype(bool)):.3f}"
     base = np.full(len(right), right.mean())

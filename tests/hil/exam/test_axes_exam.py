@@ -90,14 +90,7 @@ def test_it_is_sealed_diagnosed_and_scored(tmp_path: Path) -> None:
     early = quasiomni("exam", "diagnose", out, "--oracle", *key)
     assert early.returncode == 2
     assert "not diagnosed yet" in " ".join(early.stderr.split())
-    one = ["--core", "one"]
-    for option in (
-        [],
-        ["--without-true-candidate", *key],
-        ["--oracle", *key],
-        one,
-        [*one, "--without-true-candidate", *key],
-    ):
+    for option in ([], ["--without-true-candidate", *key], ["--oracle", *key]):
         diagnosed = quasiomni("exam", "diagnose", out, "--jobs", "1", *option)
         assert diagnosed.returncode == 0, diagnosed.stderr
     scored = quasiomni("exam", "score", out, *key)
@@ -105,12 +98,6 @@ def test_it_is_sealed_diagnosed_and_scored(tmp_path: Path) -> None:
     score = json.loads((tmp_path / "exam" / "score.json").read_text())
     assert (score["cases"], score["sealed"], score["missing"]) == (3, True, {})
     assert sum(name.startswith(ORACLE) for name in score["rates"]) == 1
-    other = quasiomni("exam", "score", out, *key, *one)
-    assert other.returncode == 0, other.stderr
-    assert json.loads((tmp_path / "exam" / "one" / "score.json").read_text())["cases"] == 3
-    standing, beside = (sorted((tmp_path / "exam" / name).iterdir()) for name in ("diagnoses", "diagnoses_one"))
-    assert [path.name for path in standing] == [path.name for path in beside]
-    assert [path.read_text() for path in standing] != [path.read_text() for path in beside]
 
 
 def test_an_oracle_that_knows_the_truth_is_not_asked_without_it(tmp_path: Path) -> None:
