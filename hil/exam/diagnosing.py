@@ -90,11 +90,13 @@ def diagnose_exam(
         removed: candidate that is taken out of the library, by case; all of them are left in without.
 
     Raises:
-        UserError: there is no exam, or it has no records yet; or candidates are to be removed from a sealed one before
+        UserError: there is no exam, it has no records yet, or the core cannot diagnose such; or candidates are to be removed from a sealed one before
             all of its cases have been diagnosed with all of them.
     """
     forbid_emulator()
     exam = read_exam(folder)
+    if folder.core is Core.ONE and not exam.of_axes:
+        raise UserError("The core `one` diagnoses axes alone.", "Leave --core out, or diagnose an exam of axes.")
     there = [identifier for identifier in exam.identifiers if folder.complete(identifier)]
     if removed is not None and exam.sealed:
         refuse_undiagnosed(folder, there)
@@ -104,8 +106,6 @@ def diagnose_exam(
         )
     asked = [identifier for identifier in there if removed is None or identifier in removed]
     task = _axis_task(folder, removed or {}) if exam.of_axes else _vehicle_task(folder, removed or {})
-    if folder.core is Core.ONE and not exam.of_axes:
-        raise UserError("The core `one` diagnoses axes alone.", "Leave --core out, or diagnose an exam of axes.")
     of_axes = diagnose_axis_by_core if folder.core is Core.ONE else diagnose_axis_case
     function = of_axes if exam.of_axes else diagnose_case
     places = {identifier: folder.diagnosis(identifier, removed is not None) for identifier in asked}
