@@ -90,8 +90,8 @@ def diagnose_exam(
         removed: candidate that is taken out of the library, by case; all of them are left in without.
 
     Raises:
-        UserError: there is no exam, it has no records yet, or the core cannot diagnose such; or candidates are to be removed from a sealed one before
-            all of its cases have been diagnosed with all of them.
+        UserError: there is no exam, it has no records yet, or the core cannot diagnose such; or candidates are to be
+            removed from a sealed one before all of its cases have been diagnosed with all of them.
     """
     forbid_emulator()
     exam = read_exam(folder)
