@@ -15,11 +15,12 @@ from types import MappingProxyType, ModuleType
 from typing import Any, Final
 
 from hil.exam.axes.record_bytes import axis_record_of
-from hil.exam.folder import RECORDS, ExamFolder, read_exam
+from hil.exam.folder import RECORDS, Core, ExamFolder, read_exam
 from hil.exam.record_bytes import record_from_bytes
 from hil.exam.workers import run_all
 from ident.diagnosis.alone import closed_alone
 from ident.diagnosis.axis.diagnose import diagnose_axis
+from ident.diagnosis.core.answer import diagnose_by_core
 from ident.diagnosis.diagnosis import faulty
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.names import EffectName
@@ -89,17 +90,20 @@ def diagnose_exam(
         removed: candidate that is taken out of the library, by case; all of them are left in without.
 
     Raises:
-        UserError: there is no exam, or it has no records yet; or candidates are to be removed from a sealed one before
-            all of its cases have been diagnosed with all of them.
+        UserError: there is no exam, it has no records yet, or the core cannot diagnose such; or candidates are to be
+            removed from a sealed one before all of its cases have been diagnosed with all of them.
     """
     forbid_emulator()
     exam = read_exam(folder)
+    if folder.core is Core.ONE and not exam.of_axes:
+        raise UserError("The core `one` diagnoses axes alone.", "Leave --core out, or diagnose an exam of axes.")
     there = with_records(folder, exam.identifiers)
     if removed is not None and exam.sealed:
         refuse_undiagnosed(folder, there)
     asked = [identifier for identifier in there if removed is None or identifier in removed]
     task = _axis_task(folder, removed or {}) if exam.of_axes else _vehicle_task(folder, removed or {})
-    function = diagnose_axis_case if exam.of_axes else diagnose_case
+    of_axes = diagnose_axis_by_core if folder.core is Core.ONE else diagnose_axis_case
+    function = of_axes if exam.of_axes else diagnose_case
     places = {identifier: folder.diagnosis(identifier, removed is not None) for identifier in asked}
     keep_answers(function, task, places, jobs=jobs, scheduler=scheduler, progress=progress)
 
@@ -222,6 +226,18 @@ def diagnose_axis_case(identifier: str, fit: bytes, confirm: bytes, removed: str
         records = axis_records(fit, confirm)
         found = diagnose_axis(records[:1], records[1:], seed=1, lacking=() if removed is None else (removed,))
         return found.diagnosis().as_json()
+
+    return identifier, _timed(answer)
+
+
+def diagnose_axis_by_core(identifier: str, fit: bytes, confirm: bytes, removed: str | None) -> tuple[str, bytes]:
+    """The same by the core `one`."""
+    forbid_emulator()
+
+    def answer() -> dict[str, Any]:
+        records = axis_records(fit, confirm)
+        lacking = () if removed is None else (removed,)
+        return diagnose_by_core(records[:1], records[1:], lacking=lacking).as_json()
 
     return identifier, _timed(answer)
 

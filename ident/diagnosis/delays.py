@@ -30,12 +30,12 @@ HELD: Final = 0.55
 
 def delayed(series: Array, delay: float, sample_time: float) -> Array:
     """A series (N,) as it was `delay` seconds before, by its spectrum; its end is led back to its start."""
-    return _answered(series, sample_time, lambda angular: np.exp(-1j * angular * delay))
+    return answered(series, sample_time, lambda angular: np.exp(-1j * angular * delay))
 
 
 def led(series: Array, time: float, sample_time: float) -> Array:
     """A series (N,) before a filter of first order, as it must have been: u + T u', by its spectrum."""
-    return _answered(series, sample_time, lambda angular: 1 + 1j * angular * time)
+    return answered(series, sample_time, lambda angular: 1 + 1j * angular * time)
 
 
 def sprung(series: Array, resonance: float, sample_time: float, damping: float = DAMPING) -> Array:
@@ -53,15 +53,23 @@ def sprung(series: Array, resonance: float, sample_time: float, damping: float =
         return np.asarray(angular**2 / (1 - share**2 + 2j * damping * share), dtype=np.complex128)
 
     ringing = math.ceil(RUNG / (damping * resonance * sample_time))
-    return _answered(series, sample_time, response, max(ringing, LED_BACK))
+    return answered(series, sample_time, response, max(ringing, LED_BACK))
 
 
-def _answered(
+def answered(
     series: Array,
     sample_time: float,
     response: Callable[[Array], NDArray[np.complexfloating[Any, Any]]],
     led_back: int = LED_BACK,
 ) -> Array:
+    """What a filter makes of a series (N,), by its spectrum; its end is led back to its start.
+
+    Args:
+        series: (N,).
+        sample_time: [s].
+        response: of the filter, at angular frequencies (F,) [rad/s].
+        led_back: samples that it takes to lead it back, as many as the filter remembers.
+    """
     length = fft.next_fast_len(len(series) + led_back, real=True)
     closed = np.pad(series, (0, length - len(series)), mode="linear_ramp", end_values=series[0])
     turn = response(2 * np.pi * fft.rfftfreq(length, sample_time))

@@ -1,0 +1,196 @@
+"""Hypotheses: what may be missing in the plant of an axis, as columns in the rows, and what is believed before them.
+
+A named hypothesis is a family of few columns and at most one number more, tried between the ends that the record can
+show. A free function is a Gaussian process of one variable, whose length stands in the place of that number.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.axis.model import AxisEffect
+from ident.diagnosis.core.functions import (
+    FILTER,
+    FUNCTIONS,
+    Function,
+    filter_factors,
+    filter_taps,
+    process_factors,
+    waves,
+)
+from ident.diagnosis.core.observations import MASS, Observation
+from ident.diagnosis.delays import answered, delayed, led
+from ident.diagnosis.names import EffectName
+
+Array = NDArray[np.float64]
+Observations = Sequence[Observation]
+
+EVERY: Final = 1.2
+"""Ratio of neighbouring numbers of a family on a logarithmic grid; between them it is refined."""
+
+RIGID: Final = 100.0
+"""Resonance over the bandwidth, of a spring that shows as a compliance alone: it adds a ten-thousandth else."""
+
+DAMPING: Final = 0.03
+"""Of what is behind a spring, over the critical damping: what bolted steel has. Less would let the noise of a position,
+and the unknown motion of the load before the record, ring on in what is reckoned from it."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A cause that may be there.
+
+    Attributes:
+        name: of the library, or `law`.
+        numbers: (G,) of the family, or lengths of the function over its range; one NaN where there is none.
+        series: observation and number -> (N, k) unfiltered columns.
+        factors: (K, R) of the prior covariance of the columns by number; empty: the columns are independent.
+        function: of which it is one, for a law.
+        response: angular frequencies (F,) and number -> what a coefficient of one adds to the inertia, over it: the
+            noise of the acceleration is amplified by as much.
+    """
+
+    name: str
+    numbers: Array
+    series: Callable[[Observation, float], Array]
+    factors: tuple[Array, ...] = ()
+    function: Function | None = None
+    response: Callable[[Array, float], NDArray[np.complex128]] | None = None
+
+    @property
+    def free(self) -> bool:
+        """Whether it is a law without a name; its columns are the same for every number."""
+        return self.function is not None
+
+
+def hypotheses(observations: Observations, lacking: Collection[str] = ()) -> tuple[Hypothesis, ...]:
+    """All that are tried, by name without those lacking."""
+    named = [family(observations) for family in _FAMILIES]
+    free = [_free(function, observations) for function in FUNCTIONS]
+    memories, factors = filter_factors()
+    free.append(Hypothesis("law", memories, lambda one, _: filter_taps(one), factors, FILTER))
+    return tuple(one for one in [*named, *free] if one.name not in lacking)
+
+
+def _free(function: Function, observations: Observations) -> Hypothesis:
+    basis = waves(function, observations)
+    lengths, factors = process_factors()
+    return Hypothesis("law", lengths, lambda one, _: basis.columns(one), factors, function)
+
+
+def _one(name: str, series: Callable[[Observation], Array]) -> Callable[[Observations], Hypothesis]:
+    """A family of one column (N,)."""
+    return lambda _: Hypothesis(name, np.array([np.nan]), lambda one, _number: series(one)[:, None])
+
+
+def _between(low: float, high: float) -> Array:
+    count = 1 + max(1, round(np.log(max(high / low, 1.0)) / np.log(EVERY)))
+    return np.geomspace(low, high, count)
+
+
+def _slowest(observations: Observations) -> float:
+    """Speed of the slowest row."""
+    return min(float(np.abs(one.at_rows(one.velocity)).min()) for one in observations)
+
+
+def _fastest(observations: Observations) -> float:
+    return max(float(np.abs(one.at_rows(one.velocity)).max()) for one in observations)
+
+
+def _reach(observations: Observations) -> float:
+    return max(float(np.ptp(one.position)) for one in observations)
+
+
+def _stribeck(observations: Observations) -> Hypothesis:
+    def series(one: Observation, speed: float) -> Array:
+        velocity = one.velocity
+        return (one.direction * np.exp(-np.square(velocity / speed)))[:, None]
+
+    return Hypothesis(EffectName.STRIBECK, _between(_slowest(observations), _fastest(observations)), series)
+
+
+def _presliding(observations: Observations) -> Hypothesis:
+    def series(one: Observation, distance: float) -> Array:
+        return (one.direction * np.exp(-one.path / distance))[:, None]
+
+    shortest = min(float(one.at_rows(one.path).min()) for one in observations)
+    reach = _reach(observations)
+    return Hypothesis(EffectName.PRESLIDING, _between(max(shortest, reach / 1000), reach), series)
+
+
+def _warming(observations: Observations) -> Hypothesis:
+    def series(one: Observation, constant: float) -> Array:
+        return np.asarray(one.direction * (1 - np.exp(-one.time / constant)))[:, None]
+
+    longest = max(float(one.time[-1]) for one in observations)
+    return Hypothesis(AxisEffect.FRICTION_WARMING, _between(longest / len(observations[0]) * 3, longest), series)
+
+
+def _ripple(observations: Observations) -> Hypothesis:
+    """Orders in periods a unit of position; half of the rows see the fastest, four are tried a period of the reach."""
+
+    def series(one: Observation, order: float) -> Array:
+        angle = 2 * np.pi * order * one.position
+        return np.column_stack([np.sin(angle), np.cos(angle)])
+
+    reach, usual = _reach(observations), float(np.median(np.abs(observations[0].velocity)))
+    most = observations[0].filter.bandwidth / (2 * np.pi * usual)
+    orders = np.arange(4.0, max(4 * reach * most, 5.0)) / (4 * reach)
+    return Hypothesis(EffectName.TORQUE_RIPPLE, orders, series)
+
+
+def _elasticity(observations: Observations) -> Hypothesis:
+    def series(one: Observation, resonance: float) -> Array:
+        force = one.values[MASS] * one.acceleration
+        return np.asarray(one.values[MASS] * answered(force, one.interval, lambda w: compliant(w, resonance)))[:, None]
+
+    def response(angular: Array, resonance: float) -> NDArray[np.complex128]:
+        return np.asarray(observations[0].values[MASS] * compliant(angular, resonance))
+
+    band = observations[0].filter.bandwidth
+    # A resonance is as wide as its damping: from beside it, nothing leads there.
+    count = round(math.log(RIGID) / 2 / (2 * DAMPING))
+    resonances = np.append(np.geomspace(band / 2, math.sqrt(RIGID) / 2 * band, count), RIGID * band)
+    return Hypothesis(EffectName.ELASTICITY, resonances, series, response=response)
+
+
+def compliant(angular: Array, resonance: float) -> NDArray[np.complex128]:
+    """What a compliance of one adds to a force on what is behind it, at frequencies (F,), in its unit over the mass.
+
+    Args:
+        angular: [rad/s].
+        resonance: of the load, the drive held [rad/s].
+    """
+    share = angular / resonance
+    return np.asarray(angular**2 / (1 - share**2 + 2j * DAMPING * share), dtype=np.complex128)
+
+
+def _centred(one: Observation) -> Array:
+    position = one.position
+    return np.asarray(position - (position.max() + position.min()) / 2)
+
+
+def following(one: Observation) -> Array:
+    """(M,) what a filter of the lag's time constant adds to an effort that is that late."""
+    return led(delayed(one.effort, one.lag, one.interval), one.lag, one.interval) - one.effort
+
+
+_FAMILIES: Final[Sequence[Callable[[Observations], Hypothesis]]] = (
+    _stribeck,
+    _one(EffectName.ASYMMETRIC_VISCOUS, lambda one: np.abs(one.velocity)),
+    _one(EffectName.QUADRATIC_DRAG, lambda one: one.velocity * np.abs(one.velocity)),
+    _ripple,
+    _elasticity,
+    _presliding,
+    _warming,
+    _one(EffectName.FRICTION_POSITION, lambda one: _centred(one) * one.direction),
+    _one(EffectName.FRICTION_LOAD, lambda one: np.abs(one.effort) * one.direction),
+    _one(AxisEffect.GRAVITY_LOAD, _centred),
+    _one(AxisEffect.INERTIA_POSITION, lambda one: _centred(one) * one.acceleration),
+)
