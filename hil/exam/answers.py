@@ -191,8 +191,9 @@ class Answer:
 
     @property
     def modest(self) -> bool:
-        """No confident single name."""
-        return all(len(_set(effect)) > 1 or effect["probability"] < CONFIDENT for effect in self.said.effects)
+        """No confident single name; a law has none."""
+        named = [effect for effect in self.said.effects if effect["name"] != LAW]
+        return all(len(_set(effect)) > 1 or effect["probability"] < CONFIDENT for effect in named)
 
     def near(self, closed: float = 1.0) -> bool:
         """All that is named is at the joint of the case, and closes all but what a cosine of ALIKE leaves.

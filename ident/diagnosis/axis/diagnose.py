@@ -8,7 +8,8 @@ from typing import Final
 
 from ident.diagnosis.axis.candidates import LATE
 from ident.diagnosis.axis.problem import axis_problem, delayed_axes
-from ident.diagnosis.axis.reference import Reference, Scale, axis_reference, refuse_other_axes
+from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_other_axes
+from ident.diagnosis.axis.scale import Scale
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judge import judge
 from ident.diagnosis.limits import Limits

@@ -16,13 +16,12 @@ from ident.diagnosis.axis.model import AxisModel
 from ident.diagnosis.axis.motion import AxisMotion, with_repeats
 from ident.diagnosis.axis.reference import (
     Reference,
-    Scale,
     Signals,
     axis_signals,
-    nominal,
     own_columns,
     refuse_other_axes,
 )
+from ident.diagnosis.axis.scale import Scale, nominal
 from ident.diagnosis.delays import HELD
 from ident.diagnosis.law.dependence import Dependence, across
 from ident.diagnosis.names import EffectName

@@ -239,6 +239,7 @@ def test_where_a_value_has_changed_wrong_effects_are_fitted_with_the_values_held
     [
         ((entry("slope", probability=0.9),), False, False),
         ((entry("slope", probability=0.4),), False, True),
+        ((entry("law", probability=0.95),), True, True),
         ((entry("slope", probability=0.9, among=("scrub",)),), True, True),
         ((entry("slope", among=("scrub",)), entry("stribeck", probability=0.9)), False, False),
         ((), False, True),
