@@ -15,8 +15,8 @@ from fmu.variables import Block, VariableTable
 _WRITTEN: Final = ("instance.h", "instance.c", "saved.c", "values.c", "sensitivity.c", "stepping.c")
 
 _ENTRY: Final = {
-    FmiVersion.FMI2: ("fmi2_calls.h", "fmi2.c", "fmi2_solving.c"),
-    FmiVersion.FMI3: ("fmi3_calls.h", "fmi3.c", "fmi3_values.c", "fmi3_solving.c", "arrays.h", "arrays.c"),
+    FmiVersion.FMI2: ("calls_fmi2.h", "fmi2.c", "fmi2_solving.c"),
+    FmiVersion.FMI3: ("calls_fmi3.h", "fmi3.c", "fmi3_values.c", "fmi3_solving.c", "arrays.h", "arrays.c"),
 }
 """The functions of the standard, and what they need."""
 

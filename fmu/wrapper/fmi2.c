@@ -1,7 +1,7 @@
 /* FMI 2.0.4 on one instance: from instantiation to the end, its values, and saved states. */
 #include <string.h>
 
-#include "fmi2_calls.h"
+#include "calls_fmi2.h"
 
 static void write_message(const qo_instance *me, qo_answer status, const char *category, const char *message)
 {

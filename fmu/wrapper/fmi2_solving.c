@@ -1,7 +1,7 @@
 /* FMI 2.0.4 on one instance: derivatives, events, the importer's solver, and steps of its own. */
 #include <string.h>
 
-#include "fmi2_calls.h"
+#include "calls_fmi2.h"
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown,

@@ -1,7 +1,7 @@
 /* FMI 3.0.1 on one instance: from instantiation to the end, and saved states. */
 #include <string.h>
 
-#include "fmi3_calls.h"
+#include "calls_fmi3.h"
 
 static void write_message(const qo_instance *me, qo_answer status, const char *category, const char *message)
 {

@@ -1,5 +1,5 @@
 /* FMI 3.0.1 on one instance: derivatives, events, the importer's solver, and steps of its own. */
-#include "fmi3_calls.h"
+#include "calls_fmi3.h"
 
 typedef qo_answer (*derivative)(qo_instance *me, const unsigned unknowns[], size_t n_unknowns,
                                 const unsigned knowns[], size_t n_knowns, const double seed[], size_t n_seed,

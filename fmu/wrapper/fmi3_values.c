@@ -1,5 +1,5 @@
 /* FMI 3.0.1 on one instance: values of its variables, and all types that it has none of. */
-#include "fmi3_calls.h"
+#include "calls_fmi3.h"
 
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           fmi3Float64 values[], size_t nValues)

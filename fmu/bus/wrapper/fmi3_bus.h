@@ -3,7 +3,7 @@
 #define QB_FMI3_BUS_H
 
 #include "bus.h"
-#include "fmi3_calls.h"
+#include "calls_fmi3.h"
 #include "plant_functions.h"
 
 /* The instance as the plant sees it, and as a whole. */

@@ -62,7 +62,6 @@ class AxisMotion:
         position, velocity, acceleration: (N,) smoothed, for what is nonlinear in them [m or rad, and per s, s²].
         linear: (N, 2) acceleration and velocity of the unfiltered position, to be filtered like the effort.
         effort: (N,) measured, unfiltered [N or Nm].
-        position_noise: of a sample of the position, as its second differences show it [m or rad].
         sticking: (N,) where the axis may stick: it reverses, or hardly moves.
         moving: (N,) false there, `GUARDS` around it, and at the ends, where filters have not settled.
     """
@@ -72,7 +71,6 @@ class AxisMotion:
     acceleration: Array
     linear: Array
     effort: Array
-    position_noise: float
     sticking: NDArray[np.bool_]
     moving: NDArray[np.bool_]
 
@@ -150,7 +148,7 @@ def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth:
         moving = _apart(slow, GUARDS[1] / (bandwidth * dt))
     rate = differentiate(axis.position, dt, SEVEN)
     linear = np.stack([differentiate(rate, dt, SEVEN), rate], axis=1)
-    return AxisMotion(position, velocity, differentiate(velocity, dt, SEVEN), linear, axis.effort, noise, slow, moving)
+    return AxisMotion(position, velocity, differentiate(velocity, dt, SEVEN), linear, axis.effort, slow, moving)
 
 
 def _apart(slow: NDArray[np.bool_], guard: float) -> NDArray[np.bool_]:
