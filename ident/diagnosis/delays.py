@@ -30,12 +30,12 @@ HELD: Final = 0.55
 
 def delayed(series: Array, delay: float, sample_time: float) -> Array:
     """A series (N,) as it was `delay` seconds before, by its spectrum; its end is led back to its start."""
-    return answered(series, sample_time, lambda angular: np.exp(-1j * angular * delay))
+    return _answered(series, sample_time, lambda angular: np.exp(-1j * angular * delay))
 
 
 def led(series: Array, time: float, sample_time: float) -> Array:
     """A series (N,) before a filter of first order, as it must have been: u + T u', by its spectrum."""
-    return answered(series, sample_time, lambda angular: 1 + 1j * angular * time)
+    return _answered(series, sample_time, lambda angular: 1 + 1j * angular * time)
 
 
 def sprung(series: Array, resonance: float, sample_time: float, damping: float = DAMPING) -> Array:
@@ -48,28 +48,30 @@ def sprung(series: Array, resonance: float, sample_time: float, damping: float =
         damping: ζ, over the critical one.
     """
 
-    def response(angular: Array) -> NDArray[np.complex128]:
-        share = angular / resonance
-        return np.asarray(angular**2 / (1 - share**2 + 2j * damping * share), dtype=np.complex128)
-
     ringing = math.ceil(RUNG / (damping * resonance * sample_time))
-    return answered(series, sample_time, response, max(ringing, LED_BACK))
+    return _answered(
+        series, sample_time, lambda angular: compliant(angular, resonance, damping), max(ringing, LED_BACK)
+    )
 
 
-def answered(
+def compliant(angular: Array, resonance: float, damping: float) -> NDArray[np.complex128]:
+    """What a compliance of one adds to a force on what is behind it, at frequencies (F,), in its unit over the mass.
+
+    Args:
+        angular: [rad/s].
+        resonance: of what is behind the spring, with the front held [rad/s].
+        damping: over the critical one.
+    """
+    share = angular / resonance
+    return np.asarray(angular**2 / (1 - share**2 + 2j * damping * share), dtype=np.complex128)
+
+
+def _answered(
     series: Array,
     sample_time: float,
     response: Callable[[Array], NDArray[np.complexfloating[Any, Any]]],
     led_back: int = LED_BACK,
 ) -> Array:
-    """What a filter makes of a series (N,), by its spectrum; its end is led back to its start.
-
-    Args:
-        series: (N,).
-        sample_time: [s].
-        response: of the filter, at angular frequencies (F,) [rad/s].
-        led_back: samples that it takes to lead it back, as many as the filter remembers.
-    """
     length = fft.next_fast_len(len(series) + led_back, real=True)
     closed = np.pad(series, (0, length - len(series)), mode="linear_ramp", end_values=series[0])
     turn = response(2 * np.pi * fft.rfftfreq(length, sample_time))

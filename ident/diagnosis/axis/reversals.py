@@ -108,7 +108,7 @@ def turned_round(speed: float, inertia: float, sample_time: float) -> float:
     """Deviation of the impulse at an end of a record, where the motion turns round: twice its momentum.
 
     Args:
-        speed: largest of the record [m/s or rad/s].
+        speed: of the motion that turns, or of what is not known of it [m/s or rad/s].
         inertia: [kg or kg m²].
         sample_time: [s].
 

@@ -25,7 +25,7 @@ from ident.diagnosis.core.functions import (
     waves,
 )
 from ident.diagnosis.core.observations import MASS, Observation
-from ident.diagnosis.delays import answered, delayed, led
+from ident.diagnosis.delays import RARER, compliant, delayed, led, sprung
 from ident.diagnosis.names import EffectName
 
 Array = NDArray[np.float64]
@@ -148,27 +148,16 @@ def _ripple(observations: Observations) -> Hypothesis:
 def _elasticity(observations: Observations) -> Hypothesis:
     def series(one: Observation, resonance: float) -> Array:
         force = one.values[MASS] * one.acceleration
-        return np.asarray(one.values[MASS] * answered(force, one.interval, lambda w: compliant(w, resonance)))[:, None]
+        return np.asarray(one.values[MASS] * sprung(force, resonance, one.interval, DAMPING))[:, None]
 
     def response(angular: Array, resonance: float) -> NDArray[np.complex128]:
-        return np.asarray(observations[0].values[MASS] * compliant(angular, resonance))
+        return np.asarray(observations[0].values[MASS] * compliant(angular, resonance, DAMPING))
 
     band = observations[0].filter.bandwidth
     # A resonance is as wide as its damping: from beside it, nothing leads there.
     count = round(math.log(RIGID) / 2 / (2 * DAMPING))
     resonances = np.append(np.geomspace(band / 2, math.sqrt(RIGID) / 2 * band, count), RIGID * band)
     return Hypothesis(EffectName.ELASTICITY, resonances, series, response=response)
-
-
-def compliant(angular: Array, resonance: float) -> NDArray[np.complex128]:
-    """What a compliance of one adds to a force on what is behind it, at frequencies (F,), in its unit over the mass.
-
-    Args:
-        angular: [rad/s].
-        resonance: of the load, the drive held [rad/s].
-    """
-    share = angular / resonance
-    return np.asarray(angular**2 / (1 - share**2 + 2j * DAMPING * share), dtype=np.complex128)
 
 
 def _centred(one: Observation) -> Array:

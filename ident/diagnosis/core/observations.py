@@ -274,12 +274,13 @@ def _estimated(observations: Sequence[Observation]) -> tuple[Array, dict[float, 
 
 def _unsure(observation: Observation, motion: AxisMotion) -> Array:
     dt, filters = observation.sample_time, observation.filter
+    speed_noise = math.sqrt(2) * observation.encoder / dt
     sticking = Sticking(
         where=motion.sticking,
         friction=float(observation.values[DIRECTION]),
         noise=1.0,
         blur=1 / (filters.cutoff * dt),
-        ends=turned_round(observation.encoder, float(observation.values[MASS]), dt),
+        ends=turned_round(speed_noise, float(observation.values[MASS]), dt),
     )
 
     def filtered(series: Array) -> Array:
