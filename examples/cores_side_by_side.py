@@ -48,12 +48,14 @@ def table(exam: ExamFolder, key: Path | None) -> str:
     cases, known = open_cases(exam, key), exam_identities(exam)
     columns: dict[Core, Mapping[str, str]] = {}
     counted = {}
+    whole: dict[Core, Sequence[Answer]] = {}
     for removed in (False, True):
         shared = [case for case in cases if all(_answered(folder, case, removed) for folder in folders.values())]
         counted[removed] = len(shared)
         for core, folder in folders.items():
             answers = read_answers(folder, shared, known, removed=removed) if shared else []
-            own = _without(answers) if removed else _with_all(answers)
+            own = _without(answers, whole[core]) if removed else _with_all(answers)
+            whole.setdefault(core, answers)
             columns[core] = {**columns.get(core, {}), **own}
     head = f"{counted[False]} cases, {counted[True]} of them with the true candidate left out as well"
     lines = [f"| {head} | {' | '.join(folders)} |", "|---|" + "---|" * len(folders)]
@@ -83,8 +85,9 @@ def _with_all(answers: Sequence[Answer]) -> dict[str, str]:
     return texts
 
 
-def _without(answers: Sequence[Answer]) -> dict[str, str]:
-    return {name: str(rate) for name, rate in removal_rates(answers).items() if name in SHOWN} if answers else {}
+def _without(answers: Sequence[Answer], whole: Sequence[Answer]) -> dict[str, str]:
+    rates = removal_rates(answers, whole) if answers else {}
+    return {name: str(rate) for name, rate in rates.items() if name in SHOWN}
 
 
 def main() -> None:

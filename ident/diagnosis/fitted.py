@@ -207,11 +207,11 @@ class Fitted:
         rows, confirming = self.rows, self.rows.confirming
         powers, turn = np.linalg.eigh(found.covariance)
         known = powers > np.finfo(float).eps * powers.max(initial=0.0)
-        prior = turn[:, known].T / np.sqrt(powers[known])[:, None]
+        axes, deviations = turn[:, known], np.sqrt(powers[known])
         left = rows.target - rows.stack(list(found.blocks))
-        white = self._weights.apply(rows, np.column_stack([rows.baseline @ turn[:, known], left]))[confirming]
-        asked = np.append(white[:, -1], np.zeros(len(prior)))
-        moved = turn[:, known] @ least_squares(np.vstack([white[:, :-1], prior @ turn[:, known]]), asked)
+        white = self._weights.apply(rows, np.column_stack([rows.baseline @ axes, left]))[confirming]
+        asked = np.append(white[:, -1], np.zeros(len(deviations)))
+        moved = axes @ least_squares(np.vstack([white[:, :-1], np.diag(1 / deviations)]), asked)
         first = len(self.problems[0].blocks)
         return [
             model + (block.baseline @ moved if index >= first else 0.0)

@@ -15,15 +15,14 @@ from ident.diagnosis.core.design import Design
 from ident.diagnosis.core.evidence import Member
 from ident.diagnosis.core.fit import Fit, fitted, temperature
 from ident.diagnosis.core.functions import FILTER
-from ident.diagnosis.core.hypotheses import Hypothesis, hypotheses
+from ident.diagnosis.core.hypotheses import LATE, Hypothesis, hypotheses
 from ident.diagnosis.core.observations import OFFSET, observe
 from ident.diagnosis.core.search import Search, State, price_of
-from ident.diagnosis.delays import HELD, RARER
+from ident.diagnosis.delays import HELD
 from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Verdict
 from ident.diagnosis.findings import LAW
 from ident.diagnosis.law.answer import Alternative, LawAnswer
 from ident.diagnosis.law.dependence import Variable
-from ident.diagnosis.names import EffectName
 from ident.records.axis_record import AxisRecord
 from ident.vehicle.quantities import Quantity
 
@@ -36,16 +35,10 @@ DOUBTED: Final = 0.5
 EXACT: Final = 0.01
 """Share of the held-out gap that a member must close beside others, whose columns are exact to about as much."""
 
-LATE: Final = 2
-"""Hypotheses of the lag, a delay and a filter, beside those with columns."""
-
 PLACE: Final = "axis"
 
 NOTHING: Final = ""
 """Name of no hypothesis."""
-
-_SIZES: Final[Mapping[str, str]] = {EffectName.TIME_DELAY: "delay", EffectName.TORQUE_FILTER: "time"}
-"""Parameter of what makes an effort late."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +113,7 @@ def diagnose_by_core(
     """
     observations, kind = observe(fit, confirm)
     tried = hypotheses(observations, lacking)
-    search = Search(Design(observations, tried), price_of(len(tried) + LATE))
+    search = Search(Design(observations, tried), price_of(len(tried) + len(LATE)))
     state = search.run()
     temper = temperature(state, len(fit))
     tempered = state.tempered(temper)
@@ -130,7 +123,7 @@ def diagnose_by_core(
     lag = _lag(tempered, search.price, lacking)
     late = lag.slot
     beyond = 0.0 if late is None else lag.beyond
-    led = late is not None and late.name == EffectName.TORQUE_FILTER
+    led = late is not None and late.name in LATE and LATE[late.name].led
     found = fitted(state, len(fit), kind, led=led, lag=beyond, temper=temper)
     effects = [
         _named(tried[index], slot, found, index)
@@ -186,11 +179,11 @@ def _lag(state: State, price: float, lacking: Collection[str]) -> Lag:
     # Uniform within what sampling does, and within what such rows could show.
     sampled = math.log(max(-math.expm1(float(np.logaddexp(above, below))), np.finfo(float).tiny)) - math.log(2 * widest)
     late = float(np.logaddexp(above, below)) - math.log(2 * longest) - price - sampled
-    odds: dict[str, float] = {}
-    if EffectName.TIME_DELAY not in lacking:
-        odds[EffectName.TIME_DELAY] = late
-    if EffectName.TORQUE_FILTER not in lacking:
-        odds[EffectName.TORQUE_FILTER] = late - RARER + state.led.log_evidence - state.log_evidence
+    odds = {
+        name: late - cause.rarer + (state.led.log_evidence - state.log_evidence if cause.led else 0.0)
+        for name, cause in LATE.items()
+        if name not in lacking
+    }
     free = next(index for index, each in enumerate(design.hypotheses) if each.function is FILTER)
     if free not in state.members:
         odds[LAW] = late + state.evidence.table(free, state.members).total
@@ -219,6 +212,6 @@ def _late(slot: Slot, lag: Lag, found: Fit) -> NamedEffect:
     if slot.name == LAW:
         law = LawAnswer(slot.variables[0], "", "", "dynamic", None, "", "", np.zeros((0, 3)), None, None, None)
     else:
-        parameters = {_SIZES[slot.name]: Quantity(lag.value, "s", "diagnosis", lag.std)}
+        parameters = {LATE[slot.name].parameter: Quantity(lag.value, "s", "diagnosis", lag.std)}
     probability = round(slot.odds[slot.name], 2)
     return NamedEffect(slot.name, PLACE, parameters, probability, slot.names, found.gap.closed, (), law)

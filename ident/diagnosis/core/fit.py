@@ -11,7 +11,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.axis.model import AxisEffect
 from ident.diagnosis.core.design import Design
 from ident.diagnosis.core.evidence import Member
 from ident.diagnosis.core.functions import FILTER, waves
@@ -20,7 +19,6 @@ from ident.diagnosis.core.observations import MASS, OFFSET
 from ident.diagnosis.core.search import State
 from ident.diagnosis.diagnosis import Gap
 from ident.diagnosis.law.answer import POINTS, LawAnswer
-from ident.diagnosis.names import EffectName
 from ident.records.axis_record import AxisKind
 from ident.vehicle.quantities import Quantity
 
@@ -34,21 +32,6 @@ WIDEST: Final = 1.0
 
 STEP: Final = 1e-4
 """Relative step of a family's number, for its derivative."""
-
-_WORDS: Final[Mapping[str, tuple[tuple[str, str], ...]]] = {
-    EffectName.STRIBECK: (("amplitude", "u"), ("velocity", "q/s")),
-    EffectName.ASYMMETRIC_VISCOUS: (("imbalance", "u s/q"),),
-    EffectName.QUADRATIC_DRAG: (("coefficient", "u s^2/q^2"),),
-    EffectName.TORQUE_RIPPLE: (("amplitude", "u"), ("order", "1/q"), ("phase", "rad")),
-    EffectName.ELASTICITY: (("compliance", "q/u"), ("resonance", "rad/s")),
-    EffectName.PRESLIDING: (("amplitude", "u"), ("distance", "q")),
-    AxisEffect.FRICTION_WARMING: (("change", "u"), ("time", "s")),
-    EffectName.FRICTION_POSITION: (("slope", "u/q"),),
-    EffectName.FRICTION_LOAD: (("share", "1"),),
-    AxisEffect.GRAVITY_LOAD: (("slope", "u/q"),),
-    AxisEffect.INERTIA_POSITION: (("slope", "u s^2/q^2"),),
-}
-"""Parameters and units of every family, u for that of the effort and q for that of the position."""
 
 
 @dataclass(frozen=True)
@@ -252,10 +235,11 @@ def _quantities(
     relative = float(std[-1]) if len(std) > len(a) else math.nan
     std = std[: len(a)] / design.sizes[block.place]
     values, errors = [float(a[0]), block.number], [float(std[0]), relative * block.number]
-    if hypothesis.name == EffectName.ELASTICITY:
+    if hypothesis.response is not None:
         scale = (design.observations[0].values[MASS] / mass) ** 2
         values[0], errors[0] = values[0] * scale, errors[0] * scale
-    elif hypothesis.name == EffectName.TORQUE_RIPPLE:
+    elif len(a) > 1:
+        # Sine and cosine of a wave.
         size, both = (
             float(np.hypot(*a)),
             covariance[:2, :2] / np.outer(design.sizes[block.place], design.sizes[block.place]),
@@ -265,7 +249,7 @@ def _quantities(
         errors = [math.sqrt(along @ both @ along), errors[1], math.sqrt(across @ both @ across) / size]
     return {
         word: Quantity(value, _unit(unit, kind), "diagnosis", error)
-        for (word, unit), value, error in zip(_WORDS[hypothesis.name], values, errors, strict=False)
+        for (word, unit), value, error in zip(hypothesis.parameters, values, errors, strict=False)
     }
 
 

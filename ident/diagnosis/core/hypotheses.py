@@ -7,8 +7,9 @@ show. A free function is a Gaussian process of one variable, whose length stands
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -30,6 +31,7 @@ from ident.diagnosis.names import EffectName
 
 Array = NDArray[np.float64]
 Observations = Sequence[Observation]
+Parameters = tuple[tuple[str, str], ...]
 
 EVERY: Final = 1.2
 """Ratio of neighbouring numbers of a family on a logarithmic grid; between them it is refined."""
@@ -53,7 +55,8 @@ class Hypothesis:
         factors: (K, R) of the prior covariance of the columns by number; empty: the columns are independent.
         function: of which it is one, for a law.
         response: angular frequencies (F,) and number -> what a coefficient of one adds to the inertia, over it: the
-            noise of the acceleration is amplified by as much.
+            noise of the acceleration is amplified by as much. Its size goes with the square of the inertia then.
+        parameters: of a name, each with its unit, u for that of the effort and q for that of the position.
     """
 
     name: str
@@ -62,6 +65,7 @@ class Hypothesis:
     factors: tuple[Array, ...] = ()
     function: Function | None = None
     response: Callable[[Array, float], NDArray[np.complex128]] | None = None
+    parameters: Parameters = ()
 
     @property
     def free(self) -> bool:
@@ -84,9 +88,12 @@ def _free(function: Function, observations: Observations) -> Hypothesis:
     return Hypothesis("law", lengths, lambda one, _: basis.columns(one), factors, function)
 
 
-def _one(name: str, series: Callable[[Observation], Array]) -> Callable[[Observations], Hypothesis]:
+def _one(
+    name: str, parameter: str, unit: str, series: Callable[[Observation], Array]
+) -> Callable[[Observations], Hypothesis]:
     """A family of one column (N,)."""
-    return lambda _: Hypothesis(name, np.array([np.nan]), lambda one, _number: series(one)[:, None])
+    alone, stated = np.array([np.nan]), ((parameter, unit),)
+    return lambda _: Hypothesis(name, alone, lambda one, _number: series(one)[:, None], parameters=stated)
 
 
 def _between(low: float, high: float) -> Array:
@@ -112,7 +119,8 @@ def _stribeck(observations: Observations) -> Hypothesis:
         velocity = one.velocity
         return (one.direction * np.exp(-np.square(velocity / speed)))[:, None]
 
-    return Hypothesis(EffectName.STRIBECK, _between(_slowest(observations), _fastest(observations)), series)
+    speeds = _between(_slowest(observations), _fastest(observations))
+    return Hypothesis(EffectName.STRIBECK, speeds, series, parameters=(("amplitude", "u"), ("velocity", "q/s")))
 
 
 def _presliding(observations: Observations) -> Hypothesis:
@@ -121,7 +129,8 @@ def _presliding(observations: Observations) -> Hypothesis:
 
     shortest = min(float(one.at_rows(one.path).min()) for one in observations)
     reach = _reach(observations)
-    return Hypothesis(EffectName.PRESLIDING, _between(max(shortest, reach / 1000), reach), series)
+    paths = _between(max(shortest, reach / 1000), reach)
+    return Hypothesis(EffectName.PRESLIDING, paths, series, parameters=(("amplitude", "u"), ("distance", "q")))
 
 
 def _warming(observations: Observations) -> Hypothesis:
@@ -129,7 +138,8 @@ def _warming(observations: Observations) -> Hypothesis:
         return np.asarray(one.direction * (1 - np.exp(-one.time / constant)))[:, None]
 
     longest = max(float(one.time[-1]) for one in observations)
-    return Hypothesis(AxisEffect.FRICTION_WARMING, _between(longest / len(observations[0]) * 3, longest), series)
+    times = _between(longest / len(observations[0]) * 3, longest)
+    return Hypothesis(AxisEffect.FRICTION_WARMING, times, series, parameters=(("change", "u"), ("time", "s")))
 
 
 def _ripple(observations: Observations) -> Hypothesis:
@@ -142,7 +152,8 @@ def _ripple(observations: Observations) -> Hypothesis:
     reach, usual = _reach(observations), float(np.median(np.abs(observations[0].velocity)))
     most = observations[0].filter.bandwidth / (2 * np.pi * usual)
     orders = np.arange(4.0, max(4 * reach * most, 5.0)) / (4 * reach)
-    return Hypothesis(EffectName.TORQUE_RIPPLE, orders, series)
+    stated = (("amplitude", "u"), ("order", "1/q"), ("phase", "rad"))
+    return Hypothesis(EffectName.TORQUE_RIPPLE, orders, series, parameters=stated)
 
 
 def _elasticity(observations: Observations) -> Hypothesis:
@@ -157,7 +168,8 @@ def _elasticity(observations: Observations) -> Hypothesis:
     # A resonance is as wide as its damping: from beside it, nothing leads there.
     count = round(math.log(RIGID) / 2 / (2 * DAMPING))
     resonances = np.append(np.geomspace(band / 2, math.sqrt(RIGID) / 2 * band, count), RIGID * band)
-    return Hypothesis(EffectName.ELASTICITY, resonances, series, response=response)
+    stated = (("compliance", "q/u"), ("resonance", "rad/s"))
+    return Hypothesis(EffectName.ELASTICITY, resonances, series, response=response, parameters=stated)
 
 
 def _centred(one: Observation) -> Array:
@@ -172,14 +184,35 @@ def following(one: Observation) -> Array:
 
 _FAMILIES: Final[Sequence[Callable[[Observations], Hypothesis]]] = (
     _stribeck,
-    _one(EffectName.ASYMMETRIC_VISCOUS, lambda one: np.abs(one.velocity)),
-    _one(EffectName.QUADRATIC_DRAG, lambda one: one.velocity * np.abs(one.velocity)),
+    _one(EffectName.ASYMMETRIC_VISCOUS, "imbalance", "u s/q", lambda one: np.abs(one.velocity)),
+    _one(EffectName.QUADRATIC_DRAG, "coefficient", "u s^2/q^2", lambda one: one.velocity * np.abs(one.velocity)),
     _ripple,
     _elasticity,
     _presliding,
     _warming,
-    _one(EffectName.FRICTION_POSITION, lambda one: _centred(one) * one.direction),
-    _one(EffectName.FRICTION_LOAD, lambda one: np.abs(one.effort) * one.direction),
-    _one(AxisEffect.GRAVITY_LOAD, _centred),
-    _one(AxisEffect.INERTIA_POSITION, lambda one: _centred(one) * one.acceleration),
+    _one(EffectName.FRICTION_POSITION, "slope", "u/q", lambda one: _centred(one) * one.direction),
+    _one(EffectName.FRICTION_LOAD, "share", "1", lambda one: np.abs(one.effort) * one.direction),
+    _one(AxisEffect.GRAVITY_LOAD, "slope", "u/q", _centred),
+    _one(AxisEffect.INERTIA_POSITION, "slope", "u s^2/q^2", lambda one: _centred(one) * one.acceleration),
 )
+
+
+@dataclass(frozen=True)
+class Late:
+    """What makes an effort late beyond what sampling does.
+
+    Attributes:
+        parameter: its time [s].
+        led: whether the effort follows by a filter, whose second order is another one.
+        rarer: log odds against a plain delay, before the rows.
+    """
+
+    parameter: str
+    led: bool = False
+    rarer: float = 0.0
+
+
+LATE: Final[Mapping[str, Late]] = MappingProxyType(
+    {EffectName.TIME_DELAY: Late("delay"), EffectName.TORQUE_FILTER: Late("time", led=True, rarer=RARER)}
+)
+"""By name; beside the hypotheses with columns."""
