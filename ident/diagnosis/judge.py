@@ -91,12 +91,16 @@ def _judged_once(
         return _judged(found, laws, limits, seed)
 
     judgement = concluded_from(searched)
-    if not judgement.incomplete() or not problems[0].dependences:
+    if not problems[0].dependences or (judgement.found.variants and not judgement.incomplete()):
         return judgement
     stage(f"on what the remainder depends: {len(problems[0].dependences)} possibilities")
     designs = Designs(problems, regression.rows)
     starts = [searched, *([Shaped(problems, regression, ())] if searched.taken else [])]
-    found = [judgement, *(one for start in starts if (one := _with_laws(start, designs, concluded_from)) is not None)]
+    found = [one for start in starts if (one := _with_laws(start, designs, concluded_from)) is not None]
+    if not judgement.found.variants:
+        # A law has its evidence against nothing at all, as a name has: of a small cause the gap says too little.
+        return next((one for one in found if one.has_law), judgement)
+    found = [judgement, *found]
     floors = np.min([one.fitted.floors for one in found], axis=0)
     acting = frozenset[str]().union(*(one.fitted.reached for one in found))
     masks = [one.fitted.told for one in found if one.fitted.told]

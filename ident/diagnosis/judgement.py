@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.diagnosis import Verdict
-from ident.diagnosis.findings import Cause, Findings
+from ident.diagnosis.findings import Cause, Findings, ordered
 from ident.diagnosis.fitted import Fitted
 from ident.diagnosis.law.answer import LawAnswer, alternatives, law_answer, same_names
 from ident.diagnosis.law.drift import drift_cause
@@ -63,7 +62,7 @@ class Judgement:
             events=tuple(self.problems[0].candidates[owner].key for owner in self.found.rest.events),
             gap=self.fitted.settled if verdict is Verdict.NONE else self.fitted.exactly,
             where=shares(self.rows, self.fitted.floors, self.fitted.judged()),
-            invisible=invisible_names(self.regression),
+            invisible=self.regression.invisible(),
             before=self.fitted.before,
             after=self.fitted.after,
             significance=min(slot.evidence.significance for slot in (self.found.rest, *self.found.slots)),
@@ -80,6 +79,11 @@ class Judgement:
         left = self._verdict() is Verdict.UNKNOWN or self._predictable() or self._repeats.by_no_accident
         bent = Curve.ANOTHER in self._curves
         return left or bent or self.fitted.exactly.after**2 > 1 + self.limits.measurable
+
+    @property
+    def has_law(self) -> bool:
+        """Whether a law is one of the causes."""
+        return bool(self._law_keys())
 
     def _law_keys(self) -> list[str]:
         owners = {self.regression.owners[variant] for variant in self.found.variants}
@@ -260,7 +264,7 @@ class Judgement:
 
     def _causes(self) -> tuple[Cause, ...]:
         made = [self._cause(index, variant) for index, variant in enumerate(self.found.variants)]
-        return _ordered(made)
+        return ordered(made)
 
     def _cause(self, index: int, variant: int) -> Cause:
         settings = calibration()
@@ -287,24 +291,3 @@ class Judgement:
     def _law_answer(self, law: Law, index: int, variant: int) -> LawAnswer:
         nearest = nearest_name(self.regression, self.found.slots[index], variant, {law.number for law in self.laws})
         return law_answer(law, channel_of(self.problems[0], self.rows.layout[variant]), nearest)
-
-
-def _ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
-    """By the share of the held-out gap that needs them, to a half, then by evidence; none surer than those before it.
-
-    What is found beside another cause is right only as far as that one is.
-    """
-    found: list[Cause] = []
-    for cause in sorted(causes, key=lambda cause: (-round(2 * cause.needed), -cause.log_evidence)):
-        surest = min([cause.probability, *(other.probability for other in found[-1:])])
-        found.append(replace(cause, probability=surest))
-    return tuple(found)
-
-
-def invisible_names(regression: Regression) -> tuple[str, ...]:
-    """Names of effects of which no place and no variant leaves anything beside the baseline."""
-    sizes = regression.evidence(regression.whitener(()), ()).directions.sizes
-    candidates = regression.problem.candidates
-    visible = {candidates[owner].effect for owner, size in zip(regression.owners, sizes, strict=True) if size}
-    names = dict.fromkeys(candidate.effect for candidate in candidates)
-    return tuple(str(name) for name in names if name not in visible)

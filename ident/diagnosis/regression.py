@@ -228,6 +228,14 @@ class Regression:
         best = [self._simplest(variants, found) for variants in contenders.values()]
         return Slot(evidence, tuple(sorted(best, key=lambda variant: -float(found[variant]))), events, seen)
 
+    def invisible(self) -> tuple[str, ...]:
+        """Names of effects of which no place and no variant leaves anything beside the baseline."""
+        sizes = self.evidence(self.whitener(()), ()).directions.sizes
+        candidates = self.problem.candidates
+        visible = {candidates[owner].effect for owner, size in zip(self.owners, sizes, strict=True) if size}
+        names = dict.fromkeys(candidate.effect for candidate in candidates)
+        return tuple(str(name) for name in names if name not in visible)
+
     def _simplest(self, variants: Sequence[int], log_evidence: Array) -> int:
         """The best variant of a candidate, or one of fewer columns that is nearly as good."""
         best: int = max(variants, key=lambda variant: float(log_evidence[variant]))

@@ -19,8 +19,8 @@ from ident.plant.places import STEERING, WHEEL_PLACES, rows_of, with_groups
 from ident.plant.symbolic import Expression
 from ident.plant.terms import FIRST_WHEEL, Masses, State
 
-COUNT: Final = 24
-"""Coefficients of a function."""
+COUNT: Final = 48
+"""Coefficients of a function: three in a period follow sixteen periods over its range."""
 
 _FIRST_RANK: Final = 1000
 

@@ -27,7 +27,6 @@ def axis_dependences(axis: AxisModel) -> list[Dependence]:
         (Variable.ANGLE, direction, motion.position, position),
         (Variable.ANGLE, Partner.ACCELERATION, motion.position, position),
         (Variable.ANGLE, Partner.RATE, motion.position, position),
-        (Variable.ACCELERATION, nothing, motion.acceleration, f"{position}/s^2"),
         (Variable.LOAD, nothing, axis.effort, effort),
         (Variable.LOAD, direction, np.abs(axis.effort), effort),
         (Variable.LOAD_RATE, nothing, load_rate, f"{effort}/s"),

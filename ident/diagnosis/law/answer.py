@@ -14,13 +14,13 @@ from ident.diagnosis.law.dependence import Dependence, law_name
 from ident.diagnosis.law.formula import formula_of
 from ident.diagnosis.law.stage import Law
 from ident.effects import Effect, make_effect
-from ident.effects.laws import LAWS, coefficient
+from ident.effects.laws import COUNT, LAWS, coefficient
 from ident.writing import json_number
 
 Array = NDArray[np.float64]
 
-POINTS: Final = 41
-"""Of a curve."""
+POINTS: Final = 2 * COUNT - 5
+"""Of a curve: two for every step between its knots."""
 
 
 @dataclass(frozen=True)

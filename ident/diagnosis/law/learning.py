@@ -28,7 +28,7 @@ from ident.diagnosis.whitening import Whitener
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-LENGTHS: Final = (1.0, 0.5, 0.25, 0.125, 0.07)
+LENGTHS: Final = (1.0, 0.5, 0.25, 0.125, 0.07, 0.035)
 """Of a function that are tried, over the range of its variable; the last is what the knots resolve."""
 
 ROUNDING: Final = 1e-9
@@ -111,12 +111,11 @@ class Learner:
             knots: of its function.
         """
         white = self._white(design)
-        left = self._part.without(white[self.fitted])
-        span = knots.period or knots.ends[1] - knots.ends[0]
-        best = max((_fit(left, self._part, knots.prior(share * span)) for share in LENGTHS), key=lambda fit: fit.log)
+        part = _Moments.of(white[self.fitted], self._part)
+        best = max((_fit(part, knots.prior(share)) for share in LENGTHS), key=lambda fit: fit.log)
         if not best.log > 0:
             return None
-        whole = _fit(self._all.without(white), self._all, best.prior, best.size)
+        whole = _fit(_Moments.of(white, self._all), best.prior, best.size)
         scale = self._scale(best, whole)
         turn = best.prior @ _beside_absorbed(white @ best.prior, self._all)
         return Learnt(
@@ -153,6 +152,27 @@ class Learner:
 
 
 @dataclass(frozen=True)
+class _Moments:
+    """Columns (n, K) beside the baseline in some rows, and their products.
+
+    Attributes:
+        columns: (n, K).
+        powers: (K, K) products of them.
+        amplitudes: (K,) products of them and the residual.
+    """
+
+    columns: Array
+    powers: Array
+    amplitudes: Array
+
+    @classmethod
+    def of(cls, columns: Array, beside: _Beside) -> _Moments:
+        """Those of whitened columns (n, K)."""
+        left = beside.without(columns)
+        return cls(left, left.T @ left, left.T @ beside.residual)
+
+
+@dataclass(frozen=True)
 class _Fit:
     """A function of one prior beside some rows.
 
@@ -162,7 +182,7 @@ class _Fit:
         log: log evidence against no function.
         mean: (R,) coefficients in the directions of the prior.
         covariance: (R, R) of them.
-        shape: (n,) what it adds.
+        moments: of the rows.
     """
 
     prior: Array
@@ -170,22 +190,26 @@ class _Fit:
     log: float
     mean: Array
     covariance: Array
-    shape: Array
+    moments: _Moments
+
+    @property
+    def shape(self) -> Array:
+        """What it adds to the rows (n,)."""
+        return np.asarray(self.moments.columns @ (self.prior @ self.mean))
 
 
-def _fit(columns: Array, beside: _Beside, prior: Array, size: float | None = None) -> _Fit:
-    """The most likely size, or the one given, of a function with columns (n, K) and a prior (K, R)."""
-    design = columns @ prior
-    powers, turn = np.linalg.eigh(design.T @ design)
+def _fit(moments: _Moments, prior: Array, size: float | None = None) -> _Fit:
+    """The most likely size, or the one given, of a function with a prior (K, R)."""
+    powers, turn = np.linalg.eigh(prior.T @ moments.powers @ prior)
     powers = np.maximum(powers, 0.0)
-    amplitudes = turn.T @ (design.T @ beside.residual)
+    amplitudes = turn.T @ (prior.T @ moments.amplitudes)
     largest = max(float(powers.max(initial=0.0)), np.finfo(float).tiny)
     sizes = np.array([size]) if size is not None else np.array(SIZES) / largest
     gains = sizes[:, None] / (1 + sizes[:, None] * powers)
     logs = 0.5 * np.sum(gains * amplitudes**2 - np.log1p(sizes[:, None] * powers), axis=1)
     best = int(np.argmax(logs))
     mean = turn @ (gains[best] * amplitudes)
-    return _Fit(prior, float(sizes[best]), float(logs[best]), mean, turn * gains[best] @ turn.T, design @ mean)
+    return _Fit(prior, float(sizes[best]), float(logs[best]), mean, turn * gains[best] @ turn.T, moments)
 
 
 def _beside_absorbed(design: Array, beside: _Beside) -> Array:

@@ -7,6 +7,7 @@ The coefficients have the covariance of a Gaussian process with a squared-expone
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -59,24 +60,37 @@ class Knots:
             found[rows, (first + index - 1) % COUNT] = weight / 6
         return found.reshape(*np.shape(x), COUNT)
 
-    def prior(self, length: float) -> Array:
+    def prior(self, share: float) -> Array:
         """Factor L (COUNT, R) of the covariance L Lᵀ of the coefficients, of unit variance about a straight line.
 
         The line has unit variance too: where the fitted rows end, the function goes on straight.
 
         Args:
-            length: over which the function changes, in the unit of the variable.
+            share: length over which the function changes, over its period or the range of its variable.
         """
-        distance = self.places[:, None] - self.places
-        if self.period:
-            distance = self.period / np.pi * np.sin(np.pi * distance / self.period)
-        powers, vectors = np.linalg.eigh(np.exp(-0.5 * (distance / length) ** 2))
-        kept = powers > LEAST_POWER * powers.max()
-        wave = vectors[:, kept] * np.sqrt(powers[kept])
-        if self.period:
-            return np.asarray(wave)
-        along = np.linspace(-1.0, 1.0, COUNT)
-        return np.column_stack([wave, np.ones(COUNT), along])
+        return _around(share) if self.period else _along(share)
+
+
+@cache
+def _along(share: float) -> Array:
+    """The factor of a function of a range."""
+    along = np.linspace(-1.0, 1.0, COUNT)
+    steps = np.arange(COUNT)
+    return np.column_stack([_wave(np.subtract.outer(steps, steps) / (COUNT - 3), share), np.ones(COUNT), along])
+
+
+@cache
+def _around(share: float) -> Array:
+    """The factor of a function that comes around."""
+    steps = np.arange(COUNT)
+    return _wave(np.sin(np.pi * np.subtract.outer(steps, steps) / COUNT) / np.pi, share)
+
+
+def _wave(distance: Array, share: float) -> Array:
+    """Factor of a covariance that falls with the distance (COUNT, COUNT) over a length."""
+    powers, vectors = np.linalg.eigh(np.exp(-0.5 * (distance / share) ** 2))
+    kept = powers > LEAST_POWER * powers.max()
+    return np.asarray(vectors[:, kept] * np.sqrt(powers[kept]))
 
 
 def knots_over(low: float, high: float) -> Knots:
