@@ -17,7 +17,7 @@ from scipy import linalg
 
 from ident.diagnosis.directions import VISIBLE
 from ident.diagnosis.evidence import scatter
-from ident.diagnosis.law.dependence import Dependence
+from ident.diagnosis.law.dependence import Dependence, Variable
 from ident.diagnosis.law.spline import Knots, knots_around, knots_over
 from ident.diagnosis.linear import orthonormal
 from ident.diagnosis.problem import Problem
@@ -30,6 +30,9 @@ Mask = NDArray[np.bool_]
 
 LENGTHS: Final = (1.0, 0.5, 0.25, 0.125, 0.07, 0.035)
 """Of a function that are tried, over the range of its variable; the last is what the knots resolve."""
+
+SHORTEST_IN_TIME: Final = 0.07
+"""Of a function of time, over the record: what is shorter follows the motion, and two records of one motion agree."""
 
 ROUNDING: Final = 1e-9
 """Range of a variable, relative to its size, from which it changes."""
@@ -112,7 +115,8 @@ class Learner:
         """
         white = self._white(design)
         part = _Moments.of(white[self.fitted], self._part)
-        best = max((_fit(part, knots.prior(share)) for share in LENGTHS), key=lambda fit: fit.log)
+        shares = [share for share in LENGTHS if share >= knots.shortest]
+        best = max((_fit(part, knots.prior(share)) for share in shares), key=lambda fit: fit.log)
         if not best.log > 0:
             return None
         whole = _fit(_Moments.of(white, self._all), best.prior, best.size)
@@ -269,4 +273,6 @@ def _knots_of(parts: Sequence[Dependence], samples: Sequence[NDArray[np.int64]])
     if not used:
         return None
     low, high = min(float(x.min()) for x in used), max(float(x.max()) for x in used)
-    return knots_over(low, high) if high - low > ROUNDING * max(abs(low), abs(high)) else None
+    if high - low <= ROUNDING * max(abs(low), abs(high)):
+        return None
+    return knots_over(low, high, SHORTEST_IN_TIME if parts[0].variable is Variable.TIME else 0.0)

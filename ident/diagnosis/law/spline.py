@@ -29,11 +29,13 @@ class Knots:
         start: of the first one, a step before the range begins.
         step: between them.
         period: of the variable; 0 where it does not come around. The steps then go once around.
+        shortest: length over which the function may change, over its period or the range of its variable.
     """
 
     start: float
     step: float
     period: float = 0.0
+    shortest: float = 0.0
 
     @property
     def places(self) -> Array:
@@ -93,10 +95,10 @@ def _wave(distance: Array, share: float) -> Array:
     return np.asarray(vectors[:, kept] * np.sqrt(powers[kept]))
 
 
-def knots_over(low: float, high: float) -> Knots:
+def knots_over(low: float, high: float, shortest: float = 0.0) -> Knots:
     """Knots of a range."""
     step = (high - low) / (COUNT - 3)
-    return Knots(low - step, step)
+    return Knots(low - step, step, shortest=shortest)
 
 
 def knots_around(period: float) -> Knots:
