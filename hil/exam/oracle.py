@@ -8,6 +8,7 @@ rate of false alarms. Of axes and of vehicles alike; nothing is searched, nothin
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -132,7 +133,7 @@ def oracle_rates(folder: ExamFolder, cases: Sequence[Case], false_alarms: float)
 
 def _values(said: Mapping[str, float | None]) -> list[float]:
     """Log evidence; of what is invisible the least there is."""
-    return [np.finfo(float).min if value is None else value for value in said.values()]
+    return [-sys.float_info.max if value is None else value for value in said.values()]
 
 
 def _key(case: Case) -> str:

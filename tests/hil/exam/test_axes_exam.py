@@ -108,6 +108,10 @@ def test_it_is_sealed_diagnosed_and_scored(tmp_path: Path) -> None:
     score = json.loads((tmp_path / "exam" / "score.json").read_text())
     assert (score["cases"], score["sealed"], score["missing"]) == (3, True, {})
     assert sum(name.startswith(ORACLE) for name in score["rates"]) == 1
+    for answer in (tmp_path / "exam" / "oracle").iterdir():
+        answer.write_text(json.dumps(dict.fromkeys(json.loads(answer.read_text()))))
+    blind = quasiomni("exam", "score", out, *key)
+    assert blind.returncode == 0, blind.stderr
     for record in (tmp_path / "exam" / "cases").iterdir():
         record.unlink()
     for option in ([], ["--oracle", *key]):
