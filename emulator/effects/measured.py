@@ -16,7 +16,7 @@ from emulator.effects.base import Injector, Placed, at_joints
 from emulator.effects.laws import Law, Moment
 from emulator.effects.places import JOINTS, JointAxis
 
-COUNT: Final = 24
+COUNT: Final = 48
 """Coefficients of a table."""
 
 

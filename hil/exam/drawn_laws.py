@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 MEASURE: Final = "asymmetric_coulomb"
 """The effect whose size says how many Nm are a noise unit at a joint: it pushes with its size wherever that moves."""
 
+DRAWN: Final = 24
+"""Points of a shape, which are the coefficients of a spline; a law has them on half of the step."""
+
 SLACK: Final = 0.5
 """Largest share of the range by which the coefficients reach beyond it, on either side."""
 
@@ -81,8 +84,8 @@ def _drawn(name: str, where: str, size: float, table: SizeTable, generator: np.r
 
 
 def _smooth(length: float, periodic: bool, generator: np.random.Generator) -> Array:
-    """(COUNT,) of a Gaussian process of unit variance over [0, 1]."""
-    distance = np.subtract.outer(np.arange(COUNT), np.arange(COUNT)) / (COUNT if periodic else COUNT - 3)
+    """(DRAWN,) of a Gaussian process of unit variance over [0, 1]."""
+    distance = np.subtract.outer(np.arange(DRAWN), np.arange(DRAWN)) / (DRAWN if periodic else DRAWN - 3)
     if periodic:
         distance = np.sin(np.pi * distance) / np.pi
     return smooth_values(distance, length, generator)
@@ -101,17 +104,34 @@ def law_effect(injected: Injected, planned: Record) -> Effect:
     periodic = injected.name == "law_angle" and injected.where in WHEEL_PLACES
     variables = [joint.rate if injected.name == "law_rate" else joint.angle for joint in joints]
     if periodic:
-        period, start, step = 2 * math.pi, 0.0, 2 * math.pi / COUNT
+        period, start, step = 2 * math.pi, 0.0, math.pi / DRAWN
     else:
         low, high = min(x.min() for x in variables), max(x.max() for x in variables)
         reach = high - low
-        period, step = 0.0, reach * (1 + before + behind) / (COUNT - 3)
+        period, step = 0.0, reach * (1 + before + behind) / (DRAWN - 3) / 2
         start = low - before * reach - step
     values = {"scale": 1.0, "start": start, "step": step, "period": period}
+    points = np.array([numbers[coefficient(index)] for index in range(DRAWN)])
+    numbers = {coefficient(index): value for index, value in enumerate(_halved(points, periodic).tolist())}
     law = make_effect(injected.name, injected.where, values | numbers)
     left = [_left(law, joint, x) for joint, x in zip(joints, variables, strict=True)]
     scale = injected.size * unit / max(rms(np.concatenate(left)), np.finfo(float).tiny)
     return make_effect(injected.name, injected.where, values | {"scale": scale} | numbers)
+
+
+def _halved(points: Array, periodic: bool) -> Array:
+    """Coefficients (COUNT,) on half of the step, of the spline that has those (DRAWN,) on the whole one.
+
+    The curve is the same (Lane and Riesenfeld 1980); beyond a range it goes over to the value at its end.
+    """
+    before, behind = np.roll(points, 1), np.roll(points, -1)
+    on, between = (before + 6 * points + behind) / 8, (points + behind) / 2
+    fine = np.column_stack([on, between]).ravel()
+    if periodic:
+        return fine
+    fine = fine[1 : 2 * DRAWN - 2]
+    last = (fine[-3] + 4 * fine[-2] + fine[-1]) / 6
+    return np.append(fine, np.full(COUNT - len(fine), last))
 
 
 def _joint(planned: Record, joint: int) -> Joint:

@@ -46,7 +46,7 @@ def law_at(name: str, where: str) -> Effect:
     """A wave over what a campaign goes through, around for wheels."""
     waves = {coefficient(index): 1.5 + np.sin(1.3 * index) for index in range(COUNT)}
     around = name.startswith("law_angle") and where.startswith("wheel")
-    numbers = {"scale": 0.7, "start": -1.1, "step": 0.1, "period": 2.4 if around else 0.0}
+    numbers = {"scale": 0.7, "start": -1.1, "step": 0.1, "period": 0.1 * COUNT if around else 0.0}
     if name == "law_time_direction":
         numbers |= {"start": 50.0, "step": 1.0}
     return make_effect(name, where, numbers | waves)

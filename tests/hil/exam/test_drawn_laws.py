@@ -6,13 +6,14 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 
 from emulator.effects import inject
 from emulator.effects.measured import Table
 from emulator.prototype import load_prototype
 from hil.exam.cases import Kind
 from hil.exam.drawing import Composition, draw_cases
-from hil.exam.drawn_laws import draw_laws, law_effect
+from hil.exam.drawn_laws import DRAWN, draw_laws, law_effect
 from hil.exam.identity import planned_record
 from hil.exam.plans import CONFIRMING
 from hil.exam.sizes import SizeTable
@@ -53,11 +54,32 @@ def test_what_the_model_leaves_of_a_law_is_as_large_as_asked(table: SizeTable, p
     assert np.sqrt(np.mean(left**2)) == pytest.approx(1.5 * row.physical(1.0), rel=0.02)
 
 
+@pytest.mark.parametrize("name", ["law_rate", "law_angle"])
+def test_a_law_is_the_curve_that_was_drawn(table: SizeTable, planned: Record, name: str) -> None:
+    """By SciPy's splines on the points as they were drawn; of a wheel's angle it comes around."""
+    law = next(
+        one
+        for one in draw_laws(table, [1.5] * 40, np.random.default_rng(1))
+        if one.name == name and str(one.where).startswith("wheel_")
+    )
+    effect = law_effect(law, planned)
+    coefficients = tuple(effect[coefficient(index)] for index in range(COUNT))
+    curve = Table(effect["start"], effect["step"], effect["period"], coefficients)
+    points = np.array([law.values[coefficient(index)] for index in range(DRAWN)])
+    step = 2 * effect["step"]
+    if effect["period"]:
+        points = np.concatenate([points[-1:], points, points[:2]])
+    first = -step if effect["period"] else effect["start"] - effect["step"]
+    drawn = BSpline(first + step * np.arange(-2, len(points) + 2), points, 3)
+    for x in np.linspace(first + step, first + step * (len(points) - 2), 101):
+        assert curve(x) == pytest.approx(float(drawn(x)), abs=1e-9)
+
+
 def test_laws_are_of_every_name_at_many_places_and_no_two_alike(table: SizeTable) -> None:
     laws = draw_laws(table, [1.0] * 64, np.random.default_rng(2))
     assert set(Counter(law.name for law in laws).values()) == {16}
     assert len({(law.name, law.where) for law in laws}) > 12
-    shapes = {tuple(law.values[coefficient(index)] for index in range(COUNT)) for law in laws}
+    shapes = {tuple(law.values[coefficient(index)] for index in range(DRAWN)) for law in laws}
     assert len(shapes) == len(laws)
 
 
