@@ -21,7 +21,7 @@ _NAMES: Final[Mapping[int, str]] = MappingProxyType(
     {
         getattr(ca, f"OP_{name.upper()}"): name
         for name in (
-            *("add", "sub", "mul", "div", "neg", "sq", "sqrt", "twice", "inv", "fabs", "sign", "fmax", "fmin"),
+            *("add", "sub", "mul", "div", "neg", "sq", "sqrt", "twice", "inv", "fabs", "sign", "fmax", "fmin", "floor"),
             *("sin", "cos", "tan", "asin", "acos", "atan", "tanh", "exp", "log", "atan2", "pow", "constpow"),
             *("lt", "le", "eq", "ne", "not", "and", "or", "if_else_zero"),
         )

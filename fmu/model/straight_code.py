@@ -20,7 +20,7 @@ _WRITTEN: Final[Mapping[str, str]] = MappingProxyType(
     {
         **{name: f"{{0}} {sign} {{1}}" for name, sign in (("add", "+"), ("sub", "-"), ("mul", "*"), ("div", "/"))},
         **{name: f"{name}({{0}})" for name in ("sqrt", "fabs", "sin", "cos", "tan", "asin", "acos", "atan")},
-        **{name: f"{name}({{0}})" for name in ("exp", "log")},
+        **{name: f"{name}({{0}})" for name in ("exp", "log", "floor")},
         **{name: f"{{0}} {sign} {{1}}" for name, sign in (("lt", "<"), ("le", "<="), ("eq", "=="), ("ne", "!="))},
         "tanh": "qo_tanh({0})",
         "neg": "-{0}",

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from emulator.effects.measured import Table
 from fmu.table import neutral_effects, variable_table
 from fmu.variables import Block
-from ident.effects import make_effect
+from ident.effects import LAWS, make_effect
+from ident.effects.laws import COUNT, coefficient
 from ident.vehicle.description import load_vehicle
 
 GRAVITY = 9.80665
@@ -25,6 +27,20 @@ def plain(core_of: Callable[..., Any]) -> Any:
 @pytest.fixture(scope="module")
 def extended(core_of: Callable[..., Any]) -> Any:
     return core_of("prototype", neutral_effects())
+
+
+WAVE = tuple(float(1.5 + np.sin(1.3 * index)) for index in range(COUNT))
+AROUND = 0.1 * COUNT
+
+
+@pytest.fixture(scope="module")
+def lawful(core_of: Callable[..., Any]) -> Any:
+    """With every law without a name at one wheel, of size zero; what is over an angle comes around."""
+    numbers = {"scale": 0.0, "start": -1.1, "step": 0.1} | {coefficient(index): one for index, one in enumerate(WAVE)}
+    return core_of(
+        "prototype",
+        [make_effect(name, "wheel_rl", numbers | {"period": AROUND * ("angle" in name)}) for name in LAWS],
+    )
 
 
 def rates_of(instance: Any) -> dict[str, float]:
@@ -66,6 +82,20 @@ def test_a_stribeck_hump_holds_what_coulomb_friction_would_let_go(extended: Any)
             each.step(0.002)
     assert instance["alpha_l"] > 0.1
     assert abs(humped["alpha_l"]) < 3e-3
+
+
+@pytest.mark.parametrize("angle", [-3.0, -0.2, 0.3, 9.1])
+@pytest.mark.parametrize("rate", [-0.4, 2.0])
+@pytest.mark.parametrize(
+    ("name", "over", "times"), [("rate", "rate", 1.0), ("angle", "angle", 1.0), ("angle_rate", "angle", None)]
+)
+def test_a_law_is_the_curve_of_its_table(
+    lawful: Any, name: str, over: str, times: float | None, angle: float, rate: float
+) -> None:
+    added = change(lawful, f"law_{name}.wheel_rl.scale", 0.7, beta_rl=angle, beta_rl_dot=rate)
+    curve = Table(-1.1, 0.1, 0.0 if over == "rate" else AROUND, WAVE)
+    torque = 0.7 * curve(rate if over == "rate" else angle) * (rate if times is None else times)
+    assert added["beta_rl_dot"] == pytest.approx(-torque / lawful.vehicle.prior["B_w"], rel=1e-9)
 
 
 def test_a_slope_by_input_is_the_slope_by_effect(extended: Any) -> None:

@@ -58,7 +58,11 @@ EVERYTHING = ca.vertcat(
     ca.sqrt(ca.fabs(X[0])) + ca.sin(X[1]) * ca.cos(X[2]) - ca.tan(X[0] / 3) + ca.exp(-X[1]) + ca.log(1 + X[2] ** 2),
     ca.tanh(X[0]) + ca.atan(X[1]) + ca.atan2(X[1], X[2]) + ca.sign(X[2]) + ca.fmax(X[0], X[1]) * ca.fmin(X[1], X[2]),
     ca.if_else(X[0] < X[1], X[2] ** 3, X[0] ** 0.5 * P[2]) + (X[0] <= X[2]) + (X[0] == X[1]) + (X[0] != X[1]),
-    ca.asin(ca.tanh(X[0])) + ca.acos(ca.tanh(X[1])) + ca.logic_and(X[0] > 0, X[1] > 0) + ca.logic_not(X[2] > 0),
+    ca.floor(3 * X[1])
+    + ca.asin(ca.tanh(X[0]))
+    + ca.acos(ca.tanh(X[1]))
+    + ca.logic_and(X[0] > 0, X[1] > 0)
+    + ca.logic_not(X[2] > 0),
     P[0] * ca.exp(X[0]) / X[1] + P[1] * X[2] * ca.sin(X[0]) + P[2] / X[1] + P[0] / X[1],
     ca.sin(P[0] * X[1]) * ca.exp(X[2]) + (P[0] + P[1] * X[0]) ** 2 * ca.cos(X[2]) - 2 * P[1],
     3.5,
