@@ -19,7 +19,7 @@ from ident.writing import json_number
 
 Array = NDArray[np.float64]
 
-POINTS: Final = 2 * COUNT - 5
+POINTS: Final = 2 * (COUNT - 3) + 1
 """Of a curve: two for every step between its knots."""
 
 

@@ -121,7 +121,7 @@ class Learner:
             return None
         whole = _fit(_Moments.of(white, self._all), best.prior, best.size)
         scale = self._scale(best, whole)
-        turn = best.prior @ _beside_absorbed(white @ best.prior, self._all)
+        turn = best.prior @ _beside_absorbed(white @ best.prior, whole.moments.columns @ best.prior)
         return Learnt(
             index=index,
             knots=knots,
@@ -216,14 +216,14 @@ def _fit(moments: _Moments, prior: Array, size: float | None = None) -> _Fit:
     return _Fit(prior, float(sizes[best]), float(logs[best]), mean, turn * gains[best] @ turn.T, moments)
 
 
-def _beside_absorbed(design: Array, beside: _Beside) -> Array:
+def _beside_absorbed(design: Array, left: Array) -> Array:
     """What takes the part off coefficients (R,) that the baseline absorbs: a constant, where that is the friction's.
 
     Args:
         design: (n, R) columns.
-        beside: the baseline.
+        left: (n, R) of them beside the baseline.
     """
-    whole, left = design.T @ design, beside.without(design)
+    whole = design.T @ design
     size = np.sqrt(np.maximum(np.diag(whole), np.finfo(float).tiny))
     scaled = whole / np.outer(size, size) + RIDGE * np.eye(len(whole))
     shares, turn = linalg.eigh(left.T @ left / np.outer(size, size), scaled)
