@@ -81,6 +81,7 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
     beside = np.minimum([column.beside for column in layout], np.maximum(sizes - 1, 0))
     price = 0.5 * sizes * math.log(len(white.target))
     price += BESIDE * beside + np.array([column.price for column in layout])
+    price = price[origins(layout)]
     tested = np.where(competing, 0.5 * ratios / spread - price, -np.inf)
     by_chance = np.where((sizes > 0) & ~excluded, 0.5 * found.ratios(surrogates) / spread - price, -np.inf)
     competing &= own / scale > 0.5 * (sizes - beside) * math.log(len(white.target))
@@ -94,6 +95,12 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
         confirming=_confirming(white, layout, found, amplitudes),
         significance=significance(tested.max(initial=-np.inf), by_chance.max(axis=1, initial=-np.inf)),
     )
+
+
+def origins(layout: Sequence[Column]) -> NDArray[np.int64]:
+    """The variant (V,) that each is the shape of, or itself."""
+    of = [index if column.shape_of is None else column.shape_of for index, column in enumerate(layout)]
+    return np.array(of, dtype=np.int64)
 
 
 def _sums(values: Array, stretch: NDArray[np.int64]) -> Array:

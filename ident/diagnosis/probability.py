@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from ident.diagnosis.evidence import cosines
+from ident.diagnosis.evidence import cosines, origins
 from ident.diagnosis.regression import Regression, Slot
 from ident.vehicle.quantities import read_toml
 
@@ -97,7 +97,7 @@ def rank(regression: Regression, slot: Slot, variant: int, settings: Calibration
 def alike(regression: Regression, slot: Slot, variant: int) -> list[int]:
     """Variants that are the same as the one taken in these records, itself first, one a candidate."""
     evidence = slot.evidence
-    sizes = evidence.directions.sizes
+    sizes = evidence.directions.sizes[origins(regression.rows.layout)]
     same = (cosines(evidence, variant) > ALIKE) & (sizes == sizes[variant]) & np.isfinite(evidence.log_evidence)
     found: dict[str, int] = {regression.key(variant): variant}
     for other in sorted(np.flatnonzero(same).tolist(), key=lambda one: -float(evidence.log_evidence[one])):

@@ -86,7 +86,9 @@ def shaped(problems: Sequence[Problem], regression: Regression, taken: tuple[int
             continue
         number, end = owners[variant], layout[-1].place.stop
         now[place] = len(layout)
-        layout.append(Column(number, len(changed[0].candidates[number].variants), slice(end, end + 1), 0.0, (0.0, 0.0)))
+        origin = layout[variant].shape_of if layout[variant].shape_of is not None else variant
+        count = len(changed[0].candidates[number].variants)
+        layout.append(Column(number, count, slice(end, end + 1), 0.0, (0.0, 0.0), shape_of=origin))
         columns.append(column / size)
         changed = _with_variant(changed, number, part, size)
     wider = replace(rows, columns=np.hstack(columns), layout=tuple(layout))

@@ -87,7 +87,7 @@ def build_problem(
             replace(block, irregular=series, baseline=np.column_stack([block.baseline, late]))
             for block, series, late in zip(blocks, slid, lag_columns(sources, context), strict=True)
         ),
-        candidates=tuple(seen_together(candidates, slid, sources, context)),
+        candidates=tuple(seen_together(candidates, sources, tables, context)),
         nominal=_nominal(model) if model else None,
         spreads=UNSTATED,
         dependences=tuple(vehicle_dependences(sources, context)),

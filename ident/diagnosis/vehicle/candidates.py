@@ -10,16 +10,16 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from ident.diagnosis.delays import HELD, RARER
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate, Variant
-from ident.diagnosis.vehicle.askew import beside_sliding, stands_askew
+from ident.diagnosis.vehicle.askew import MODES, Travelling, dragging, stands_askew, with_shares
 from ident.diagnosis.vehicle.bending import BristleCause
 from ident.diagnosis.vehicle.bristles import bristle_candidate, bristle_causes
 from ident.diagnosis.vehicle.context import FORMULAS_KEPT, MODEL_COLUMNS, Context
 from ident.diagnosis.vehicle.contribution import Cause, acting_in, contribution_of, side_by_side
+from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.library import (
     DRIFTS,
     ONE_SIDED,
@@ -45,6 +45,8 @@ from ident.diagnosis.vehicle.sliding import (
 from ident.diagnosis.vehicle.sources import Source
 from ident.diagnosis.vehicle.transforms import TransformCause, transform_causes
 from ident.plant.places import DRIVES, STEERING, WHEEL_PLACES
+from ident.vehicle.geometry import Geometry
+from ident.vehicle.parameters import PARAMETER_NAMES
 
 Array = NDArray[np.float64]
 
@@ -154,23 +156,34 @@ def slid_by_any(sources: Sequence[Source], context: Context) -> Sequence[Array |
 
 
 def seen_together(
-    candidates: Sequence[Candidate], slid: Sequence[Array | None], sources: Sequence[Source], context: Context
+    candidates: Sequence[Candidate], sources: Sequence[Source], tables: Sequence[Array], context: Context
 ) -> Iterator[Candidate]:
-    """The candidates, sliding beside those that stand askew, and slip only of wheels that slide alone, and let go.
-
-    `slid` is that of `slid_by_any`.
-    """
+    """The candidates: those that stand askew by their shares, and slip only of wheels that slide alone, and let go."""
     driving = [source for source in sources if source.rolls and not source.rattles.any()]
     inputs, settings = [context.inputs(one) for one in driving], [context.setting(one) for one in driving]
     times = np.sum([np.zeros(len(WHEEL_PLACES)), *map(sliding_times, inputs, settings)], axis=0)
     lets_go = slides_at_its_limit(inputs, settings)
-    rolling = [mask for source in sources for mask in [_nothing_slides(source, context)] * len(source.coordinates)]
+    blocks = list(_travelling(sources, tables, context.geometry))
     for candidate in candidates:
         if candidate.effect == EffectName.SLIP:
             alone = slides_alone(sliding_cause(candidate.where), times)
             yield replace(candidate, excluded=not (alone and lets_go))
         else:
-            yield beside_sliding(candidate, slid, rolling) if stands_askew(candidate) else candidate
+            yield with_shares(candidate, blocks) if stands_askew(candidate) else candidate
+
+
+def _travelling(sources: Sequence[Source], tables: Sequence[Array], geometry: Geometry) -> Iterator[Travelling | None]:
+    """What every block is of drives in which wheels roll."""
+    friction = 1 + PARAMETER_NAMES.index("d_cw")
+    for source, table in zip(sources, tables, strict=True):
+        mode = source.spec.mode
+        rate = np.abs(source.inputs[:: source.factor, SLICES["beta_rate"]]).mean(axis=1)
+        for row in range(len(source.coordinates)):
+            if mode not in MODES or source.own is not None:
+                yield None
+                continue
+            dragged = None if source.rolls else dragging(mode, geometry) * table[:, row, friction]
+            yield Travelling(MODES.index(mode), dragged, rate)
 
 
 def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Candidate:
@@ -193,15 +206,6 @@ def _slid(cause: SlidingCause, sources: Sequence[Source], context: Context) -> S
     """What sliding adds to every block, (N,); drives that rattle aside, for there the play is why wheels slide."""
     acting = [source.travels and not source.rattles.any() for source in sources]
     return contribution_of(cause, acting, sources, context)(np.ones(1), context.parameters)
-
-
-def _nothing_slides(source: Source, context: Context) -> NDArray[np.bool_] | None:
-    """Rows of a source that rolls that no sliding reaches through the filter; None for other sources."""
-    if not source.rolls:
-        return None
-    slides = ANY_WHEEL.sliding(context.inputs(source), context.setting(source)).any(axis=1)
-    width = 2 * round(context.processing.guard / source.sample_time) + 1
-    return np.asarray(~ndimage.binary_dilation(slides, np.ones(width, dtype=bool))[:: source.factor], dtype=np.bool_)
 
 
 def _picked(columns: list[int], tables: Sequence[Array]) -> tuple[Array | None, ...]:

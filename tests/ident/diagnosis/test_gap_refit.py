@@ -16,6 +16,7 @@ from ident.diagnosis.refit import MOST_STEPS, Refit, refit
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import make_rows
 from ident.diagnosis.settings import Settings
+from ident.diagnosis.shapes import shaped
 from ident.effects import EffectParameter
 
 Array = NDArray[np.float64]
@@ -99,3 +100,26 @@ def test_what_a_way_of_telling_adds_to_a_deviation_is_absolute_or_a_part(world: 
     )
     assert wide.std[0] == pytest.approx(np.hypot(plain.std[0], 0.1))
     assert relative.std[0] == pytest.approx(np.hypot(plain.std[0], 0.25 * plain.values[0]))
+
+
+def test_a_shape_costs_what_the_numbers_cost_that_it_was_fitted_with(world: type[Any]) -> None:
+    """One column in place of two is no cheaper: its form was chosen by the same rows."""
+    plain = [bent(world(seed=3).problem(part), []) for part in (0, 1)]
+    problems = [replace(one, candidates=(_widened(one), *one.candidates[1:])) for one in plain]
+    regression = Regression(problems[0], make_rows(*problems), Settings(), 1)
+    found = shaped(problems, regression, (0,))
+    (shape,) = found.taken
+    assert shape != 0
+    evidence = found.regression.evidence(found.regression.whitener(found.taken), ())
+    prices = 0.5 * evidence.directions.ratios(evidence.amplitudes) / evidence.scale - evidence.log_evidence
+    assert found.regression.rows.layout[shape].width == 1
+    assert found.regression.rows.layout[0].width == 2
+    assert prices[shape] == pytest.approx(prices[0])
+
+
+def _widened(problem: Problem) -> Candidate:
+    """The first effect with a column beside its own that is not the one by which its form is curved."""
+    first = problem.candidates[0]
+    pairs = zip(first.variants[0].columns, problem.candidate("c@place").variants[0].columns, strict=True)
+    columns = tuple(np.hstack([one, two]) for one, two in pairs if one is not None and two is not None)
+    return replace(first, variants=(Variant(columns, lambda found: found[:1]),))

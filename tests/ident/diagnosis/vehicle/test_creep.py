@@ -45,7 +45,7 @@ def problem(prototype: VehicleDescription) -> Problem:
 
 def rolling(problem: Problem) -> tuple[Array, Array, Array]:
     """Creep's columns, the column of an askew wheel and the target of the straight drive's rolling rows."""
-    (variant,) = problem.candidate("steering_offset@steering_left").variants
+    variant = problem.candidate("steering_offset@steering_left").variants[0]
     parts = [
         (block.baseline[:, COLUMNS], column, block.target, block.moving)
         for block, column in zip(problem.blocks, variant.columns, strict=True)

@@ -7,8 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.problem import Candidate, Channel, Variant
-from ident.diagnosis.vehicle.askew import beside_sliding
+from ident.diagnosis.problem import Channel
 from ident.diagnosis.vehicle.ideal import Drive, ideal_record
 from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.sliding import adhesion, slides_alone, sliding_cause, sliding_times, traction
@@ -140,21 +139,3 @@ def test_a_coupling_gives_way_only_beyond_the_dry_friction_of_a_unit(
         assert np.mean(np.abs(twist[beyond] - size / 2 * np.sign(load[beyond])) < 0.05 * size) > 0.9
         first = int(np.argmax(np.abs(load) > friction))
         assert np.abs(twist[: max(first - round(0.1 / setting.sample_time), 0)]).max(initial=0.0) < 0.02 * size
-
-
-def test_what_stands_askew_says_nothing_of_rows_in_which_a_wheel_slides() -> None:
-    own, slid = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.5, 0.0])
-    rolling = np.array([True, False, True])
-    variant = Variant((own[:, None], None), lambda found: found[:1])
-    plain = Candidate("elasticity", "steering_left", (), (variant,), lambda values, _: [values[0] * own, None])
-    beside = beside_sliding(plain, [slid, None], [rolling, None])
-    columns = beside.variants[0].columns[0]
-    assert columns is not None
-    assert beside.variants[0].beside == 1
-    assert beside.variants[0].start is None, "the amount slid stands behind the parameters"
-    assert beside.contribution is not None
-    assert columns.tolist() == [[1.0, 0.0], [0.0, 0.5], [3.0, 0.0]]
-    values = np.array([2.0, 1.5])
-    (exact, _) = beside.contribution(values, np.zeros(11))
-    assert exact is not None
-    assert exact == pytest.approx(columns @ values)
