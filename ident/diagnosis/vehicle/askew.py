@@ -46,11 +46,14 @@ MODES: Final = (Mode.STEERED, Mode.ROTATION, Mode.LATERAL)
 APART: Final = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]])
 """How shares of those may be apart."""
 
-SLOW: Final = 0.2
-"""Rate of the wheels from which a drag is taken to be there where its onset is first looked for [rad/s]."""
+RATE: Final = 4.0
+"""Rate of the wheels for which their drag is told [rad/s]."""
 
-LEAST: Final = 1e-6
-"""Rate that is none [rad/s]."""
+SLOW: Final = 0.2
+"""Rate from which a dry drag is taken to be there where it is first looked for [rad/s]."""
+
+STRAIGHT: Final = 1e-3
+"""Bend of a drag below which it is in proportion to the rate [-]."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class Travelling:
         mode: number of its mode in `MODES`.
         friction: (N,) what wheels that drag as a friction of 1 Nm at each does in straight drives add to it; None for
             rolling rows.
-        rate: (N,) at which the wheels turn, of any sign averaged [rad/s].
+        rate: (N,) of the wheels in a straight drive in which their axes are as fast [rad/s].
     """
 
     mode: int
@@ -78,10 +81,10 @@ def stands_askew(candidate: Candidate) -> bool:
     return candidate.effect in ASKEW and candidate.where in STEERING
 
 
-def dragging(mode: Mode, geometry: Geometry) -> float:
-    """What wheels that are turned aside drag in a mode, of what they drag in straight drives, by their rolling speed.
+def sliding_aside(mode: Mode, geometry: Geometry) -> float:
+    """Speed of the steering axes in a mode, over that at which the contacts roll: wheels turned aside slide with those.
 
-    They slide aside as fast as their steering axes travel; their contacts stand beside those and roll faster in turns.
+    Contacts stand beside the axes, and roll faster in turns.
     """
     if mode is not Mode.ROTATION:
         return 1.0
@@ -92,8 +95,8 @@ def dragging(mode: Mode, geometry: Geometry) -> float:
 def with_shares(candidate: Candidate, blocks: Blocks) -> Candidate:
     """A cause that may have a share of its own in the rolling rows of every mode, its wheels then dragging.
 
-    Behind its own numbers come the friction at every wheel that drags as much [Nm], the rate of the wheels from which
-    all of it is there [rad/s], and by how much the share of every mode is above one.
+    Behind its own numbers come the friction at every wheel that drags as much at `RATE` [Nm], how it bends up to that
+    [-], and by how much the share of every mode is above one.
     """
     own = _width(candidate.variants[-1])
     return replace(
@@ -114,24 +117,21 @@ def _shared(variant: Variant, blocks: Blocks) -> Variant:
     """Its columns; what drags, at any rate and by the rate; how the first column is apart between the modes."""
     own = _width(variant)
     start = variant.start or (lambda found: found)
-    fastest = max((float(block.rate.max(initial=0.0)) for block in blocks if block is not None), default=0.0)
 
     def numbers(found: Array) -> Array:
         itself, line, apart = found[:own], found[own : own + 2], found[own + 2 :]
         above = APART @ apart / itself[0] if itself[0] else np.zeros(len(MODES))
-        return np.concatenate([start(itself), _saturating(line, fastest), above])
+        return np.concatenate([start(itself), _bent(*line.tolist()), above])
 
     columns = [_joined(column, block, own) for column, block in zip(variant.columns, blocks, strict=True)]
     return Variant(tuple(columns), numbers, beside=variant.beside + 2 + APART.shape[1], itself=False)
 
 
-def _saturating(line: Array, fastest: float) -> Array:
-    """Drag and onset of D tanh(rate/onset) that is about a line, at zero and by the rate, up to the fastest rate."""
-    dry, viscous = (float(number) for number in line)
-    reached = dry + viscous * fastest
-    bent = float(np.clip(viscous * fastest / reached, 0.0, 1.0)) if reached else 0.0
-    onset = SLOW + 2 * bent * fastest
-    return np.array([reached / math.tanh(fastest / onset) if fastest else dry, onset])
+def _bent(dry: float, viscous: float) -> Array:
+    """Drag and bend that are about a line over the rate."""
+    drag = dry + viscous * RATE
+    part = float(np.clip(viscous * RATE / drag, 0.0, 1.0)) if drag else 0.0
+    return np.array([drag, RATE / (SLOW + 2 * part * RATE)])
 
 
 def _joined(column: Array | None, block: Travelling | None, own: int) -> Array | None:
@@ -167,12 +167,13 @@ def _linear(variant: Variant) -> Callable[[Array, Array], Sequence[Array | None]
 
 
 def _with_share(series: Array | None, block: Travelling | None, along: Array) -> Array | None:
-    drag, onset, *above = (float(number) for number in along)
+    drag, bend, *above = (float(number) for number in along)
     if block is None:
         return series
     if block.friction is None:
         return None if series is None else (1 + above[block.mode]) * series
-    dragged = drag * block.friction * np.tanh(block.rate / max(abs(onset), LEAST))
+    bend = max(abs(bend), STRAIGHT)
+    dragged = drag / math.tanh(bend) * block.friction * np.tanh(bend * block.rate / RATE)
     return dragged if series is None else series + dragged
 
 

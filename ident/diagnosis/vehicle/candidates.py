@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.delays import HELD, RARER
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate, Variant
-from ident.diagnosis.vehicle.askew import MODES, Travelling, dragging, stands_askew, with_shares
+from ident.diagnosis.vehicle.askew import MODES, Travelling, sliding_aside, stands_askew, with_shares
 from ident.diagnosis.vehicle.bending import BristleCause
 from ident.diagnosis.vehicle.bristles import bristle_candidate, bristle_causes
 from ident.diagnosis.vehicle.context import FORMULAS_KEPT, MODEL_COLUMNS, Context
@@ -182,8 +182,9 @@ def _travelling(sources: Sequence[Source], tables: Sequence[Array], geometry: Ge
             if mode not in MODES or source.own is not None:
                 yield None
                 continue
-            dragged = None if source.rolls else dragging(mode, geometry) * table[:, row, friction]
-            yield Travelling(MODES.index(mode), dragged, rate)
+            part = sliding_aside(mode, geometry)
+            dragged = None if source.rolls else part * table[:, row, friction]
+            yield Travelling(MODES.index(mode), dragged, part * rate)
 
 
 def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Candidate:

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from ident.campaign.steps import EXCITATIONS
 from ident.diagnosis.problem import Candidate, Variant
-from ident.diagnosis.vehicle.askew import MEAN_STD, Travelling, dragging, with_shares
+from ident.diagnosis.vehicle.askew import MEAN_STD, RATE, Travelling, sliding_aside, with_shares
 from ident.plant import kinematics
 from ident.plant.modes import Mode
 from ident.records.record import Step
@@ -25,8 +25,10 @@ MASS, INERTIA, ADHESION = 842.0, 150.0, 0.8
 FASTEST, PERIOD = 0.5, 3.0
 
 
-def driven(step: Step, geometry: Geometry, offset: Array, slip: float) -> tuple[float, float]:
+def driven(step: Step, geometry: Geometry, offset: Array, slip: float, *, creeps: bool = False) -> tuple[float, float]:
     """Share of what vehicles in the middle would show between left and right, and what drags over 2 μ N δ.
+
+    What drags is a force, or goes with the speed of the wheels where contacts creep: it is that at 1 m/s then.
 
     A rigid body on four contacts that carry μ N across the wheels from a slip of some `slip` [m/s] on, and along them
     the same traction each, so large that its coordinate moves as a sinusoid.
@@ -62,7 +64,8 @@ def driven(step: Step, geometry: Geometry, offset: Array, slip: float) -> tuple[
     lost = -np.einsum("ni,ni->n", [across(twist) for twist in twists], twists @ true[:4, :3].T)
     speed = np.abs(twists @ true[4:, :3].T).mean(axis=1)
     share = float(told_left @ middle / (middle @ middle))
-    return share, float(lost @ speed / (speed @ speed) / (2 * grip * np.abs(offset).sum()))
+    rolled_off = speed**2 if creeps else speed
+    return share, float(lost @ rolled_off / (rolled_off @ rolled_off) / (2 * grip * np.abs(offset).sum()))
 
 
 def _left_right(matrix: Array, rolled: Array, senses: Array) -> Array:
@@ -92,7 +95,16 @@ def test_a_vehicle_follows_the_side_that_drags_where_contacts_slide_and_takes_th
 def test_wheels_that_slide_aside_drag_by_their_grip_and_the_angle_in_every_drive(geometry: Geometry) -> None:
     for step in (Step.STRAIGHT, Step.ROTATION):
         lost = driven(step, geometry, np.array([5e-3, 0.0]), 1e-5)[1]
-        assert lost == pytest.approx(dragging(MODES[step], geometry), rel=0.01)
+        assert lost == pytest.approx(sliding_aside(MODES[step], geometry), rel=0.01)
+
+
+def test_where_contacts_creep_the_drag_goes_with_the_square_of_how_fast_axes_are_for_it_does_so_with_their_speed(
+    geometry: Geometry,
+) -> None:
+    straight, turning = (
+        driven(step, geometry, np.array([5e-3, 0.0]), 1e-2, creeps=True)[1] for step in (Step.STRAIGHT, Step.ROTATION)
+    )
+    assert turning / straight == pytest.approx(sliding_aside(Mode.ROTATION, geometry) ** 2, rel=0.03)
 
 
 @pytest.fixture
@@ -120,11 +132,17 @@ def test_a_cause_without_shares_is_itself(shared: Candidate) -> None:
 
 
 def test_a_share_belongs_to_the_rolling_rows_of_its_drive_and_a_drag_to_its_travel(shared: Candidate) -> None:
-    first, second, travel, rest = _form(shared)(np.array([0.5, 0.25, 1e-9, 0.8, -0.8, 0.0]))
+    first, second, travel, rest = _form(shared)(np.array([0.5, 0.25, 1e3, 0.8, -0.8, 0.0]))
     assert first == pytest.approx([0.9, 1.8])
     assert second == pytest.approx([0.1, 0.2])
     assert travel == pytest.approx([0.5, -0.5])
     assert rest == pytest.approx([0.5, 1.0])
+
+
+def test_a_drag_without_a_bend_goes_with_the_rate(shared: Candidate) -> None:
+    slow, fast = (abs(float(_form(shared)(np.array([0.0, 0.25, bend, 0.0, 0.0, 0.0]))[2][0])) for bend in (0.0, 1e3))  # type: ignore[index]
+    assert slow == pytest.approx(0.25 * 2.0 / RATE, rel=1e-3)
+    assert fast == pytest.approx(0.25 * 2.0)
 
 
 def test_columns_and_form_of_shares_agree_where_wheels_are_fast(shared: Candidate) -> None:
