@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
 from emulator.effects.base import Injector, Placed, at_joints
+from emulator.effects.injection import Injection
 from emulator.effects.laws import Law, Moment
-from emulator.effects.places import JOINTS, JointAxis
+from emulator.effects.places import CHASSIS, JOINTS, JointAxis
 
 COUNT: Final = 48
 """Coefficients of a table."""
@@ -83,6 +84,18 @@ class OverRate(_Measured):
         self.resist(moment, self.table(self.rate(moment)))
 
 
+@dataclass(frozen=True)
+class OverSpeed:
+    """A force on the chassis against its forward speed [N]."""
+
+    table: Table
+
+    def __call__(self, moment: Moment) -> None:
+        """Push the chassis."""
+        forward, _, _ = moment.engine.twist()
+        moment.engine.push((-self.table(forward), 0.0, 0.0))
+
+
 class OverAngle(_Measured):
     """A torque over the angle [Nm]."""
 
@@ -121,22 +134,40 @@ def _table(effect: Placed) -> Table:
     return Table(effect["start"], effect["step"], effect["period"], coefficients)
 
 
+def _units(unit_x: str, unit_y: str) -> dict[str, str]:
+    of_variable = dict.fromkeys(("start", "step", "period"), unit_x)
+    return {"scale": "1"} | of_variable | {f"c_{index:02d}": unit_y for index in range(COUNT)}
+
+
 def _injector(name: str, law: Callable[[JointAxis, Table], Law], unit_x: str, unit_y: str) -> Injector:
-    units = {"scale": "1", "start": unit_x, "step": unit_x, "period": unit_x}
     return Injector(
         name=name,
         places=JOINTS,
-        units=units | {f"c_{index:02d}": unit_y for index in range(COUNT)},
+        units=_units(unit_x, unit_y),
         inject=at_joints(lambda axis, effect: law(axis, _table(effect))),
         signed=True,
     )
+
+
+def _over_rate(injection: Injection, effect: Placed) -> Injection:
+    if effect.where in CHASSIS:
+        return injection.with_laws(OverSpeed(_table(effect)))
+    return at_joints(lambda axis, placed: OverRate(axis, _table(placed)))(injection, effect)
+
+
+_OVER_RATE: Final = replace(
+    _injector("law_rate", OverRate, "rad/s", "Nm"),
+    places=(*JOINTS, *CHASSIS),
+    units_at={CHASSIS[0]: _units("m/s", "N")},
+    inject=_over_rate,
+)
 
 
 MEASURED: Final[Mapping[str, Injector]] = MappingProxyType(
     {
         injector.name: injector
         for injector in (
-            _injector("law_rate", OverRate, "rad/s", "Nm"),
+            _OVER_RATE,
             _injector("law_angle", OverAngle, "rad", "Nm"),
             _injector("law_angle_direction", CoulombOverAngle, "rad", "Nm"),
             _injector("law_angle_rate", ViscousOverAngle, "rad", "Nm s/rad"),

@@ -91,7 +91,8 @@ def _judged_once(
         return _judged(found, laws, limits, seed)
 
     judgement = concluded_from(searched)
-    if not problems[0].dependences or (judgement.found.variants and not judgement.incomplete()):
+    # One law may do what several names do together.
+    if not problems[0].dependences or (len(judgement.found.variants) == 1 and not judgement.incomplete()):
         return judgement
     stage(f"on what the remainder depends: {len(problems[0].dependences)} possibilities")
     designs = Designs(problems, regression.rows)

@@ -124,7 +124,8 @@ class Judgement:
         widened = [index for index, share in enumerate(closed) if share < -self.limits.widening]
         refuted = widened if self._measurable() else []
         laws = [index for index in range(self.fitted.count) if self._law(index)]
-        bent = [index for index in laws if self.fitted.closed_where_it_acts(index) < self.limits.law]
+        least = self.limits.law if self._measurable() else 0.0
+        bent = [index for index in laws if self.fitted.closed_where_it_acts(index) <= least]
         for superfluous in (refuted, bent):
             if superfluous:
                 return self.fitted.others(min(superfluous, key=lambda index: closed[index]))

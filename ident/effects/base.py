@@ -121,7 +121,7 @@ class EffectKind:
         term: makes what it adds to the equations, from name, place and values.
         words: what is said of it beside its place, with its parameters in braces.
         usual: its size in practice for a vehicle, by place: one that people do meet, and see.
-        units_at: units of the size that differ from the table's, by place.
+        units_at: units of its parameters that differ from the table's, by place.
         sign: of its size.
         adding: parameters that add up where it is found twice; none where the sizes of one place do not.
         polar: length and angle that add up as vectors do.
@@ -139,7 +139,7 @@ class EffectKind:
     term: Callable[[str, str, Mapping[str, Expression]], EffectTerm]
     words: str
     usual: Callable[[VehicleDescription, str], float]
-    units_at: Mapping[str, str] = field(default_factory=dict)
+    units_at: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     sign: Sign = Sign.EITHER
     adding: tuple[str, ...] | None = None
     polar: tuple[str, str] | None = None
@@ -160,9 +160,8 @@ class EffectKind:
 
     def unit(self, parameter: str, where: str) -> str:
         """Unit of a parameter at a place."""
-        if parameter == self.size.name and where in self.units_at:
-            return self.units_at[where]
-        return next(entry.unit for entry in self.parameters if entry.name == parameter)
+        usual = next(entry.unit for entry in self.parameters if entry.name == parameter)
+        return self.units_at.get(where, {}).get(parameter, usual)
 
     @property
     def sums(self) -> tuple[str, ...]:

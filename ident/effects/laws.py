@@ -1,4 +1,4 @@
-"""Laws without a name: a smooth function of the motion of a joint, as it was found in records.
+"""Laws without a name: a smooth function of the motion of a joint or of the chassis, as it was found in records.
 
 The function is a sum of uniform cubic B-splines, twice differentiable everywhere, times its partner: nothing, the
 direction (then it holds the joint at rest, as dry friction does), the rate or the acceleration. Beyond its range it
@@ -15,7 +15,7 @@ from typing import ClassVar, Final
 import casadi as ca
 
 from ident.effects.base import EffectKind, EffectParameter, EffectTerm, sign_of
-from ident.plant.places import STEERING, WHEEL_PLACES, rows_of, with_groups
+from ident.plant.places import CHASSIS, STEERING, WHEEL_PLACES, rows_of, with_groups
 from ident.plant.symbolic import Expression
 from ident.plant.terms import FIRST_WHEEL, Masses, State
 
@@ -81,6 +81,12 @@ def _kernel(u: Expression) -> Expression:
 
 
 class _OverRate(_LawTerm):
+    def _in_rows(self, state: State) -> Expression:
+        """At the chassis a force against its forward speed."""
+        if self.where not in CHASSIS:
+            return super()._in_rows(state)
+        return ca.vertcat(self["scale"] * self._function(state.rates[0]), ca.SX(8, 1))
+
     def _variable(self, state: State, row: int) -> Expression:
         return state.rates[row]
 
@@ -110,11 +116,17 @@ class _OverTime(_Direction):
         return state.elapsed
 
 
+def _units(unit_x: str, unit_y: str) -> dict[str, str]:
+    """Of the parameters that have those of its variable and of the function."""
+    return dict.fromkeys(("start", "step", "period"), unit_x) | {coefficient(i): unit_y for i in range(COUNT)}
+
+
 def _kind(rank: int, name: str, term: type[_LawTerm], unit_x: str, unit_y: str) -> EffectKind:
+    travels = term is _OverRate
     return EffectKind(
         name=name,
         rank=_FIRST_RANK + rank,
-        places=with_groups(STEERING, WHEEL_PLACES),
+        places=with_groups(STEERING, WHEEL_PLACES, *([CHASSIS] if travels else [])),
         parameters=(
             EffectParameter("scale", "1", "of the law as it was found"),
             EffectParameter("start", unit_x, "of the first coefficient"),
@@ -125,6 +137,7 @@ def _kind(rank: int, name: str, term: type[_LawTerm], unit_x: str, unit_y: str) 
         term=term,
         words="a law without a name, {scale} of what was found",
         usual=lambda vehicle, where: 1.0,
+        units_at=MappingProxyType({CHASSIS[0]: _units("m/s", "N")} if travels else {}),
         adding=(),
         always=False,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import dataclass
 from typing import Any, Final
 
 import casadi as ca
@@ -26,7 +27,7 @@ from ident.effects.text import effects_text, read_effects
 from ident.errors import UserError
 from ident.plant import dynamics, kinematics
 from ident.plant.modes import Mode
-from ident.plant.places import rows_of
+from ident.plant.places import CHASSIS, rows_of
 from ident.plant.simulation import Motion
 from ident.plant.terms import State
 from ident.vehicle.description import load_vehicle
@@ -87,19 +88,37 @@ def test_the_emulator_has_the_same_torque_or_says_why_not(name: str, where: str)
     assert list(effect.parameters) == list(MEASURED[name].units)
     injection = inject(load_prototype(), [effect], 1e-3)
     for _ in range(20):
-        alpha, beta, rates = generator.uniform(-1.5, 1.5, 2), generator.uniform(-9, 9, 4), generator.uniform(-1, 1, 6)
-        moment = _moment(alpha, beta, rates, 60.0 + generator.uniform(-20, 20))
+        alpha, beta, rates = generator.uniform(-1.5, 1.5, 2), generator.uniform(-9, 9, 4), generator.uniform(-1, 1, 9)
+        chassis = Floor((rates[0], rates[1], rates[2]))
+        moment = _moment(chassis, alpha, beta, rates[3:], 60.0 + generator.uniform(-20, 20))
         for law in injection.laws:
             law(moment)
         expected = _resisting(effect, alpha, beta, rates, moment.time)
-        np.testing.assert_allclose(_at_joints(moment, rates), expected, atol=1e-9)
+        np.testing.assert_allclose([-chassis.ahead, 0.0, 0.0], expected[:3], atol=1e-9)
+        np.testing.assert_allclose(_at_joints(moment, rates[3:]), expected[3:], atol=1e-9)
 
 
-def _moment(alpha: Array, beta: Array, rates: Array, time: float) -> Moment:
+@dataclass
+class Floor:
+    """A chassis that moves as it is told, and knows how it is pushed."""
+
+    moving: tuple[float, float, float]
+    ahead: float = 0.0
+
+    def twist(self) -> tuple[float, float, float]:
+        """How it moves."""
+        return self.moving
+
+    def push(self, force: tuple[float, float, float]) -> None:
+        """Ahead alone."""
+        self.ahead += force[0]
+        assert force[1:] == (0.0, 0.0)
+
+
+def _moment(engine: Any, alpha: Array, beta: Array, rates: Array, time: float) -> Moment:
     """Eight joints that move as the six of the model do: rear units turn against the front ones."""
     steering = [alpha[0], -alpha[0], alpha[1], -alpha[1]]
     turning = [rates[0], -rates[0], rates[1], -rates[1]]
-    engine: Any = None
     return Moment(time, engine, [*steering, *beta], [*turning, *rates[2:]], [0.0] * 8, [0.0] * 4, [10.0] * 8)
 
 
@@ -112,15 +131,15 @@ def _at_joints(moment: Moment, rates: Array) -> Array:
 
 
 def _resisting(effect: Effect, alpha: Array, beta: Array, rates: Array, time: float) -> Array:
-    """The same by the terms of the model, epsilon so small that a direction is a sign."""
+    """The same and what resists the chassis (9,), by the terms of the model, a direction being a sign."""
     found = np.zeros(9)
     for term in terms_of([effect]):
-        state = State(0.0, ca.DM(alpha), ca.DM(beta), ca.DM(np.append(np.zeros(3), rates)), ca.DM.zeros(9), time)
+        state = State(0.0, ca.DM(alpha), ca.DM(beta), ca.DM(rates), ca.DM.zeros(9), time)
         rows = term.forces(state, None, None) + term.dry_friction(state, None)  # type: ignore[arg-type]
         epsilon = ca.symvar(ca.SX(rows))
         function = ca.Function("rows", [ca.vertcat(*epsilon)], [rows])
         found += np.array(function(np.full(len(epsilon), 1e-6))).ravel()
-    return found[3:]
+    return found
 
 
 def _course() -> Course:
@@ -161,7 +180,7 @@ def test_torques_are_asked_for_it_and_a_simulation_moves_otherwise_with_it(name:
 @every_law_everywhere
 def test_a_diagnosis_judges_a_model_that_has_it_or_refuses_it(name: str, where: str) -> None:
     effect = law_at(name, where)
-    assert rows_of(where)
+    assert rows_of(where) or where in CHASSIS
     if name == "law_time_direction":
         with pytest.raises(UserError, match="averages over repeats"):
             refuse_strangers([effect])

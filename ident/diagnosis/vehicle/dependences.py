@@ -1,6 +1,7 @@
-"""On what the remainder of the vehicle may depend: the motion and the load of its joints, one by one and all equals.
+"""On what the remainder of the vehicle may depend: the motion of its joints, each and all equals, and its own speed.
 
-A torque f at a joint j stands in the generalized rows as H_k(α)ᵀ e_j f, as friction does in (14).
+A torque f at a joint j stands in the generalized rows as H_k(α)ᵀ e_j f, as friction does in (14); so does a force
+against the forward speed of the chassis.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.sources import Source
 from ident.plant import kinematics
 from ident.plant.kinematics import GENERALIZED_VELOCITIES
-from ident.plant.places import STEERING, WHEEL_PLACES, rows_of
-from ident.vehicle.geometry import WHEELS
+from ident.plant.places import CHASSIS, STEERING, WHEEL_PLACES, rows_of
+from ident.vehicle.geometry import WHEELS, Geometry
 from ident.vehicle.parameters import COULOMB_EPSILON
 
 Array = NDArray[np.float64]
@@ -30,6 +31,9 @@ JOINTS: Final = (*STEERING, "steering", *WHEEL_PLACES, "wheels")
 
 FIRST_JOINT: Final = 3
 """Row of q of the first joint; the six joints are the two steering axes and the four wheels."""
+
+FORWARD: Final = 6
+"""Number of the chassis' way ahead, behind those of the joints."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,7 @@ _UNITS: Final = {
 _STEERING: Final = (*STEERING, "steering")
 _LAWS: Final = (
     _Law(Variable.RATE, Partner.NOTHING, "rad/s", JOINTS),
+    _Law(Variable.RATE, Partner.NOTHING, "m/s", CHASSIS),
     *(_Law(Variable.ANGLE, partner, "rad", _STEERING) for partner in Partner),
     *(_Law(Variable.ANGLE, Partner.NOTHING, "rad", _WHEELS, turn) for turn in ("wheel", "motor")),
     *(_Law(Variable.ANGLE, Partner.DIRECTION, "rad", _WHEELS, turn) for turn in ("wheel",)),
@@ -77,7 +82,7 @@ def vehicle_dependences(sources: Sequence[Source], context: Context) -> list[Dep
 def _dependence(
     law: _Law, where: str, sources: Sequence[Source], levers: Sequence[Array | None], context: Context
 ) -> Dependence:
-    joints = [row - FIRST_JOINT for row in rows_of(where)]
+    joints = [FORWARD] if where in CHASSIS else [row - FIRST_JOINT for row in rows_of(where)]
 
     def design(basis: Basis) -> Sequence[Array | None]:
         found: list[Array | None] = []
@@ -88,7 +93,7 @@ def _dependence(
                 inputs = context.inputs(source)
                 torques = sum(
                     (_partner(inputs, joint, law.partner) * lever[:, joint][:, rows].T)[:, :, None]
-                    * basis(_variable(inputs, joint, law, source.time))[None]
+                    * basis(_variable(inputs, joint, law, source.time, context.geometry))[None]
                     for joint in joints
                 )
                 filtered = context.filtered(np.moveaxis(np.asarray(torques), 0, 1), source)
@@ -102,7 +107,7 @@ def _dependence(
         of_rows: list[Array | None] = [None] * len(source.coordinates)
         for row in _acting(lever, joints):
             inputs = context.inputs(source)
-            x = [_variable(inputs, joint, law, source.time)[:: source.factor] for joint in joints]
+            x = [_variable(inputs, joint, law, source.time, context.geometry)[:: source.factor] for joint in joints]
             of_rows[row] = np.stack(x, axis=1)
         arguments += of_rows
     turn = {"": 0.0, "wheel": 2 * math.pi, "motor": 2 * math.pi / context.geometry.gear_ratio}[law.turn]
@@ -111,7 +116,7 @@ def _dependence(
         variable=law.variable,
         partner=law.partner,
         unit_x=law.unit,
-        unit_y=_UNITS[law.partner],
+        unit_y="N" if where in CHASSIS else _UNITS[law.partner],
         arguments=tuple(arguments),
         design=design,
         of=law.turn,
@@ -125,19 +130,20 @@ def _acting(lever: Array | None, joints: Sequence[int]) -> list[int]:
 
 
 def levers_of(source: Source, context: Context) -> Array | None:
-    """What a torque at each of the six joints is in the rows of a source, (M, 6, rows); None where it is nothing."""
+    """What a torque at each joint, and a force ahead, is in the rows of a source (M, 7, rows); None: nothing."""
     if source.channel is not Channel.DYNAMIC or source.own is not None:
         return None
     inputs, spec = context.inputs(source), source.spec
     if spec.mode is None:
-        found = np.zeros((len(inputs), 6, len(source.coordinates)))
+        found = np.zeros((len(inputs), FORWARD + 1, len(source.coordinates)))
         for row, name in enumerate(source.coordinates):
             found[:, 2 + WHEELS.index(name.removeprefix("beta_")), row] = 1.0
         return found
     names = GENERALIZED_VELOCITIES[spec.mode]
     columns = [names.index(name) for name in source.coordinates]
     complement = kinematics.complement(spec.mode, inputs[:, SLICES["alpha"]], context.geometry)
-    return np.asarray(complement[:, FIRST_JOINT:][:, :, columns])
+    rows = [*range(FIRST_JOINT, FIRST_JOINT + FORWARD), 0]
+    return np.asarray(complement[:, rows][:, :, columns])
 
 
 def _joint(inputs: Array, joint: int, steering: str, wheel: str) -> Array:
@@ -146,7 +152,10 @@ def _joint(inputs: Array, joint: int, steering: str, wheel: str) -> Array:
     return inputs[:, SLICES[name].start + index]
 
 
-def _variable(inputs: Array, joint: int, law: _Law, time: Array) -> Array:
+def _variable(inputs: Array, joint: int, law: _Law, time: Array, geometry: Geometry) -> Array:
+    if joint == FORWARD:
+        alpha, steering, wheels = (inputs[:, SLICES[name]] for name in ("alpha", "alpha_rate", "beta_rate"))
+        return kinematics.odometry(alpha, steering, wheels, geometry)[:, 0]
     rate = _joint(inputs, joint, "alpha_rate", "beta_rate")
     match law.variable:
         case Variable.RATE:

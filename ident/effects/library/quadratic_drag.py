@@ -45,6 +45,6 @@ EFFECT: Final = EffectKind(
     term=_QuadraticDrag,
     words="drag that grows with the square of the speed, {coefficient}",
     usual=_usual,
-    units_at=MappingProxyType({"chassis": "N s^2/m^2"}),
+    units_at=MappingProxyType({CHASSIS[0]: {"coefficient": "N s^2/m^2"}}),
     over=("rate", ""),
 )

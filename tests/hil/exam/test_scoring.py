@@ -55,10 +55,11 @@ def answer(
     size: float = 0.1,
     noise_units: float = 1.0,
     name: str = "torque_bias",
+    where: str = "drive_fl",
     **said: Any,
 ) -> Answer:
-    """An answer to a case with a torque bias of the front left drive."""
-    case = Case("id", Kind.EFFECT, (Injected(name, "drive_fl", "bias", size),), noise_units, 1, 0)
+    """An answer to a case with a torque bias of the front left drive, or another effect."""
+    case = Case("id", Kind.EFFECT, (Injected(name, where, "bias", size),), noise_units, 1, 0)
     content = {"verdict": "effect" if effects else "none", "closed": 0.9, **said}
     return Answer(case, Said(effects=effects, **content), (identity,))
 
@@ -282,6 +283,13 @@ def test_a_name_in_the_place_of_a_removed_cause_is_near_where_it_closes_as_much_
     rates = removal_rates([without], [whole])
     assert rates[names.WITHOUT_NEAR].value == near
     assert rates[names.WITHOUT_FAR].value == (not near)
+
+
+@pytest.mark.parametrize(("parameter", "near"), [("d_vw", True), ("d_cl", False)])
+def test_a_changed_value_of_the_model_is_at_the_joint_whose_it_is(parameter: str, near: bool) -> None:
+    whole = answer(entry("stribeck", "wheels"), where="wheels", identity=apart(), closed=0.99)
+    without = answer(entry("parameter_change", parameter), where="wheels", identity=apart(), closed=0.98)
+    assert removal_rates([without], [whole])[names.WITHOUT_NEAR].value == near
 
 
 def test_unknown_is_the_answer_to_a_removed_cause() -> None:

@@ -1,0 +1,52 @@
+"""Columns of a function of the motion are those of the effects that are such functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ident.diagnosis.names import EffectName
+from ident.diagnosis.problem import Problem
+from ident.diagnosis.vehicle.build import build_problem
+from ident.diagnosis.vehicle.ideal import FOUR, ideal_record
+from ident.vehicle.description import VehicleDescription
+
+Array = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def problem(prototype: VehicleDescription) -> Problem:
+    named = (EffectName.QUADRATIC_DRAG, EffectName.ASYMMETRIC_VISCOUS)
+    return build_problem([ideal_record(FOUR, prototype)], prototype, prototype.prior, effects=named)
+
+
+@pytest.mark.parametrize("where", ["chassis", "wheels", "wheel_rl"])
+def test_a_square_of_the_rate_is_a_quadratic_drag(problem: Problem, where: str) -> None:
+    _same(problem, f"law_rate@{where}", f"quadratic_drag@{where}", lambda x: x * np.abs(x))
+
+
+@pytest.mark.parametrize("where", ["steering_left", "steering", "wheel_fr"])
+def test_a_rate_without_its_sign_is_an_asymmetric_friction(problem: Problem, where: str) -> None:
+    _same(problem, f"law_rate@{where}", f"asymmetric_viscous@{where}", np.abs)
+
+
+def _same(problem: Problem, law: str, name: str, function: Callable[[Array], Array]) -> None:
+    """Columns alike up to one factor in every block, where the vehicle moves."""
+    (dependence,) = (one for one in problem.dependences if one.key == law)
+    made = dependence.design(lambda x: function(x)[..., None])
+    named = problem.candidate(name).variants[0].columns
+    pairs = [
+        (block.moving, one, other)
+        for block, one, other in zip(problem.blocks, made, named, strict=True)
+        if one is not None
+    ]
+    assert pairs
+    assert all(other is not None for _, _, other in pairs)
+    mine = np.concatenate([one[moving, 0] for moving, one, _ in pairs])
+    theirs = np.concatenate([other[moving, 0] for moving, _, other in pairs if other is not None])
+    factor = float(mine @ theirs) / float(mine @ mine)
+    assert np.abs(theirs - factor * mine).max() < 0.02 * np.abs(theirs).max()
+    assert all(other is None for one, other in zip(made, named, strict=True) if one is None)
