@@ -52,6 +52,13 @@ GRID: Final = 0.3
 LEAST_SHARE: Final = 0.1
 """Of the effort that must lie behind a play for it to be one."""
 
+BETWEEN_SAMPLES: Final = 0.004
+"""Part of a sampling interval to which a delay can be told at best, beyond the scatter of the rows.
+
+How an effort goes between its samples is in no record. On 48 axes of opened exams, the 17 whose rows scattered by less
+than 0.003 were wrong by 0.0035 rms.
+"""
+
 LATE: Final = (EffectName.TIME_DELAY, EffectName.TORQUE_FILTER)
 """What makes a motion follow its effort later than sampling does."""
 
@@ -134,7 +141,13 @@ def _time_delay(axis: AxisModel) -> Candidate:
     variants = (Variant(axis.alone(slope[:, None])),)
     shortest = HELD * axis.sample_time
     return Candidate(
-        EffectName.TIME_DELAY, axis.place, parameters, variants, contribution, negligible=(shortest, shortest)
+        EffectName.TIME_DELAY,
+        axis.place,
+        parameters,
+        variants,
+        contribution,
+        negligible=(shortest, shortest),
+        spread=(BETWEEN_SAMPLES * axis.sample_time,),
     )
 
 
