@@ -193,8 +193,8 @@ class Answer:
 
     @property
     def open(self) -> bool:
-        """The answer is `unknown`, or every effect named comes as a set."""
-        sets = [len(_set(effect)) > 1 for effect in self.said.effects]
+        """The answer is `unknown`, or laws, or every effect that is named comes as a set."""
+        sets = [effect["name"] == LAW or len(_set(effect)) > 1 for effect in self.said.effects]
         return self.rejected or (bool(sets) and all(sets))
 
     @property

@@ -285,6 +285,12 @@ def test_a_name_in_the_place_of_a_removed_cause_is_near_where_it_closes_as_much_
     assert rates[names.WITHOUT_FAR].value == (not near)
 
 
+def test_a_law_beside_a_set_of_names_leaves_the_cause_open() -> None:
+    law, several, single = entry("law"), entry("scrub", among=("stribeck",)), entry("scrub")
+    assert answer(law, several, identity=apart()).open
+    assert not answer(law, single, identity=apart()).open
+
+
 @pytest.mark.parametrize(("parameter", "near"), [("d_vw", True), ("d_cl", False)])
 def test_a_changed_value_of_the_model_is_at_the_joint_whose_it_is(parameter: str, near: bool) -> None:
     whole = answer(entry("stribeck", "wheels"), where="wheels", identity=apart(), closed=0.99)
