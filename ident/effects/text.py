@@ -92,7 +92,8 @@ def _read_effect(entry: Any, source: str) -> Effect:
     for key, quantity in parameters.items():
         if not isinstance(quantity, Mapping) or not isinstance(quantity.get("value"), int | float):
             raise DataFileError(f"{source}: {key} has no value.", "Write { value = ..., unit = ..., std = ... }.")
-        known = key in {parameter.name for parameter in kind.parameters}
+        # Elsewhere no unit is right: `make_effect` says where it can be.
+        known = where in kind.places and key in {parameter.name for parameter in kind.parameters}
         if known and quantity.get("unit") != kind.unit(key, where):
             raise DataFileError(f"{source}: {key} is in {quantity.get('unit')}.", f"Give {kind.unit(key, where)}.")
         values[key], std[key] = float(quantity["value"]), float(quantity.get("std", 0.0))

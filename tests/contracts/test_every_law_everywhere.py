@@ -61,6 +61,13 @@ def test_in_a_file_it_comes_back(name: str, where: str) -> None:
     assert [read[key] for key in effect.parameters] == pytest.approx([effect[key] for key in effect.parameters])
 
 
+@pytest.mark.parametrize("name", LAWS)
+def test_at_a_place_that_it_cannot_have_the_place_is_refused_and_not_its_units(name: str) -> None:
+    text = effects_text([law_at(name, "wheel_rl")]).replace("wheel_rl", "encoder_left")
+    with pytest.raises(UserError, match="encoder_left"):
+        read_effects(tomllib.loads(text), "file")
+
+
 @every_law_everywhere
 def test_found_twice_it_stays_two(name: str, where: str) -> None:
     effect = law_at(name, where)
