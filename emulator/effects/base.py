@@ -62,7 +62,7 @@ class Injector:
         places: where it can be.
         units: of its parameters, SI; the first is its size.
         inject: makes it, at one place.
-        units_at: units of its parameters that differ from the table's, by place.
+        units_at: units of the size that differ from the table's, by place.
         known: whether models have it too; what no model has is `unknown` to a diagnosis.
         signed: whether it goes both ways.
         first: whether it derives the bodies anew, which others then load, shift and replace.
@@ -76,7 +76,7 @@ class Injector:
     places: tuple[str, ...]
     units: Mapping[str, str]
     inject: Inject
-    units_at: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    units_at: Mapping[str, str] = field(default_factory=dict)
     known: bool = True
     signed: bool = False
     first: bool = False
@@ -92,7 +92,7 @@ class Injector:
 
     def unit(self, where: str) -> str:
         """Of the size at a place."""
-        return self.units_at.get(where, {}).get(self.size, self.units[self.size])
+        return self.units_at.get(where, self.units[self.size])
 
 
 @dataclass(frozen=True)

@@ -134,33 +134,27 @@ def _table(effect: Placed) -> Table:
     return Table(effect["start"], effect["step"], effect["period"], coefficients)
 
 
-def _units(unit_x: str, unit_y: str) -> dict[str, str]:
-    of_variable = dict.fromkeys(("start", "step", "period"), unit_x)
-    return {"scale": "1"} | of_variable | {f"c_{index:02d}": unit_y for index in range(COUNT)}
-
-
 def _injector(name: str, law: Callable[[JointAxis, Table], Law], unit_x: str, unit_y: str) -> Injector:
+    units = {"scale": "1", "start": unit_x, "step": unit_x, "period": unit_x}
     return Injector(
         name=name,
         places=JOINTS,
-        units=_units(unit_x, unit_y),
+        units=units | {f"c_{index:02d}": unit_y for index in range(COUNT)},
         inject=at_joints(lambda axis, effect: law(axis, _table(effect))),
         signed=True,
     )
 
 
+_AT_JOINTS: Final = _injector("law_rate", OverRate, "rad/s", "Nm")
+
+
 def _over_rate(injection: Injection, effect: Placed) -> Injection:
     if effect.where in CHASSIS:
         return injection.with_laws(OverSpeed(_table(effect)))
-    return at_joints(lambda axis, placed: OverRate(axis, _table(placed)))(injection, effect)
+    return _AT_JOINTS.inject(injection, effect)
 
 
-_OVER_RATE: Final = replace(
-    _injector("law_rate", OverRate, "rad/s", "Nm"),
-    places=(*JOINTS, *CHASSIS),
-    units_at={CHASSIS[0]: _units("m/s", "N")},
-    inject=_over_rate,
-)
+_OVER_RATE: Final = replace(_AT_JOINTS, places=(*JOINTS, *CHASSIS), inject=_over_rate)
 
 
 MEASURED: Final[Mapping[str, Injector]] = MappingProxyType(

@@ -16,6 +16,7 @@ from hil.exam.statistics import Z95
 from ident.diagnosis.findings import LAW
 from ident.diagnosis.functions import function_of
 from ident.diagnosis.vehicle.library import DRIFTS, SHAPES
+from ident.plant.places import OF_PARAMETERS
 
 CONFIDENT: Final = 0.5
 """Probability from which on a single name counts as a confident one."""
@@ -32,13 +33,6 @@ LAW_VARIABLES: Final = MappingProxyType(
 _JOINTS: Final = MappingProxyType({"drive": "wheel", "drives": "wheels", "encoder": "steering", "encoders": "steering"})
 """A drive turns the wheel of its corner, an encoder reads the steering axis of its side."""
 
-_OF_PARAMETERS: Final = MappingProxyType(
-    dict.fromkeys(("C_l", "d_vl", "d_cl"), "steering_left")
-    | dict.fromkeys(("C_r", "d_vr", "d_cr"), "steering_right")
-    | dict.fromkeys(("B_w", "d_vw", "d_cw"), "wheels")
-    | dict.fromkeys(("m_ch", "C_ch"), "chassis")
-)
-"""What a changed value of the model is at."""
 
 _TURNED: Final = frozenset(str(name) for name, shape in SHAPES.items() if shape.angle is not None)
 """Effects with a direction or a phase: half a turn of it is the other sign of the size."""
@@ -290,8 +284,8 @@ class Answer:
 
 def _corner(where: str) -> str:
     """The joint that a place, or a parameter of the model, is at."""
-    if where in _OF_PARAMETERS:
-        return _OF_PARAMETERS[where]
+    if where in OF_PARAMETERS:
+        return OF_PARAMETERS[where]
     kind, mark, corner = where.partition("_")
     return f"{_JOINTS.get(kind, kind)}{mark}{corner}"
 

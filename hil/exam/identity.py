@@ -186,7 +186,8 @@ class _Cause:
 
 def _cause(candidate: Candidate, layout: Sequence[Column], number: int, left: Array, whole: Array) -> _Cause | None:
     """None where nothing is to be seen of it."""
-    own = [column for column in layout if column.candidate == number and column.width > 0]
+    # What comes along with an effect, and shows by itself, is no form of that effect.
+    own = [column for column in layout if column.candidate == number and column.width > 0 and column.itself]
     spaces = [left[:, column.place] for column in own]
     injected = next((index for index, column in enumerate(own) if _is_injected(candidate, column)), None)
     if injected is None:

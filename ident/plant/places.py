@@ -18,6 +18,14 @@ GROUPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
 )
 """All equals of one kind, by the name that is the place of an effect which each of them has."""
 
+OF_PARAMETERS: Final[Mapping[str, str]] = MappingProxyType(
+    dict.fromkeys(("C_l", "d_vl", "d_cl"), STEERING[0])
+    | dict.fromkeys(("C_r", "d_vr", "d_cr"), STEERING[1])
+    | dict.fromkeys(("m_ch", "C_ch"), CHASSIS[0])
+    | dict.fromkeys(("d_vw", "d_cw", "B_w"), ALL_WHEELS[0])
+)
+"""Place that each parameter of the model is of."""
+
 _FIRST_ROWS: Final[Mapping[tuple[str, ...], int]] = MappingProxyType({STEERING: 3, WHEEL_PLACES: 5})
 """Row of q of the first joint of a kind."""
 

@@ -10,7 +10,7 @@ from typing import Final
 from markupsafe import Markup
 
 from ident.diagnosis.diagnosis import NamedEffect
-from ident.plant.places import ALL_WHEELS, CHASSIS, DRIVES, ENCODERS, STEERING, WHEEL_PLACES, members
+from ident.plant.places import CHASSIS, DRIVES, ENCODERS, OF_PARAMETERS, STEERING, WHEEL_PLACES, members
 from ident.report.digits import plain, significant, unit_text
 from ident.report.headline import place_words
 from ident.vehicle.geometry import WHEELS, Geometry
@@ -35,13 +35,6 @@ ROW: Final = 60.0
 
 _SIDES: Final = MappingProxyType({"fl": (-1, -1), "rl": (-1, 1), "fr": (1, -1), "rr": (1, 1)})
 """Of the wheels: right and down."""
-
-_OF_PARAMETERS: Final[Mapping[str, str]] = MappingProxyType(
-    dict.fromkeys(("C_l", "d_vl", "d_cl"), STEERING[0])
-    | dict.fromkeys(("C_r", "d_vr", "d_cr"), STEERING[1])
-    | dict.fromkeys(("m_ch", "C_ch"), CHASSIS[0])
-    | dict.fromkeys(("d_vw", "d_cw", "B_w"), ALL_WHEELS[0])
-)
 
 Box = tuple[float, float, float, float]
 
@@ -79,7 +72,7 @@ class _Part:
 
 def joint_of(where: str) -> str:
     """The place that a cause's place is, or that a parameter of the model belongs to."""
-    return _OF_PARAMETERS.get(where, where)
+    return OF_PARAMETERS.get(where, where)
 
 
 def mark_of(number: int, effect: NamedEffect) -> Mark:

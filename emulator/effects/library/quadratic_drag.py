@@ -52,5 +52,5 @@ INJECTOR: Final = Injector(
     places=(*EACH_WHEEL, *CHASSIS),
     units={"coefficient": "Nm s^2/rad^2"},
     inject=_inject,
-    units_at={"chassis": {"coefficient": "N s^2/m^2"}},
+    units_at={"chassis": "N s^2/m^2"},
 )

@@ -1,36 +1,37 @@
-"""Wheels that stand askew: by how much of it each drive turns aside is decided by the contacts, not by geometry.
+"""Wheels that stand askew: how much of it each kind of drive shows is decided by the contacts, not by geometry.
 
 Two sides that point to different centres cannot both roll. Where contacts give way in proportion to their slip, the
 vehicle takes the middle; where they slide with all their grip any centre between the two balances the forces across
 the wheels, and the next smaller moments decide: a side that slides also drags, and turns the vehicle towards itself.
 So in one drive it follows the side that is askew and in another the side that is not: of what the middle would be,
-it shows twice in one and not at all in the other. Every drive therefore has a share of its own; over driving straight
-and turning on the spot, in which the same side drags the other way, shares are one on average.
+it shows twice in one and not at all in the other. Every kind of drive therefore has a share of its own; over driving
+straight and turning on the spot, in which the same side drags the other way, shares are one on average.
+
+That is so of an angle that stays. What a coupling gives way by follows the traction, and has no share.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate, Contribution, Variant
 from ident.plant.modes import Mode
-from ident.plant.places import STEERING
 from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]
 
-ASKEW: Final = (EffectName.STEERING_OFFSET, EffectName.ELASTICITY, EffectName.BACKLASH)
-"""Causes that leave the wheels of a vehicle askew, at the places of `STEERING`."""
-
 SHARE_STD: Final = 1.0
-"""Of the share of a drive about one: it is between none and two [-]."""
+"""Of the share of a kind of drive about one: it is between none and two [-]."""
+
+ADHESION: Final = 0.5
+"""Of the friction of the floor, and its deviation: what wheels that slide aside drag with is between none of it and dry
+concrete's [-]."""
 
 MEAN_STD: Final = 0.05
 """Of the mean share of driving straight and turning on the spot about one [-].
@@ -50,6 +51,9 @@ RATE: Final = 4.0
 
 SLOW: Final = 0.2
 """Rate from which a dry drag is taken to be there where it is first looked for [rad/s]."""
+
+LEAST: Final = 1e-9
+"""Offset that is none [rad]."""
 
 STRAIGHT: Final = 1e-3
 """Bend of a drag below which it is in proportion to the rate [-]."""
@@ -75,11 +79,6 @@ Blocks = Sequence[Travelling | None]
 """What each block is of drives in which wheels roll; None for others."""
 
 
-def stands_askew(candidate: Candidate) -> bool:
-    """Whether a cause is one of them."""
-    return candidate.effect in ASKEW and candidate.where in STEERING
-
-
 def sliding_aside(mode: Mode, geometry: Geometry) -> float:
     """Speed of the steering axes in a mode, over that at which the contacts roll: wheels turned aside slide with those.
 
@@ -91,39 +90,39 @@ def sliding_aside(mode: Mode, geometry: Geometry) -> float:
     return axis / (axis + geometry.wheel_offset)
 
 
-def with_shares(candidate: Candidate, blocks: Blocks) -> Candidate:
-    """A cause that may have a share of its own in the rolling rows of every mode, its wheels then dragging.
+def with_shares(candidate: Candidate, blocks: Blocks, dragging: float) -> Candidate:
+    """An offset of the steering that may have a share in the rolling rows of every mode, its wheels then dragging.
 
-    Behind its own numbers come the friction at every wheel that drags as much at `RATE` [Nm], how it bends up to that
-    [-], and by how much the share of every mode is above one.
+    Behind the offset come the friction at every wheel that drags as much at `RATE` [Nm], how it bends up to that [-],
+    and by how much the share of every mode is above one.
+
+    Args:
+        candidate: linear in its one number.
+        blocks: of the drives.
+        dragging: friction at every wheel that drags as wheels do on a floor of unit friction, by the offset [Nm/rad].
     """
-    own = _width(candidate.variants[-1])
+    (plain,) = candidate.variants
     return replace(
         candidate,
-        variants=(*candidate.variants, _shared(candidate.variants[-1], blocks)),
-        contribution=_contribution(candidate, own, blocks),
-        expected=lambda values: _expected(values[own + 2 :]),
-        own=own,
+        variants=(plain, _shared(plain, blocks)),
+        contribution=_contribution(plain, blocks),
+        expected=lambda values: _expected(values, dragging),
+        own=1,
     )
 
 
-def _width(variant: Variant) -> int:
-    """Columns of a variant, whether or not these records show any: its own, and what comes along."""
-    return 1 + variant.beside
-
-
 def _shared(variant: Variant, blocks: Blocks) -> Variant:
-    """Its columns; what drags, at any rate and by the rate; how the first column is apart between the modes."""
-    own = _width(variant)
-    start = variant.start or (lambda found: found)
+    """Its column; what drags, at any rate and by the rate; how the column is apart between the modes."""
+    if all(column is None for column in variant.columns):
+        return variant
 
     def numbers(found: Array) -> Array:
-        itself, line, apart = found[:own], found[own : own + 2], found[own + 2 :]
-        above = APART @ apart / itself[0] if itself[0] else np.zeros(len(MODES))
-        return np.concatenate([start(itself), _bent(*line.tolist()), above])
+        offset, line, apart = found[0], found[1:3], found[3:]
+        above = APART @ apart / offset if offset else np.zeros(len(MODES))
+        return np.concatenate([[offset], _bent(*line.tolist()), above])
 
-    columns = [_joined(column, block, own) for column, block in zip(variant.columns, blocks, strict=True)]
-    return Variant(tuple(columns), numbers, beside=variant.beside + 2 + APART.shape[1], itself=False)
+    columns = [_joined(column, block) for column, block in zip(variant.columns, blocks, strict=True)]
+    return Variant(tuple(columns), numbers, beside=2 + APART.shape[1], itself=False)
 
 
 def _bent(dry: float, viscous: float) -> Array:
@@ -133,36 +132,30 @@ def _bent(dry: float, viscous: float) -> Array:
     return np.array([drag, RATE / (SLOW + 2 * part * RATE)])
 
 
-def _joined(column: Array | None, block: Travelling | None, own: int) -> Array | None:
+def _joined(column: Array | None, block: Travelling | None) -> Array | None:
     there = column if column is not None or block is None else block.friction
     if there is None:
         return None
-    joined = np.zeros((len(there), own + 2 + APART.shape[1]))
+    joined = np.zeros((len(there), 3 + APART.shape[1]))
     if column is not None:
-        joined[:, :own] = column
+        joined[:, :1] = column
     if block is None:
         return joined
     if block.friction is not None:
-        joined[:, own : own + 2] = block.friction[:, None] * np.stack([np.ones_like(block.rate), block.rate], axis=1)
+        joined[:, 1:3] = block.friction[:, None] * np.stack([np.ones_like(block.rate), block.rate], axis=1)
     elif column is not None:
-        joined[:, own + 2 :] = column[:, :1] * APART[block.mode]
+        joined[:, 3:] = column * APART[block.mode]
     return joined
 
 
-def _contribution(candidate: Candidate, own: int, blocks: Blocks) -> Contribution:
-    exact = candidate.contribution or _linear(candidate.variants[0])
-
-    def contribution(values: Array, parameters: Array) -> Sequence[Array | None]:
-        found, along = exact(values[:own], parameters), values[own:]
-        if not len(along):
+def _contribution(variant: Variant, blocks: Blocks) -> Contribution:
+    def contribution(values: Array, _parameters: Array) -> Sequence[Array | None]:
+        found = [None if column is None else values[0] * column[:, 0] for column in variant.columns]
+        if len(values) == 1:
             return found
-        return [_with_share(series, block, along) for series, block in zip(found, blocks, strict=True)]
+        return [_with_share(series, block, values[1:]) for series, block in zip(found, blocks, strict=True)]
 
     return contribution
-
-
-def _linear(variant: Variant) -> Callable[[Array, Array], Sequence[Array | None]]:
-    return lambda values, _: [None if column is None else column @ values for column in variant.columns]
 
 
 def _with_share(series: Array | None, block: Travelling | None, along: Array) -> Array | None:
@@ -176,8 +169,10 @@ def _with_share(series: Array | None, block: Travelling | None, along: Array) ->
     return dragged if series is None else series + dragged
 
 
-def _expected(above: Array) -> Array:
-    """How far shares are from one, in standard deviations."""
-    if not len(above):
+def _expected(values: Array, dragging: float) -> Array:
+    """How far a drag is from what wheels at that angle drag, and shares from one, in standard deviations."""
+    if len(values) == 1:
         return np.zeros(0)
-    return np.append(above / SHARE_STD, above[:2].mean() / MEAN_STD)
+    offset, drag, above = float(values[0]), float(values[1]), values[3:]
+    whole = ADHESION * dragging * max(abs(offset), LEAST)
+    return np.concatenate([[drag / whole - 1], above / SHARE_STD, [above[:2].mean() / MEAN_STD]])

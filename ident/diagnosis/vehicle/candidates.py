@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.delays import HELD, RARER
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Candidate, Variant
-from ident.diagnosis.vehicle.askew import MODES, Travelling, sliding_aside, stands_askew, with_shares
+from ident.diagnosis.vehicle.askew import MODES, Travelling, sliding_aside, with_shares
 from ident.diagnosis.vehicle.bending import BristleCause
 from ident.diagnosis.vehicle.bristles import bristle_candidate, bristle_causes
 from ident.diagnosis.vehicle.context import FORMULAS_KEPT, MODEL_COLUMNS, Context
@@ -47,6 +47,7 @@ from ident.diagnosis.vehicle.transforms import TransformCause, transform_causes
 from ident.plant.places import DRIVES, STEERING, WHEEL_PLACES
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import PARAMETER_NAMES
+from ident.vehicle.quantities import GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -158,18 +159,21 @@ def slid_by_any(sources: Sequence[Source], context: Context) -> Sequence[Array |
 def seen_together(
     candidates: Sequence[Candidate], sources: Sequence[Source], tables: Sequence[Array], context: Context
 ) -> Iterator[Candidate]:
-    """The candidates: those that stand askew by their shares, and slip only of wheels that slide alone, and let go."""
+    """The candidates: offsets of the steering with shares, and slip only of wheels that slide alone, and let go."""
     driving = [source for source in sources if source.rolls and not source.rattles.any()]
     inputs, settings = [context.inputs(one) for one in driving], [context.setting(one) for one in driving]
     times = np.sum([np.zeros(len(WHEEL_PLACES)), *map(sliding_times, inputs, settings)], axis=0)
     lets_go = slides_at_its_limit(inputs, settings)
     blocks = list(_travelling(sources, tables, context.geometry))
+    # Two of the four wheels slide by the whole angle, or all by half of it.
+    dragging = context.known[PARAMETER_NAMES.index("m_ch")] * GRAVITY / 4 * context.geometry.wheel_radius / 2
     for candidate in candidates:
         if candidate.effect == EffectName.SLIP:
             alone = slides_alone(sliding_cause(candidate.where), times)
             yield replace(candidate, excluded=not (alone and lets_go))
         else:
-            yield with_shares(candidate, blocks) if stands_askew(candidate) else candidate
+            askew = candidate.effect == EffectName.STEERING_OFFSET
+            yield with_shares(candidate, blocks, dragging) if askew else candidate
 
 
 def _travelling(sources: Sequence[Source], tables: Sequence[Array], geometry: Geometry) -> Iterator[Travelling | None]:
@@ -177,14 +181,13 @@ def _travelling(sources: Sequence[Source], tables: Sequence[Array], geometry: Ge
     friction = 1 + PARAMETER_NAMES.index("d_cw")
     for source, table in zip(sources, tables, strict=True):
         mode = source.spec.mode
-        rate = np.abs(source.inputs[:: source.factor, SLICES["beta_rate"]]).mean(axis=1)
+        if mode not in MODES or source.own is not None:
+            yield from [None] * len(source.coordinates)
+            continue
+        part = sliding_aside(mode, geometry)
+        rate = part * np.abs(source.inputs[:: source.factor, SLICES["beta_rate"]]).mean(axis=1)
         for row in range(len(source.coordinates)):
-            if mode not in MODES or source.own is not None:
-                yield None
-                continue
-            part = sliding_aside(mode, geometry)
-            dragged = None if source.rolls else part * table[:, row, friction]
-            yield Travelling(MODES.index(mode), dragged, part * rate)
+            yield Travelling(MODES.index(mode), None if source.rolls else part * table[:, row, friction], rate)
 
 
 def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -> Candidate:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 MODES = {Step.STRAIGHT: Mode.STEERED, Step.ROTATION: Mode.ROTATION}
 MASS, INERTIA, ADHESION = 842.0, 150.0, 0.8
 FASTEST, PERIOD = 0.5, 3.0
+DRAGGING = 100.0
 
 
 def driven(step: Step, geometry: Geometry, offset: Array, slip: float, *, creeps: bool = False) -> tuple[float, float]:
@@ -115,7 +117,7 @@ def shared() -> Candidate:
     plain = Candidate("steering_offset", "steering_left", (), (variant,))
     rate, friction = np.array([1.0, 3.0]), np.array([2.0, -2.0])
     blocks = (Travelling(0, None, rate), Travelling(1, None, rate), Travelling(1, friction, rate), None)
-    return with_shares(plain, blocks)
+    return with_shares(plain, blocks, DRAGGING)
 
 
 def _form(candidate: Candidate) -> Callable[[Array], list[Array | None]]:
@@ -154,6 +156,21 @@ def test_columns_and_form_of_shares_agree_where_wheels_are_fast(shared: Candidat
         assert column is not None
         assert series is not None
         assert column @ coefficients == pytest.approx(series, abs=1e-3)
+
+
+def test_a_drag_is_expected_to_be_that_of_wheels_turned_aside_so_far(shared: Candidate) -> None:
+    assert shared.expected is not None
+    none, half, whole = (
+        float(shared.expected(np.array([0.01, share * DRAGGING * 0.01, 1.0, 0.0, 0.0, 0.0]))[0])
+        for share in (0, 0.5, 1)
+    )
+    assert (none, half, whole) == pytest.approx((-1.0, 0.0, 1.0))
+
+
+def test_what_no_row_shows_of_an_offset_stays_nothing(shared: Candidate) -> None:
+    blocks = (None, Travelling(0, np.ones(2), np.ones(2)))
+    unseen = with_shares(replace(shared, variants=(Variant((None, None)),)), blocks, DRAGGING)
+    assert [variant.columns for variant in unseen.variants] == [(None, None)] * 2
 
 
 def test_a_mean_share_other_than_one_is_unexpected(shared: Candidate) -> None:
