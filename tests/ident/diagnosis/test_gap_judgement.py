@@ -211,10 +211,10 @@ def test_a_play_is_not_named_for_what_only_comes_along_with_it(world: type[Any])
     assert "a" not in _names(judge(*problems, seed=1))
 
 
-def _with_sliding(problem: Problem) -> Problem:
-    """`a` with what comes along with it, which is what `b` does: as a wheel that stands askew slides."""
-    askew, slid, *others = problem.candidates
-    both = zip(askew.variants[0].columns, slid.variants[0].columns, strict=True)
+def _with_drag(problem: Problem) -> Problem:
+    """`a` with what comes along with it, which is what `b` does: as wheels that stand askew drag."""
+    askew, drag, *others = problem.candidates
+    both = zip(askew.variants[0].columns, drag.variants[0].columns, strict=True)
     columns = tuple(np.hstack([one, other]) for one, other in both if one is not None and other is not None)
     askew = replace(askew, variants=(*askew.variants, Variant(columns, beside=1, itself=False)))
     return replace(problem, candidates=(askew, *others))
@@ -224,7 +224,7 @@ def _with_sliding(problem: Problem) -> Problem:
 def test_what_only_comes_along_with_an_effect_of_no_size_has_another_cause(
     world: type[Any], own: float, verdict: Verdict
 ) -> None:
-    problems = [_with_sliding(world(seed=22, true={"a": own, "b": 0.4}).problem(part)) for part in (0, 1)]
+    problems = [_with_drag(world(seed=22, true={"a": own, "b": 0.4}).problem(part)) for part in (0, 1)]
     findings = judge(*problems, seed=1)
     assert _names(findings) == ["a"]
     assert findings.verdict is verdict
@@ -237,7 +237,7 @@ def test_where_nothing_came_along_a_small_size_is_as_good_as_its_rows(world: typ
     """Its stated deviation is larger than itself, but no other explanation is there."""
     problems = []
     for part in (0, 1):
-        problem = _with_sliding(world(seed=22, true={"a": 0.2}).problem(part))
+        problem = _with_drag(world(seed=22, true={"a": 0.2}).problem(part))
         first, *others = problem.candidates
         widest = first.variants[-1]
         alone = [column * [1.0, 0.0] for column in widest.columns if column is not None]
@@ -267,7 +267,7 @@ def test_a_play_within_what_its_flanks_may_yield_is_their_compliance(
 
 
 def test_what_is_of_no_size_is_not_named_beside_another(world: type[Any]) -> None:
-    problems = [_with_sliding(world(seed=22, true={"b": 0.3, "c": 0.8}).problem(part)) for part in (0, 1)]
+    problems = [_with_drag(world(seed=22, true={"b": 0.3, "c": 0.8}).problem(part)) for part in (0, 1)]
     assert _names(judge(*problems, seed=1)) == ["c"]
 
 
