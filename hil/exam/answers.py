@@ -33,7 +33,6 @@ LAW_VARIABLES: Final = MappingProxyType(
 _JOINTS: Final = MappingProxyType({"drive": "wheel", "drives": "wheels", "encoder": "steering", "encoders": "steering"})
 """A drive turns the wheel of its corner, an encoder reads the steering axis of its side."""
 
-
 _TURNED: Final = frozenset(str(name) for name, shape in SHAPES.items() if shape.angle is not None)
 """Effects with a direction or a phase: half a turn of it is the other sign of the size."""
 
@@ -284,9 +283,7 @@ class Answer:
 
 def _corner(where: str) -> str:
     """The joint that a place, or a parameter of the model, is at."""
-    if where in OF_PARAMETERS:
-        return OF_PARAMETERS[where]
-    kind, mark, corner = where.partition("_")
+    kind, mark, corner = OF_PARAMETERS.get(where, where).partition("_")
     return f"{_JOINTS.get(kind, kind)}{mark}{corner}"
 
 

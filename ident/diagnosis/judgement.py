@@ -216,7 +216,7 @@ class Judgement:
         """Whether the effects would rather have other sizes in some steps, where their columns are all there is."""
         columns = [self.rows.layout[variant] for variant in self.found.variants]
         candidates = [self.problems[0].candidates[column.candidate] for column in columns]
-        exact = all(one.contribution is None for one in candidates) and not any(column.beside for column in columns)
+        exact = all(one.contribution is None for one in candidates)
         evidence = max(self._log_evidence(index) for index in range(self.fitted.count))
         limit = max(self.limits.unsteady, self.limits.bent * evidence)
         return exact and log_unsteady(self.regression, self.found) > limit

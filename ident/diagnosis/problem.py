@@ -139,8 +139,7 @@ class Candidate:
         spread: standard deviations of the parameters that come with the way they are told, beyond the scatter of the
             rows; empty where there are none.
         part: the same as part of each parameter.
-        yielding: the same over what comes along among its `own` numbers: a load, of what flanks yield under it.
-        own: how many numbers are its own, what comes along included; those behind are of what it sets off. None: all.
+        yielding: the same over what comes along: a load, of what flanks yield under it.
         curve: whose friction over the speed it changes, if it is a friction.
         periodic: of a wave over an angle; its variants are then those of the orders that the records show.
         price: log evidence that the choice of its variants costs beyond that of its coefficients.
@@ -163,7 +162,6 @@ class Candidate:
     spread: tuple[float, ...] = ()
     part: float = 0.0
     yielding: float = 0.0
-    own: int | None = None
     curve: str = ""
     along: str = ""
     periodic: Periodic | None = None

@@ -284,7 +284,7 @@ def _unknown(
 def _beyond(candidate: Candidate, numbers: Array) -> Array:
     """Standard deviations of the parameters (k,) beyond the scatter of the rows, from all numbers (m,)."""
     count = len(candidate.parameters)
-    along = numbers[count : candidate.own]
+    along = numbers[count:]
     alone = np.hypot(candidate.spread or 0.0, candidate.part * numbers[:count])
     return np.asarray(np.hypot(alone, candidate.yielding * np.linalg.norm(along)))
 

@@ -24,6 +24,9 @@ COUNT: Final = 48
 
 _FIRST_RANK: Final = 1000
 
+_AHEAD: Final = 0
+"""Row of q in which the chassis travels ahead."""
+
 
 def coefficient(index: int) -> str:
     """Name of a coefficient."""
@@ -32,9 +35,10 @@ def coefficient(index: int) -> str:
 
 @dataclass(frozen=True)
 class _LawTerm(EffectTerm):
-    """f(variable) at every joint of the place, times `_partner`; `holds` where that is the direction."""
+    """f(variable) at every joint of the place, or ahead, times `_partner`; `holds` where that is the direction."""
 
     holds: ClassVar[bool] = False
+    places: ClassVar[tuple[str, ...]] = with_groups(STEERING, WHEEL_PLACES)
 
     def forces(self, state: State, masses: Masses, parameters: Expression) -> Expression:
         """The law, unless it holds at rest."""
@@ -48,7 +52,7 @@ class _LawTerm(EffectTerm):
 
     def _in_rows(self, state: State) -> Expression:
         rows = ca.SX(9, 1)
-        for row in rows_of(self.where):
+        for row in (_AHEAD,) if self.where in CHASSIS else rows_of(self.where):
             rows[row] = self["scale"] * self._function(self._variable(state, row)) * self._partner(state, row)
         return rows
 
@@ -81,11 +85,7 @@ def _kernel(u: Expression) -> Expression:
 
 
 class _OverRate(_LawTerm):
-    def _in_rows(self, state: State) -> Expression:
-        """At the chassis a force against its forward speed."""
-        if self.where not in CHASSIS:
-            return super()._in_rows(state)
-        return ca.vertcat(self["scale"] * self._function(state.rates[0]), ca.SX(8, 1))
+    places: ClassVar[tuple[str, ...]] = (*_LawTerm.places, *CHASSIS)
 
     def _variable(self, state: State, row: int) -> Expression:
         return state.rates[row]
@@ -122,11 +122,10 @@ def _units(unit_x: str, unit_y: str) -> dict[str, str]:
 
 
 def _kind(rank: int, name: str, term: type[_LawTerm], unit_x: str, unit_y: str) -> EffectKind:
-    travels = term is _OverRate
     return EffectKind(
         name=name,
         rank=_FIRST_RANK + rank,
-        places=with_groups(STEERING, WHEEL_PLACES, *([CHASSIS] if travels else [])),
+        places=term.places,
         parameters=(
             EffectParameter("scale", "1", "of the law as it was found"),
             EffectParameter("start", unit_x, "of the first coefficient"),
@@ -137,7 +136,7 @@ def _kind(rank: int, name: str, term: type[_LawTerm], unit_x: str, unit_y: str) 
         term=term,
         words="a law without a name, {scale} of what was found",
         usual=lambda vehicle, where: 1.0,
-        units_at=MappingProxyType({CHASSIS[0]: _units("m/s", "N")} if travels else {}),
+        units_at=MappingProxyType({CHASSIS[0]: _units("m/s", "N")}),
         adding=(),
         always=False,
     )

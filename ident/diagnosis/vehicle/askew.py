@@ -52,11 +52,8 @@ RATE: Final = 4.0
 SLOW: Final = 0.2
 """Rate from which a dry drag is taken to be there where it is first looked for [rad/s]."""
 
-LEAST: Final = 1e-9
-"""Offset that is none [rad]."""
-
-STRAIGHT: Final = 1e-3
-"""Bend of a drag below which it is in proportion to the rate [-]."""
+NONE: Final = float(np.finfo(float).eps)
+"""Of an offset, or of the bend of a drag, which is in proportion to the rate then: not zero, to divide by."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,6 @@ def with_shares(candidate: Candidate, blocks: Blocks, dragging: float) -> Candid
         variants=(plain, _shared(plain, blocks)),
         contribution=_contribution(plain, blocks),
         expected=lambda values: _expected(values, dragging),
-        own=1,
     )
 
 
@@ -164,7 +160,7 @@ def _with_share(series: Array | None, block: Travelling | None, along: Array) ->
         return series
     if block.friction is None:
         return None if series is None else (1 + above[block.mode]) * series
-    bend = max(abs(bend), STRAIGHT)
+    bend = max(abs(bend), NONE)
     dragged = drag / math.tanh(bend) * block.friction * np.tanh(bend * block.rate / RATE)
     return dragged if series is None else series + dragged
 
@@ -174,5 +170,5 @@ def _expected(values: Array, dragging: float) -> Array:
     if len(values) == 1:
         return np.zeros(0)
     offset, drag, above = float(values[0]), float(values[1]), values[3:]
-    whole = ADHESION * dragging * max(abs(offset), LEAST)
+    whole = ADHESION * dragging * max(abs(offset), NONE)
     return np.concatenate([[drag / whole - 1], above / SHARE_STD, [above[:2].mean() / MEAN_STD]])

@@ -32,7 +32,7 @@ JOINTS: Final = (*STEERING, "steering", *WHEEL_PLACES, "wheels")
 FIRST_JOINT: Final = 3
 """Row of q of the first joint; the six joints are the two steering axes and the four wheels."""
 
-FORWARD: Final = 6
+FORWARD: Final = len(STEERING) + len(WHEEL_PLACES)
 """Number of the chassis' way ahead, behind those of the joints."""
 
 
