@@ -18,7 +18,7 @@ from hil.exam.order import Order
 from hil.exam.plans import ExamPlans, plan_exam, plans_from_text, plans_text
 from hil.exam.record_bytes import record_bytes
 from hil.exam.sealed import Contents, Progress, Subject, seal_exam
-from hil.exam.sizes import SizeTable
+from hil.exam.sizes import SizeTable, beyond_sampling
 from hil.exam.workers import run_all
 from hil.exam.world import World
 from hil.network import load_network
@@ -53,7 +53,8 @@ def seal(order: VehicleOrder, table: SizeTable, progress: Progress) -> Exam:
 
     def draw(lots: Lots) -> tuple[list[Case], tuple[str, ...]]:
         read_model(order.model)  # Whether it is one must show now, not when the exam is diagnosed.
-        cases = draw_cases(table, composition, lots.noise, lots.questions, lots.identifiers)
+        shown = beyond_sampling(table, cycle)
+        cases = draw_cases(shown, composition, lots.noise, lots.questions, lots.identifiers)
         return cases, _draw_plans(order, lots, cycle)
 
     subject = Subject(

@@ -5,13 +5,19 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
+from ident.diagnosis.delays import HELD
+from ident.diagnosis.names import EffectName
 from ident.errors import DataFileError
+
+LATE: Final = (EffectName.TIME_DELAY, EffectName.TORQUE_FILTER)
+EVERYWHERE: Final = "drives"
+"""Where a part of a sample interval is what sampling does."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +32,7 @@ class EffectSize:
         largest: size in practice; an effect below the noise even there is invisible.
         signed: may be negative.
         known: the library has a candidate for it.
+        hidden: size that no record tells from none; only what is beyond it amounts to noise units.
     """
 
     name: str
@@ -37,12 +44,16 @@ class EffectSize:
     largest: float
     signed: bool
     known: bool
+    hidden: float = 0.0
 
     def physical(self, noise_units: float) -> float:
         """Size that amounts to so many noise units.
 
         Straight lines through the points, both axes logarithmic; in proportion beyond them.
         """
+        return self.hidden + self._beyond(noise_units)
+
+    def _beyond(self, noise_units: float) -> float:
         sizes, units = zip(*self.points, strict=True)
         if noise_units <= units[0]:
             return float(sizes[0] * noise_units / units[0])
@@ -66,9 +77,22 @@ class SizeTable:
     unknown: tuple[EffectSize, ...]
 
 
+def beyond_sampling(table: SizeTable, sample_time: float) -> SizeTable:
+    """A table for records of one sample interval [s]: a lag of all drives counts from what sampling may do."""
+    late = tuple(
+        replace(row, hidden=HELD * sample_time) if row.name in LATE and row.where == EVERYWHERE else row
+        for row in table.visible
+    )
+    return replace(table, visible=late)
+
+
 def table_text(rows: Sequence[EffectSize]) -> str:
     """The table as JSON, an effect a line."""
-    return "[\n" + ",\n".join(json.dumps(vars(row)) for row in rows) + "\n]\n"
+    return "[\n" + ",\n".join(json.dumps(_measured(row)) for row in rows) + "\n]\n"
+
+
+def _measured(row: EffectSize) -> dict[str, Any]:
+    return {name: value for name, value in vars(row).items() if name != "hidden"}
 
 
 def load_sizes(path: Path) -> SizeTable:

@@ -14,7 +14,7 @@ from emulator.prototype import load_prototype
 from hil.exam.cases import SIZES, Case, Kind, case_from_json
 from hil.exam.drawing import Composition, draw_cases
 from hil.exam.sealing import VehicleOrder, effect_of, seal
-from hil.exam.sizes import EffectSize, SizeTable, load_rows, table_text
+from hil.exam.sizes import EffectSize, SizeTable, beyond_sampling, load_rows, load_sizes, table_text
 from hil.exam.world import stored_model, stored_sizes
 from hil.exam.worlds import world_of
 from ident.diagnosis.names import EffectName, places_of
@@ -98,6 +98,18 @@ def test_a_size_goes_through_the_points_measured() -> None:
     assert row.physical(4.0) == pytest.approx(0.4)
     assert row.physical(2.0) == pytest.approx(0.2)
     assert row.physical(0.5) == pytest.approx(0.05)
+
+
+def test_a_lag_of_all_drives_counts_from_what_sampling_may_do_and_nothing_else_does() -> None:
+    table = load_sizes(PROTOTYPE.sizes_file)
+    drawn = beyond_sampling(table, 4e-3)
+    moved = {
+        (row.name, row.where): further.physical(1.0) - row.physical(1.0)
+        for row, further in zip(table.visible, drawn.visible, strict=True)
+        if further != row
+    }
+    assert moved == {(name, "drives"): pytest.approx(2.2e-3) for name in ("time_delay", "torque_filter")}
+    assert table_text(drawn.visible) == table_text(table.visible)
 
 
 def test_a_table_has_an_effect_a_line_and_is_read_back_as_it_was(tmp_path: Path) -> None:
