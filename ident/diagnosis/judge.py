@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judgement import Judgement
@@ -49,20 +48,18 @@ def judge(
         stage: told what begins.
     """
     settings, limits = settings or Settings(), limits or Limits()
-    # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
-    with threadpool_limits(limits=1, user_api="blas"):
-        fit, confirm = with_orders((fit, confirm))
-        if not repeats((fit, confirm)):
-            return _unrefuted((fit, confirm), seed, settings, limits, stage).findings()
-        stage("what follows time")
-        drift = time_law((fit, confirm), settings, seed)
-        averaged = [replace(problem, dependences=without_time(problem)) for problem in (fit, confirm)]
-        if drift is not None:
-            problems = (without_drift(fit, drift), without_drift(confirm, drift))
-            judgement = _unrefuted(problems, seed, settings, limits, stage)
-            if judgement.fitted.closed_by_drift > limits.law:
-                return judgement.findings(drift)
-        return _unrefuted((averaged[0], averaged[1]), seed, settings, limits, stage).findings()
+    fit, confirm = with_orders((fit, confirm))
+    if not repeats((fit, confirm)):
+        return _unrefuted((fit, confirm), seed, settings, limits, stage).findings()
+    stage("what follows time")
+    drift = time_law((fit, confirm), settings, seed)
+    averaged = [replace(problem, dependences=without_time(problem)) for problem in (fit, confirm)]
+    if drift is not None:
+        problems = (without_drift(fit, drift), without_drift(confirm, drift))
+        judgement = _unrefuted(problems, seed, settings, limits, stage)
+        if judgement.fitted.closed_by_drift > limits.law:
+            return judgement.findings(drift)
+    return _unrefuted((averaged[0], averaged[1]), seed, settings, limits, stage).findings()
 
 
 def _unrefuted(

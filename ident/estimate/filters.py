@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, signal
+from scipy import fft, ndimage, signal, sparse
 
 from ident.errors import EstimationError
 
@@ -93,6 +94,41 @@ def mirrored(values: Array, order: int, cutoff: float, sample_time: float) -> Ar
     sections = butterworth(order, cutoff, sample_time)
     reach = min(math.ceil(MEMORY / (cutoff * sample_time)), len(values) - 1)
     return np.asarray(signal.sosfiltfilt(sections, values, axis=0, padtype="even", padlen=reach))
+
+
+def filter_weights(
+    gain: Callable[[Array], Array], memory: float, moments: Array, count: int, sample_time: float
+) -> Any:
+    """(n, count) sparse, that makes of a series what a zero-phase filter would have at some moments.
+
+    Cheaper than the filter where few moments of many series are wanted. Beyond its ends a series is mirrored.
+
+    Args:
+        gain: of the filter at angular frequencies (F,) [rad/s].
+        memory: after which it has forgotten a sample [s].
+        moments: (n,) from the beginning of the first sample, which lasts `sample_time` [s].
+        count: samples of the series.
+        sample_time: [s].
+    """
+    reach = math.ceil(memory / sample_time)
+    place = np.rint(moments / sample_time - 0.5).astype(np.int64)
+    length = fft.next_fast_len(2 * (reach + 2), real=True)
+    frequency = 2 * np.pi * np.fft.rfftfreq(length, sample_time)
+    # Moments lie between the samples of the series, each by its own part of an interval.
+    late = moments - (place + 0.5) * sample_time
+    responses = np.fft.irfft(
+        gain(np.asarray(frequency, dtype=np.float64)) * np.exp(-1j * np.multiply.outer(late, frequency)), length, axis=1
+    )
+    offsets = np.arange(-reach, reach + 1)
+    columns = place[:, None] + offsets
+    columns = np.where(columns < 0, -1 - columns, columns)
+    columns = np.where(columns >= count, 2 * count - 1 - columns, columns)
+    rows = np.repeat(np.arange(len(moments)), len(offsets))
+    inside = (columns >= 0) & (columns < count)
+    values = np.where(inside, responses[:, offsets], 0.0)
+    return sparse.csr_matrix(
+        (values.ravel(), (rows, np.where(inside, columns, 0).ravel())), shape=(len(moments), count)
+    )
 
 
 THREE: Final = 3

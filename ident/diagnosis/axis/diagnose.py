@@ -6,6 +6,8 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
+from threadpoolctl import threadpool_limits
+
 from ident.diagnosis.axis.candidates import LATE
 from ident.diagnosis.axis.problem import axis_problem, delayed_axes
 from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_other_axes
@@ -46,6 +48,19 @@ def diagnose_axis(
         RecordError: the records do not have the same axes.
         EstimationError: a record is too short, or an axis does not move.
     """
+    # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _diagnosed(fit, confirm, seed, cutoff, lacking, stage)
+
+
+def _diagnosed(
+    fit: Sequence[AxisRecord],
+    confirm: Sequence[AxisRecord],
+    seed: int,
+    cutoff: float | None,
+    lacking: Collection[str],
+    stage: Stage,
+) -> Findings:
     refuse_other_axes([*fit, *confirm])
     stage("filter of the records")
     reference = axis_reference(fit, cutoff, confirm)

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, signal, sparse
+from scipy import fft, signal
 
 from ident.diagnosis.axis.motion import AxisMotion, axis_motion
 from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_other_axes
@@ -25,7 +25,7 @@ from ident.diagnosis.law.dependence import path_since_reversal
 from ident.diagnosis.rows import ROWS_PER_CUTOFF
 from ident.errors import RecordError
 from ident.estimate.axis.processing import BUTTERWORTH_ORDER
-from ident.estimate.filters import FILTER_ORDER, SEVEN, differentiate
+from ident.estimate.filters import FILTER_ORDER, SEVEN, differentiate, filter_weights
 from ident.records.axis_record import AxisKind, AxisRecord
 
 Array = NDArray[np.float64]
@@ -60,6 +60,10 @@ class Filter:
     def gain(self, count: int, sample_time: float) -> Array:
         """(count,) at the frequencies of a cosine transform: both of Butterworth's, there and back."""
         frequency = np.pi * np.arange(count) / (count * sample_time)
+        return self.gain_at(np.asarray(frequency, dtype=np.float64))
+
+    def gain_at(self, frequency: Array) -> Array:
+        """(F,) at angular frequencies [rad/s]."""
         position = 1 + (frequency / self.cutoff) ** (2 * BUTTERWORTH_ORDER)
         return np.asarray(1 / position / (1 + (frequency / self.bandwidth) ** (2 * FILTER_ORDER)))
 
@@ -71,24 +75,7 @@ class Filter:
 
     def weights(self, moments: Array, count: int, sample_time: float) -> Any:
         """(n, count) sparse, that makes rows at some moments (n,) [s] of a series of so many samples."""
-        reach = math.ceil(FORGOTTEN / (self.bandwidth * sample_time))
-        place = np.rint(moments / sample_time - 0.5).astype(np.int64)
-        length = fft.next_fast_len(2 * (reach + 2), real=True)
-        frequency = 2 * np.pi * np.fft.rfftfreq(length, sample_time)
-        gain = 1 / (1 + (frequency / self.cutoff) ** (2 * BUTTERWORTH_ORDER))
-        gain = gain / (1 + (frequency / self.bandwidth) ** (2 * FILTER_ORDER))
-        # Rows stand between the samples of the series, each by its own part of an interval.
-        late = moments - (place + 0.5) * sample_time
-        responses = np.fft.irfft(gain * np.exp(-1j * np.multiply.outer(late, frequency)), length, axis=1)
-        offsets = np.arange(-reach, reach + 1)
-        columns = place[:, None] + offsets
-        columns = np.where(columns < 0, -1 - columns, columns)
-        columns = np.where(columns >= count, 2 * count - 1 - columns, columns)
-        rows = np.repeat(np.arange(len(moments)), len(offsets))
-        inside = (columns >= 0) & (columns < count)
-        values = np.where(inside, responses[:, offsets], 0.0)
-        shape = (len(moments), count)
-        return sparse.csr_matrix((values.ravel(), (rows, np.where(inside, columns, 0).ravel())), shape=shape)
+        return filter_weights(self.gain_at, FORGOTTEN / self.bandwidth, moments, count, sample_time)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.law.dependence import Basis, Dependence, Partner, Variable, path_since_reversal
 from ident.diagnosis.problem import Channel
+from ident.diagnosis.vehicle.coarse import Coarse
 from ident.diagnosis.vehicle.context import Context
 from ident.diagnosis.vehicle.inputs import SLICES
 from ident.diagnosis.vehicle.sources import Source
@@ -76,29 +77,32 @@ _LAWS: Final = (
 def vehicle_dependences(sources: Sequence[Source], context: Context) -> list[Dependence]:
     """Every variable that is tried for the joints of the vehicle, with what the function is multiplied with."""
     levers = [levers_of(source, context) for source in sources]
-    return [_dependence(law, where, sources, levers, context) for law in _LAWS for where in law.places]
+    coarse = [Coarse(source, context.processing.cutoff) for source in sources]
+    return [_dependence(law, where, coarse, levers, context) for law in _LAWS for where in law.places]
 
 
 def _dependence(
-    law: _Law, where: str, sources: Sequence[Source], levers: Sequence[Array | None], context: Context
+    law: _Law, where: str, coarse: Sequence[Coarse], levers: Sequence[Array | None], context: Context
 ) -> Dependence:
+    sources = [each.source for each in coarse]
     joints = [FORWARD] if where in CHASSIS else [row - FIRST_JOINT for row in rows_of(where)]
 
     def design(basis: Basis) -> Sequence[Array | None]:
         found: list[Array | None] = []
-        for source, lever in zip(sources, levers, strict=True):
+        for each, lever in zip(coarse, levers, strict=True):
+            source = each.source
             columns: list[Array | None] = [None] * len(source.coordinates)
             rows = _acting(lever, joints)
             if lever is not None and rows:
                 inputs = context.inputs(source)
-                torques = sum(
-                    (_partner(inputs, joint, law.partner) * lever[:, joint][:, rows].T)[:, :, None]
-                    * basis(_variable(inputs, joint, law, source.time, context.geometry))[None]
-                    for joint in joints
-                )
-                filtered = context.filtered(np.moveaxis(np.asarray(torques), 0, 1), source)
-                for place, row in enumerate(rows):
-                    columns[row] = filtered[:, place] if filtered[:, place].any() else None
+                variables = [_variable(inputs, joint, law, source.time, context.geometry) for joint in joints]
+                functions = [
+                    (_partner(inputs, joint, law.partner) * lever[:, joint].T, basis(x))
+                    for joint, x in zip(joints, variables, strict=True)
+                ]
+                for row in rows:
+                    made = each.rows([(factors[row], function) for factors, function in functions])
+                    columns[row] = made if made.any() else None
             found += columns
         return found
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from ident.diagnosis.diagnosis import Diagnosis
 from ident.diagnosis.findings import Findings
@@ -75,15 +76,17 @@ def diagnose_vehicle(
             diagnosis, or the confirming records hold none of those fitted.
         DataFileError: a parameter of the model is zero.
     """
-    stage("rows of the records")
-    question = pose_vehicle(fit, confirm, vehicle, model, effects)
-    findings = judge(*question.problems, seed=seed, stage=stage)
-    invisible = tuple(str(name) for name in effects if name in question.hidden or name in findings.invisible)
-    findings = replace(findings, invisible=invisible)
-    stage("the next experiment")
-    steps = {block.step for block in question.problems[0].blocks}
-    advice = next_experiment(findings, question.driven.only(steps), question.visibility)
-    return VehicleDiagnosis(findings, advice, question.problems)
+    # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"):
+        stage("rows of the records")
+        question = pose_vehicle(fit, confirm, vehicle, model, effects)
+        findings = judge(*question.problems, seed=seed, stage=stage)
+        invisible = tuple(str(name) for name in effects if name in question.hidden or name in findings.invisible)
+        findings = replace(findings, invisible=invisible)
+        stage("the next experiment")
+        steps = {block.step for block in question.problems[0].blocks}
+        advice = next_experiment(findings, question.driven.only(steps), question.visibility)
+        return VehicleDiagnosis(findings, advice, question.problems)
 
 
 @dataclass(frozen=True)
