@@ -18,10 +18,8 @@ class Limits:
         creeping: the same of rows whose noise is mostly what a model may lack.
         foreign: the same of rows that the model says nothing of; where no effect acts, `nearly` pardons it.
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
-        named: what one effect must close, over that and what all leave, where a remainder repeats.
-        nearly: the same where what repeats exceeds its limit by more than `far`.
+        nearly: what one effect must close, over that and what all leave, where a remainder repeats.
         humble: whether no name is surer than that share, where a remainder repeats that is pardoned.
-        far: what repeats, in units of its limit, above which `nearly` is asked instead of `named`.
         improvement: share of the held-out gap from which every effect but one counts, whatever it gains.
         widening: share of the held-out gap by which an effect may seem to widen it.
         most: share of the held-out gap that all effects must close where nothing repeats.
@@ -46,10 +44,8 @@ class Limits:
     creeping: float = 1.5
     foreign: float = 1.0
     explained: float = 0.5
-    named: float = 0.75
     nearly: float = 0.95
     humble: bool = False
-    far: float = 2.5
     improvement: float = 0.01
     widening: float = 0.1
     most: float = 0.5

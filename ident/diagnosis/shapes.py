@@ -19,7 +19,7 @@ from ident.diagnosis.problem import Problem, Variant
 from ident.diagnosis.refit import Part, refit
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Column
-from ident.diagnosis.search import extended, joined, settled
+from ident.diagnosis.search import extended, joined, settled, without
 from ident.diagnosis.whitening import Whitener
 
 Array = NDArray[np.float64]
@@ -62,10 +62,36 @@ def search(problems: Sequence[Problem], regression: Regression, taken: tuple[int
         if next_ones != now and next_ones in seen:
             found = seen[next_ones]
             break
-        found = shaped(found.problems, found.regression, grown)
+        found = _against_rivals(shaped(found.problems, found.regression, grown))
     # Not before: as columns, such a whole is less than its parts, which have their shapes already.
     whole = joined(found.regression, found.taken, found.regression.broad)
     return found if whole == found.taken else shaped(found.problems, found.regression, whole)
+
+
+def _against_rivals(found: Shaped) -> Shaped:
+    """Every effect by its shape against those that are behind its columns by less than the shape changed, by theirs."""
+    for place in range(len(found.taken)):
+        for rival in _rivals(found, place):
+            taken = (*found.taken[:place], rival, *found.taken[place + 1 :])
+            both = shaped(found.problems, found.regression, taken)
+            found = replace(both, taken=settled(both.regression, found.taken))
+            if len(found.taken) <= place:
+                return found
+    return found
+
+
+def _rivals(found: Shaped, place: int) -> list[int]:
+    """Variants that may stand in a place and have no shape of their own yet."""
+    regression, variant = found.regression, found.taken[place]
+    layout, owners = regression.rows.layout, regression.owners
+    origin = layout[variant].shape_of
+    if origin is None:
+        return []
+    slot = regression.slot(without(found.taken, place), regression.whitener(found.taken))
+    log_evidence = slot.evidence.log_evidence
+    least = log_evidence[origin] - abs(log_evidence[variant] - log_evidence[origin])
+    known = {owner for owner, column in zip(owners, layout, strict=True) if column.shape_of is not None}
+    return [one for one in slot.variants if owners[one] not in known and log_evidence[one] > least]
 
 
 def _owners(regression: Regression, taken: tuple[int, ...]) -> frozenset[int]:

@@ -20,7 +20,7 @@ from ident.diagnosis.split import split_problem
 from ident.records.axis_record import AxisRecord, AxisSignals
 from ident.stages import Stage, untold
 
-LIMITS: Final = Limits(named=0.6, nearly=0.6, humble=True)
+LIMITS: Final = Limits(nearly=0.6, humble=True)
 """Of an axis. Its effort has little noise, beside which cogging and errors of its pitch always repeat, without a name:
 what they leave does not take the name from a cause that closes one and a half times as much, but makes it less sure."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,9 @@ class Variable(enum.StrEnum):
     TEMPERATURE = "temperature"
     PATH_SINCE_REVERSAL = "path_since_reversal"
     OTHER_AXIS = "other_axis"
+
+
+_OF_ACCELERATIONS: Final = (Variable.ACCELERATION, Variable.LOAD, Variable.LOAD_RATE, Variable.LOAD_SECOND_RATE)
 
 
 class Partner(enum.StrEnum):
@@ -73,6 +77,11 @@ class Dependence:
     def effect(self) -> str:
         """Name of the law as an effect of a model."""
         return law_name(self.variable, self.partner, self.of)
+
+    @property
+    def is_noisy(self) -> bool:
+        """Whether it is made of accelerations, whose noise stands in the rows as well."""
+        return self.variable in _OF_ACCELERATIONS or self.partner is Partner.ACCELERATION
 
     @property
     def key(self) -> str:

@@ -98,9 +98,9 @@ def test_only_what_repeats_in_both_campaigns_lasts(world: type[Any], parts: Sequ
     assert both > 0.8 if len(parts) == 2 else both < 0.25
 
 
-def bent(problem: Problem, size: float) -> Problem:
+def bent(problem: Problem, size: float, name: str = "a", by: str = "b") -> Problem:
     """A world whose effect is half a square beside its column: s a + s² b/2, b being the column of another effect."""
-    straight, curved = (problem.candidate(f"{name}@place").variants[0].columns for name in ("a", "b"))
+    straight, curved = (problem.candidate(f"{one}@place").variants[0].columns for one in (name, by))
 
     def contribution(values: Array, _: Array) -> list[Array | None]:
         s = float(values[0])
@@ -112,8 +112,9 @@ def bent(problem: Problem, size: float) -> Problem:
         replace(block, target=block.target + (0.0 if added is None else added))
         for block, added in zip(problem.blocks, truth, strict=True)
     ]
-    first = Candidate("a", "place", (EffectParameter("size", "Nm", ""),), (Variant(straight),), contribution)
-    return replace(problem, blocks=tuple(blocks), candidates=(first, *problem.candidates[1:]))
+    one = Candidate(name, "place", (EffectParameter("size", "Nm", ""),), (Variant(straight),), contribution)
+    candidates = tuple(one if each.effect == name else each for each in problem.candidates)
+    return replace(problem, blocks=tuple(blocks), candidates=candidates)
 
 
 @pytest.mark.parametrize("size", [0.6, 1.5])
@@ -121,3 +122,12 @@ def test_what_the_column_of_a_large_effect_misses_is_no_second_effect(world: typ
     findings = judge(*(bent(world(seed=8).problem(part), size) for part in (0, 1)), seed=1)
     assert [cause.candidate.effect for cause in findings.causes] == ["a"]
     assert findings.causes[0].part.values[0] == pytest.approx(size, abs=0.03)
+
+
+def test_of_two_effects_of_one_column_the_shape_tells(world: type[Any]) -> None:
+    """Near zero `a` and `c` are the same; only at its size does a rival show what it is."""
+    alike = world(seed=8, alike={"c": "a"})
+    problems = [bent(bent(alike.problem(part), 0.0, "a", "d"), 1.5, "c", "b") for part in (0, 1)]
+    findings = judge(*problems, seed=1)
+    assert [cause.candidate.effect for cause in findings.causes] == ["c"]
+    assert findings.causes[0].part.values[0] == pytest.approx(1.5, abs=0.03)
