@@ -32,7 +32,7 @@ class EffectSize:
         largest: size in practice; an effect below the noise even there is invisible.
         signed: may be negative.
         known: the library has a candidate for it.
-        hidden: size that no record tells from none; only what is beyond it amounts to noise units.
+        from_sampling: size that sampling may make as well; only what is beyond it amounts to noise units.
     """
 
     name: str
@@ -44,16 +44,14 @@ class EffectSize:
     largest: float
     signed: bool
     known: bool
-    hidden: float = 0.0
+    from_sampling: float = 0.0
 
     def physical(self, noise_units: float) -> float:
-        """Size that amounts to so many noise units.
-
-        Straight lines through the points, both axes logarithmic; in proportion beyond them.
-        """
-        return self.hidden + self._beyond(noise_units)
+        """Size that amounts to so many noise units, those of sampling not counted."""
+        return self.from_sampling + self._beyond(noise_units)
 
     def _beyond(self, noise_units: float) -> float:
+        """By straight lines through the points, both axes logarithmic; in proportion beyond them."""
         sizes, units = zip(*self.points, strict=True)
         if noise_units <= units[0]:
             return float(sizes[0] * noise_units / units[0])
@@ -80,7 +78,7 @@ class SizeTable:
 def beyond_sampling(table: SizeTable, sample_time: float) -> SizeTable:
     """A table for records of one sample interval [s]: a lag of all drives counts from what sampling may do."""
     late = tuple(
-        replace(row, hidden=HELD * sample_time) if row.name in LATE and row.where == EVERYWHERE else row
+        replace(row, from_sampling=HELD * sample_time) if row.name in LATE and row.where == EVERYWHERE else row
         for row in table.visible
     )
     return replace(table, visible=late)
@@ -92,7 +90,7 @@ def table_text(rows: Sequence[EffectSize]) -> str:
 
 
 def _measured(row: EffectSize) -> dict[str, Any]:
-    return {name: value for name, value in vars(row).items() if name != "hidden"}
+    return {name: value for name, value in vars(row).items() if name != "from_sampling"}
 
 
 def load_sizes(path: Path) -> SizeTable:

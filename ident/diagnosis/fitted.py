@@ -126,14 +126,18 @@ class Fitted:
     def closed(self) -> list[float]:
         """Share of the removable held-out gap that each effect closes, all else refitted without it, as columns.
 
-        Whether an effect is worth its place is judged by this: what a refit can do without it is no reason for it.
+        Which one is the strongest, and which widens the gap, is judged by this: what a refit can do without an effect
+        is no reason for it.
         """
         without = [self.gap(self.others(index)).after for index in range(self.count)]
         return [_share(self.whole, after) for after in without]
 
     @cached_property
     def lacking(self) -> list[float]:
-        """The same of the means over the repeats where the effect acts, the values of a judged model held."""
+        """The same of the means over the repeats where the effect acts, the values of a judged model held.
+
+        It is what is written of an effect; whether one beside others is worth its place is judged by it.
+        """
         return [self._lacking(index) for index in range(self.count)]
 
     def _lacking(self, index: int) -> float:

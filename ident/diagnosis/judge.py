@@ -40,6 +40,8 @@ def judge(
 ) -> Findings:
     """Find the causes of a gap.
 
+    Tall, thin matrices: callers keep the linear algebra library to one thread.
+
     Args:
         fit: records that effects are looked for in.
         confirm: independent records, or a part of the same ones that took no part (`split_problem`).

@@ -141,9 +141,10 @@ class Judgement:
         """Share of the held-out gap that a law must close where it acts."""
         if self._measurable():
             return self.limits.law
-        # Evidence says more of a gap within the accidents of the noise, but for what has that noise in it.
+        # Of a gap within the accidents of the noise evidence says more, but for what has that noise in it.
         law = self._law(index)
-        return 0.0 if law is not None and law.dependence.is_noisy else -math.inf
+        alone = self.fitted.count == 1 and law is not None and not law.dependence.is_noisy
+        return -math.inf if alone else 0.0
 
     def _pays(self, index: int) -> bool:
         """Whether an effect beside others closes a part of the gap that counts, or gains what a name costs."""

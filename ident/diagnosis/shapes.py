@@ -69,19 +69,22 @@ def search(problems: Sequence[Problem], regression: Regression, taken: tuple[int
 
 
 def _against_rivals(found: Shaped) -> Shaped:
-    """Every effect by its shape against those that are behind its columns by less than the shape changed, by theirs."""
-    for place in range(len(found.taken)):
-        for rival in _rivals(found, place):
-            taken = (*found.taken[:place], rival, *found.taken[place + 1 :])
-            both = shaped(found.problems, found.regression, taken)
-            found = replace(both, taken=settled(both.regression, found.taken))
-            if len(found.taken) <= place:
-                return found
-    return found
+    """Effects by their shapes against those that may stand in their places, by theirs."""
+    taken, before = found.taken, len(found.regression.rows.layout)
+    for place in range(len(taken)):
+        for rival in _rivals(found, place, before):
+            instead = (*taken[:place], rival, *taken[place + 1 :])
+            found = replace(shaped(found.problems, found.regression, instead, (place,)), taken=taken)
+    added = len(found.regression.rows.layout) > before
+    return replace(found, taken=settled(found.regression, taken)) if added else found
 
 
-def _rivals(found: Shaped, place: int) -> list[int]:
-    """Variants that may stand in a place and have no shape of their own yet."""
+def _rivals(found: Shaped, place: int, before: int) -> list[int]:
+    """Variants that come as near to the column of an effect as its shape changed the evidence, for better or worse.
+
+    Those without any other shape than their column, or whose shape is known since there were `before` variants, are not
+    among them.
+    """
     regression, variant = found.regression, found.taken[place]
     layout, owners = regression.rows.layout, regression.owners
     origin = layout[variant].shape_of
@@ -89,17 +92,33 @@ def _rivals(found: Shaped, place: int) -> list[int]:
         return []
     slot = regression.slot(without(found.taken, place), regression.whitener(found.taken))
     log_evidence = slot.evidence.log_evidence
+    if not np.isfinite(log_evidence[[origin, variant]]).all():
+        return []
     least = log_evidence[origin] - abs(log_evidence[variant] - log_evidence[origin])
-    known = {owner for owner, column in zip(owners, layout, strict=True) if column.shape_of is not None}
-    return [one for one in slot.variants if owners[one] not in known and log_evidence[one] > least]
+    known = {*_owners(regression, found.taken), *owners[before:]}
+    return [
+        one
+        for one in slot.variants
+        if log_evidence[one] > least
+        and owners[one] not in known
+        and found.problems[0].candidates[owners[one]].contribution is not None
+    ]
 
 
 def _owners(regression: Regression, taken: tuple[int, ...]) -> frozenset[int]:
     return frozenset(regression.owners[variant] for variant in taken)
 
 
-def shaped(problems: Sequence[Problem], regression: Regression, taken: tuple[int, ...]) -> Shaped:
-    """Effects by the shapes that they have at their fitted values, where their columns miss something."""
+def shaped(
+    problems: Sequence[Problem], regression: Regression, taken: tuple[int, ...], places: Sequence[int] | None = None
+) -> Shaped:
+    """Effects by the shapes that they have at their fitted values, where their columns miss something.
+
+    Args:
+        problems, regression: to fit and to confirm.
+        taken: variants that are fitted together.
+        places: of those that get a shape among them; None: all.
+    """
     owners, candidates = regression.owners, problems[0].candidates
     if all(candidates[owners[variant]].contribution is None for variant in taken):
         return Shaped(tuple(problems), regression, taken)
@@ -107,6 +126,8 @@ def shaped(problems: Sequence[Problem], regression: Regression, taken: tuple[int
     parts = refit(problems, regression, taken, whitener, np.ones(len(rows), dtype=bool)).parts
     changed, columns, layout, now = list(problems), [rows.columns], list(rows.layout), list(taken)
     for place, (variant, part) in enumerate(zip(taken, parts, strict=True)):
+        if places is not None and place not in places:
+            continue
         size, column = abs(float(part.values[0])), rows.stack(part.added)[:, None]
         if size == 0 or _missed(regression, whitener, variant, column) < NEGLIGIBLE:
             continue

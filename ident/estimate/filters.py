@@ -101,13 +101,14 @@ def filter_weights(
 ) -> Any:
     """(n, count) sparse, that makes of a series what a zero-phase filter would have at some moments.
 
-    Cheaper than the filter where few moments of many series are wanted. Beyond its ends a series is mirrored.
+    Cheaper than the filter where few moments of many series are wanted. Beyond its ends a series is mirrored once: what
+    lies further away than its length counts as zero.
 
     Args:
         gain: of the filter at angular frequencies (F,) [rad/s].
         memory: after which it has forgotten a sample [s].
         moments: (n,) from the beginning of the first sample, which lasts `sample_time` [s].
-        count: samples of the series.
+        count: samples of the series, at least one.
         sample_time: [s].
     """
     reach = math.ceil(memory / sample_time)

@@ -21,7 +21,7 @@ from ident.estimate.filters import FILTER_ORDER, filter_weights
 Array = NDArray[np.float64]
 
 MEANS: Final = 2.0
-"""Means in the time of the filter, 1/cutoff: a wave that would pass for one of the cutoff is left a tenth by them."""
+"""Means in the time of the filter, 1/cutoff: of a wave that would pass for one of the cutoff they leave a tenth."""
 
 FORGOTTEN: Final = 14.0
 """Time constants of the filter after which e^-10 is left of a sample."""
@@ -46,7 +46,7 @@ class Coarse:
 
     @cached_property
     def _weights(self) -> Any:
-        """(n, M) of the means in the rows."""
+        """(n, B) of the means in the rows."""
         dt, length = self.source.sample_time, len(self.source.inputs)
         moments = np.asarray((np.arange(0, length, self.source.factor) + 0.5) * dt, dtype=np.float64)
 

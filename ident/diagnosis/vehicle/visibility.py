@@ -86,7 +86,7 @@ def _left(columns: Array, baseline: Array) -> Array:
     kept = norms > NEGLIGIBLE * norms.max(initial=0.0)
     used = columns[:, kept] / norms[kept]
     left = used - baseline @ (baseline.T @ used)
-    # Of the few products: of the many rows, singular values take ten times as long.
+    # Eigenvectors of the few products: singular vectors of the many rows take ten times as long.
     powers, turn = np.linalg.eigh(left.T @ left)
     seen = powers > VISIBLE**2
     return np.asarray(left @ (turn[:, seen] / np.sqrt(powers[seen])))

@@ -5,13 +5,14 @@ The machines know nothing of the candidates (`hil.exam.sources.machine`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy import signal
+from threadpoolctl import threadpool_limits
 
 from hil.exam.sources.machine import Machine
 from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant
@@ -81,6 +82,13 @@ class World:
 
     def _repeated(self, generator: np.random.Generator, width: int) -> Array:
         return np.tile(coloured(generator, (self.samples, width), 0.9), (self.repeats, 1))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread() -> Iterator[None]:
+    """What the callers of `judge` see to."""
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 @pytest.fixture

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,6 +14,9 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.judge import judge
+from ident.diagnosis.judgement import Judgement
+from ident.diagnosis.law.dependence import Dependence, Partner, Variable
+from ident.diagnosis.limits import Limits
 from ident.diagnosis.problem import Block, Problem
 
 Array = NDArray[np.float64]
@@ -71,3 +76,41 @@ def test_rows_of_which_the_model_says_nothing_must_be_explained_to_their_toleran
     assert findings.causes[0].candidate.effect == "a"
     assert findings.causes[0].closed > 0.9
     assert findings.verdict is verdict
+
+
+def _dependence(variable: Variable, partner: Partner) -> Dependence:
+    return Dependence("axis", variable, partner, "rad", "Nm", (), lambda _basis: ())
+
+
+@pytest.mark.parametrize(
+    ("variable", "partner", "causes", "measurable", "least"),
+    [
+        (Variable.RATE, Partner.NOTHING, 1, False, -math.inf),
+        (Variable.ANGLE, Partner.DIRECTION, 1, False, -math.inf),
+        (Variable.RATE, Partner.NOTHING, 2, False, 0.0),
+        (Variable.LOAD_SECOND_RATE, Partner.NOTHING, 1, False, 0.0),
+        (Variable.ANGLE, Partner.ACCELERATION, 1, False, 0.0),
+        (Variable.RATE, Partner.NOTHING, 1, True, Limits().law),
+    ],
+)
+def test_a_law_that_is_all_of_the_answer_need_not_close_a_gap_within_its_noise_unless_that_noise_is_in_it(
+    variable: Variable, partner: Partner, causes: int, measurable: bool, least: float
+) -> None:
+    law = SimpleNamespace(dependence=_dependence(variable, partner))
+    judgement = SimpleNamespace(
+        fitted=SimpleNamespace(count=causes),
+        limits=Limits(),
+        _law=lambda _index: law,
+        _measurable=lambda: measurable,
+    )
+    assert Judgement._least(cast("Judgement", judgement), 0) == least
+
+
+@pytest.mark.parametrize(("held", "gained", "pays"), [(0.02, 0.0, True), (0.004, 0.0, False), (0.004, 0.06, True)])
+def test_an_effect_beside_others_counts_by_the_share_that_is_written_of_it_or_by_what_it_gains(
+    held: float, gained: float, pays: bool
+) -> None:
+    """Not by what it would close with everything refitted: that share is told nowhere."""
+    fitted = SimpleNamespace(lacking=[held], gain=lambda _index, _blur: gained)
+    judgement = SimpleNamespace(fitted=fitted, limits=Limits())
+    assert Judgement._pays(cast("Judgement", judgement), 0) is pays
