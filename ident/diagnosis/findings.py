@@ -35,7 +35,8 @@ class Cause:
         ranked: what else may stand in its place.
         probability: that its name is right, or one that is the same in these records.
         log_evidence, log_predictive: of all records, and what the confirming rows add.
-        closed: share of the removable held-out gap that it closes, others given, the values of a judged model held.
+        closed: share of the removable held-out gap that it closes, others given, the values of a judged model held; not
+            negative where that gap is within the accidents of its noise.
         needed: the same with everything else refitted without it.
         biased: how much each parameter of the model shifts when the effect is left out, by name, in standard
             deviations.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -258,8 +259,12 @@ class Judgement:
         return large and self.fitted.rest.deviations > self.limits.deviations and self.fitted.rest.gain > 0
 
     def _lasting(self) -> bool:
-        """Whether what repeats is above its limit, and the effects close too little to have that pardoned."""
-        return self._repeats.most > 1 and self._named < self.limits.nearly
+        """Whether more repeats than may, and the effects close too little of that, and of all, to have it pardoned."""
+        if self._named >= self.limits.nearly:
+            return False
+        before = replace(self._repeats, models=self.fitted.judged()).sizes
+        pardoned = {label: (1 - self.limits.nearly) * size**2 for label, size in before.items()}
+        return any(size**2 > pardoned[label] for label, size in self._repeats.above.items())
 
     @cached_property
     def _repeats(self) -> Repeating:
@@ -285,7 +290,8 @@ class Judgement:
             probability=min(probability, settings.ceiling, self._surest()),
             log_evidence=self._log_evidence(index),
             log_predictive=self._log_predictive(index),
-            closed=self.fitted.lacking[index],
+            # Nothing is said to widen a gap within the accidents of its noise.
+            closed=max(self.fitted.lacking[index], -math.inf if self._measurable() else 0.0),
             needed=self.fitted.closed[index],
             biased=self.fitted.biased(index),
             sizeless=self._sizeless(index),

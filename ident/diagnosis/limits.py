@@ -18,7 +18,7 @@ class Limits:
         creeping: the same of rows whose noise is mostly what a model may lack.
         foreign: the same of rows that the model says nothing of; where no effect acts, `nearly` pardons it.
         explained: share of what can be predicted that the effects named must explain, or the answer is `unknown`.
-        nearly: what one effect must close, over that and what all leave, where a remainder repeats.
+        nearly: what one effect must close, over that and what all leave, where a remainder repeats; or all of it there.
         humble: whether no name is surer than that share, where a remainder repeats that is pardoned.
         improvement: share of the held-out gap from which every effect but one counts, whatever it gains.
         widening: share of the held-out gap by which an effect may seem to widen it.

@@ -46,10 +46,15 @@ class Repeating:
         return max(self._excesses.values(), default=0.0)
 
     @property
+    def above(self) -> Mapping[str, float]:
+        """Sizes by coordinate, where more repeats than may."""
+        return {label: self.sizes[label] for label, excess in self._excesses.items() if excess > 1}
+
+    @property
     def surely(self) -> bool:
         """Whether more repeats than may, in a coordinate in which it is no accident of the noise."""
-        large = {label for label, excess in self._excesses.items() if excess > 1}
-        return bool(large and large & self._no_accidents)
+        large = self.above
+        return bool(large and large.keys() & self._no_accidents)
 
     @property
     def by_no_accident(self) -> bool:
