@@ -47,14 +47,14 @@ class Repeating:
 
     @property
     def above(self) -> Mapping[str, float]:
-        """Sizes by coordinate, where more repeats than may."""
-        return {label: self.sizes[label] for label, excess in self._excesses.items() if excess > 1}
+        """Sizes by coordinate, where more repeats than may, and that is no accident of the noise."""
+        large = {label for label, excess in self._excesses.items() if excess > 1}
+        return {label: self.sizes[label] for label in large & self._no_accidents} if large else {}
 
     @property
     def surely(self) -> bool:
         """Whether more repeats than may, in a coordinate in which it is no accident of the noise."""
-        large = self.above
-        return bool(large and large.keys() & self._no_accidents)
+        return bool(self.above)
 
     @property
     def by_no_accident(self) -> bool:
