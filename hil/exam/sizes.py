@@ -12,10 +12,9 @@ from typing import Any, Final
 import numpy as np
 
 from ident.diagnosis.delays import HELD
-from ident.diagnosis.names import EffectName
+from ident.diagnosis.names import LATE
 from ident.errors import DataFileError
 
-LATE: Final = (EffectName.TIME_DELAY, EffectName.TORQUE_FILTER)
 EVERYWHERE: Final = "drives"
 """Where a part of a sample interval is what sampling does."""
 

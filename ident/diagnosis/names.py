@@ -58,6 +58,9 @@ _AT_GROUPS: Final[Mapping[EffectName, tuple[str, ...]]] = MappingProxyType(
 """Groups of equals at which an effect is looked for too: what one bearing, one bus or one firmware does, all do."""
 
 
+LATE = (EffectName.TIME_DELAY, EffectName.TORQUE_FILTER)
+"""What makes a motion follow its effort later than sampling does."""
+
 MEMORIES = (
     EffectName.TIME_DELAY,
     EffectName.TORQUE_FILTER,

@@ -8,13 +8,13 @@ from typing import Final
 
 from threadpoolctl import threadpool_limits
 
-from ident.diagnosis.axis.candidates import LATE
 from ident.diagnosis.axis.problem import axis_problem, delayed_axes
 from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_other_axes
 from ident.diagnosis.axis.scale import Scale
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judge import judge
 from ident.diagnosis.limits import Limits
+from ident.diagnosis.names import LATE
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.split import split_problem
 from ident.records.axis_record import AxisRecord, AxisSignals

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.delays import HELD, RARER
-from ident.diagnosis.names import EffectName
+from ident.diagnosis.names import LATE, EffectName
 from ident.diagnosis.problem import Candidate, Variant
 from ident.diagnosis.vehicle.askew import MODES, Travelling, sliding_aside, with_shares
 from ident.diagnosis.vehicle.bending import BristleCause
@@ -145,7 +145,7 @@ def candidate_of(
 
 def _by_sampling(cause: Cause, sources: Sequence[Source]) -> tuple[float, float]:
     """Sizes of a delay or a filter [s], as a lead and as itself, up to which sampling may be what it is."""
-    if cause.name not in (EffectName.TIME_DELAY, EffectName.TORQUE_FILTER):
+    if cause.name not in LATE:
         return 0.0, 0.0
     held = HELD * max((source.sample_time for source in sources), default=0.0)
     return held, held if cause.where == "drives" else 0.0
