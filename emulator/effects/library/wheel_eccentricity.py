@@ -19,7 +19,7 @@ def _inject(injection: Injection, effect: Placed) -> Injection:
 INJECTOR: Final = Injector(
     name="wheel_eccentricity",
     places=EACH_WHEEL,
-    units={"amplitude": "m", "phase": "rad"},
+    units={"amplitude": "m", "phase": "rad", "warp": "1"},
     inject=_inject,
     exclusive=True,
 )

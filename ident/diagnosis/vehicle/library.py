@@ -62,7 +62,7 @@ SHAPES: Final[Mapping[EffectName, Shape]] = MappingProxyType(
         EffectName.TORQUE_BIAS: Shape(("bias",)),
         EffectName.TORQUE_RIPPLE: Shape(("amplitude",), angle="phase", tried={"order": (1.0,)}),
         EffectName.WHEEL_RADIUS: Shape(("error",)),
-        EffectName.WHEEL_ECCENTRICITY: Shape(("amplitude",), angle="phase"),
+        EffectName.WHEEL_ECCENTRICITY: Shape(("amplitude",), angle="phase", tried={"warp": (0.0, 0.5)}),
         EffectName.STEERING_OFFSET: Shape(("offset",)),
         EffectName.SCRUB: Shape(("torque",)),
         EffectName.STEERING_UNIT_MASS: Shape(("mass",)),

@@ -13,12 +13,20 @@ from ident.plant.terms import FIRST_WHEEL, Masses, State
 from ident.vehicle.quantities import GRAVITY
 
 
+def _warped_by(wheel: int) -> tuple[int, ...]:
+    """Which wheels a rigid vehicle presses more, +1, and less, -1, when one of them is higher."""
+    return tuple(1 if other in (wheel, len(WHEEL_PLACES) - 1 - wheel) else -1 for other in range(len(WHEEL_PLACES)))
+
+
 class _Eccentricity(EffectTerm):
     def radii(self, beta: Expression) -> Expression:
-        """First harmonic over the angle of the wheel."""
+        """First harmonic over the angle of the wheel; of all wheels, as far as they roll on what the warp leaves them."""
         more = ca.SX(4, 1)
         for wheel in self.among(WHEEL_PLACES):
-            more[wheel] = self["amplitude"] * ca.cos(beta[wheel] + self["phase"])
+            higher = self["amplitude"] * ca.cos(beta[wheel] + self["phase"])
+            more[wheel] += higher
+            for other, sign in enumerate(_warped_by(wheel)):
+                more[other] -= sign * self["warp"] * higher / 4
         return more
 
     def forces(self, state: State, masses: Masses, parameters: Expression) -> Expression:
@@ -38,6 +46,7 @@ EFFECT: Final = EffectKind(
     parameters=(
         EffectParameter("amplitude", "m", "first harmonic of the rolling radius over the wheel angle"),
         EffectParameter("phase", "rad", "wheel angle of the largest radius, negative", 0.0),
+        EffectParameter("warp", "1", "rolling radius lost over what a tyre gives way more, as the vehicle warps", 0.0),
     ),
     term=_Eccentricity,
     words="a radius that varies by {amplitude} over a turn",

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from ident.extras import EngineName
 from ident.vehicle.parameters import PARAMETER_NAMES
 from ident.vehicle.quantities import GRAVITY
 
@@ -139,6 +140,32 @@ def test_an_eccentric_wheel_rolls_on_a_radius_that_changes_with_its_angle(make: 
         rolled = r * beta + e * (math.sin(beta + phase) - math.sin(phase))
         assert truth.pose[0] == pytest.approx(rolled, abs=2e-5 + 1e-4 * rolled)
     assert beta > 2 * math.pi
+
+
+ROLLED_ON: dict[EngineName, list[float]] = {
+    EngineName.PYBULLET: [0, 1, 0, 0],
+    EngineName.MUJOCO: [1 / 8, 7 / 8, -1 / 8, 1 / 8],
+}
+"""First harmonic of the radii over the eccentricity of the rear left wheel: MuJoCo has its contacts half-way in."""
+
+
+def test_wheels_roll_on_what_the_warp_leaves_them_as_far_as_contacts_of_the_engine_do(
+    make: Make, engine_name: EngineName
+) -> None:
+    e, phase = 1.5e-4, 0.7
+    moving = make(f"wheel_eccentricity@wheel_rl={e}m,phase={phase}rad")
+    seen = []
+    for _ in range(40):
+        moving.torque([8.0] * 4, 0.1)
+        truth = moving.vehicle.ground_truth()
+        seen.append([truth.pose[0], *truth.wheel_angles])
+    travel, beta = np.array(seen)[:, 0], np.array(seen)[:, 1:]
+    assert beta.max() > 2.5 * np.pi
+    turn = np.sin(beta[:, 1] + phase)
+    harmonics = [
+        np.linalg.lstsq(np.column_stack([turn, own, np.ones_like(own)]), travel, rcond=None)[0][0] for own in beta.T
+    ]
+    assert np.array(harmonics) / e == pytest.approx(ROLLED_ON[engine_name], abs=0.03)
 
 
 def test_an_eccentric_wheel_works_against_its_load(make: Make) -> None:

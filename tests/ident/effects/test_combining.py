@@ -17,7 +17,12 @@ Array = NDArray[np.float64]
 
 STEEPEST = 0.02
 """Slope [rad] whose sine is the angle, but for a hundredth of a percent."""
-KEPT = {"stribeck": {"velocity": 0.4}, "torque_ripple": {"order": 3.0}, "presliding": {"angle": 0.2}}
+KEPT = {
+    "stribeck": {"velocity": 0.4},
+    "torque_ripple": {"order": 3.0},
+    "presliding": {"angle": 0.2},
+    "wheel_eccentricity": {"warp": 0.5},
+}
 """What two entries of one effect have in common."""
 MEMORIES = ("time_delay", "torque_filter", "elasticity", "backlash")
 
@@ -95,11 +100,11 @@ def test_what_takes_all_of_an_effect_away_leaves_no_direction() -> None:
     assert none.parameters["direction"].std == pytest.approx(np.pi)
 
 
-@pytest.mark.parametrize("name", ["stribeck", "torque_ripple", "slip"])
+@pytest.mark.parametrize("name", ["stribeck", "torque_ripple", "wheel_eccentricity", "slip"])
 def test_what_is_not_one_stays_two(name: str) -> None:
-    """Friction that falls off elsewhere, a ripple of another order; coefficients of friction are never added."""
+    """Friction that falls off elsewhere, a ripple of another order, another tyre; friction of floors is never added."""
     known, found = pair(name)
-    other = {"velocity": 0.9, "order": 7.0}
+    other = {"velocity": 0.9, "order": 7.0, "warp": 1.0}
     values = {key: other.get(key, found[key]) for key in found.parameters}
     changed = make_effect(name, found.where, values)
     assert combined([known], [changed]) == (known, changed)

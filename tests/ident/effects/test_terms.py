@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ident.effects import EFFECTS, Effect, EffectTerm, effect_term, make_effect, symbolic_term, terms_of
 from ident.plant import symbolic, terms
-from ident.plant.places import rows_of
+from ident.plant.places import WHEEL_PLACES, rows_of
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
@@ -229,6 +229,20 @@ def test_the_weight_on_an_eccentric_wheel_does_the_work_of_lifting_it(
     height = [weight * e * np.cos(beta[2] + turn + phase) for turn in (-step, step)]
     assert force[7] == pytest.approx((height[1] - height[0]) / (2 * step), rel=1e-6)
     assert np.count_nonzero(force) == 1
+
+
+@pytest.mark.parametrize("wheel", range(4))
+def test_a_rigid_vehicle_on_four_springs_takes_a_higher_wheel_by_a_quarter_in_its_warp(
+    wheel: int, vehicle: VehicleDescription
+) -> None:
+    """Least squares of three heights of the chassis against what the wheels stand higher by."""
+    e, warp, across = 2e-4, 0.5, np.array([[1, x, y] for y in (1, -1) for x in (1, -1)], dtype=float)
+    higher = e * np.eye(4)[wheel]
+    chassis = np.linalg.lstsq(across, higher, rcond=None)[0]
+    given_way = higher - across @ chassis
+    term = term_of(make_effect("wheel_eccentricity", WHEEL_PLACES[wheel], {"amplitude": e, "warp": warp}))
+    radii = number(terms.rolling_radii([term], np.zeros(4)), vehicle.geometry)
+    assert radii - vehicle.geometry.wheel_radius == pytest.approx(higher - warp * given_way)
 
 
 def test_wheels_on_other_radii_still_roll(vehicle: VehicleDescription) -> None:
