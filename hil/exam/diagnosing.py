@@ -23,9 +23,11 @@ from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.core.answer import diagnose_by_core
 from ident.diagnosis.diagnosis import faulty
 from ident.diagnosis.findings import Findings
+from ident.diagnosis.judge import judge
 from ident.diagnosis.names import EffectName
+from ident.diagnosis.posterior.answer import judge_by_posterior
 from ident.diagnosis.problem import Problem
-from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
+from ident.diagnosis.vehicle.diagnose import Judge, diagnose_vehicle
 from ident.effects.extended import ExtendedModel
 from ident.errors import UserError
 from ident.faults import sure_faults
@@ -90,20 +92,17 @@ def diagnose_exam(
         removed: candidate that is taken out of the library, by case; all of them are left in without.
 
     Raises:
-        UserError: there is no exam, it has no records yet, or the core cannot diagnose such; or candidates are to be
+        UserError: there is no exam, or it has no records yet; or candidates are to be
             removed from a sealed one before all of its cases have been diagnosed with all of them.
     """
     forbid_emulator()
     exam = read_exam(folder)
-    if folder.core is Core.ONE and not exam.of_axes:
-        raise UserError("The core `one` diagnoses axes alone.", "Leave --core out, or diagnose an exam of axes.")
     there = with_records(folder, exam.identifiers)
     if removed is not None and exam.sealed:
         refuse_undiagnosed(folder, there)
     asked = [identifier for identifier in there if removed is None or identifier in removed]
     task = _axis_task(folder, removed or {}) if exam.of_axes else _vehicle_task(folder, removed or {})
-    of_axes = diagnose_axis_by_core if folder.core is Core.ONE else diagnose_axis_case
-    function = of_axes if exam.of_axes else diagnose_case
+    function = _FUNCTIONS[folder.core, exam.of_axes]
     places = {identifier: folder.diagnosis(identifier, removed is not None) for identifier in asked}
     keep_answers(function, task, places, jobs=jobs, scheduler=scheduler, progress=progress)
 
@@ -181,7 +180,13 @@ def refuse_undiagnosed(folder: ExamFolder, identifiers: Sequence[str]) -> None:
 
 
 def diagnose_case(
-    identifier: str, fit: bytes, confirm: bytes, vehicle: str, model: str, removed: str | None
+    identifier: str,
+    fit: bytes,
+    confirm: bytes,
+    vehicle: str,
+    model: str,
+    removed: str | None,
+    judged: Judge = judge,
 ) -> tuple[str, bytes]:
     """Diagnosis of one case as JSON; runs in a worker.
 
@@ -193,6 +198,7 @@ def diagnose_case(
         fit, confirm: its records, as Parquet.
         vehicle, model: texts of the files.
         removed: candidate that the library is to lack.
+        judged: finds the causes.
     """
     forbid_emulator()
     world = described(vehicle, model)
@@ -203,10 +209,17 @@ def diagnose_case(
         faults = sure_faults(records, world[0])
         if faults:
             return faulty(faults).as_json()
-        found = diagnose_vehicle(records[:1], records[1:], *world, effects=effects)
+        found = diagnose_vehicle(records[:1], records[1:], *world, effects=effects, judged=judged)
         return found.diagnosis.as_json() | ({} if removed else {"alone": _alone(found.findings, found.problems)})
 
     return identifier, _timed(answer)
+
+
+def diagnose_case_by_posterior(
+    identifier: str, fit: bytes, confirm: bytes, vehicle: str, model: str, removed: str | None
+) -> tuple[str, bytes]:
+    """The same by the core `one`."""
+    return diagnose_case(identifier, fit, confirm, vehicle, model, removed, judge_by_posterior)
 
 
 def described(vehicle: str, model: str) -> tuple[VehicleDescription, ExtendedModel]:
@@ -240,6 +253,17 @@ def diagnose_axis_by_core(identifier: str, fit: bytes, confirm: bytes, removed: 
         return diagnose_by_core(records[:1], records[1:], lacking=lacking).as_json()
 
     return identifier, _timed(answer)
+
+
+_FUNCTIONS: Final[Mapping[tuple[Core, bool], Callable[..., tuple[str, bytes]]]] = MappingProxyType(
+    {
+        (Core.STANDING, False): diagnose_case,
+        (Core.STANDING, True): diagnose_axis_case,
+        (Core.ONE, False): diagnose_case_by_posterior,
+        (Core.ONE, True): diagnose_axis_by_core,
+    }
+)
+"""Diagnosis of one case, by core and whether the exam is of axes."""
 
 
 def vehicle_records(fit: bytes, confirm: bytes) -> list[Record]:

@@ -18,7 +18,7 @@ from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.refit import Refit, refit
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.remainder import Told, held_out_gap, held_out_gap_of_means, noise_floors
-from ident.diagnosis.search import Found
+from ident.diagnosis.search import Taken
 from ident.diagnosis.whitening import Predictor, Whitener
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ class Fitted:
     """
 
     def __init__(
-        self, problems: Sequence[Problem], regression: Regression, found: Found, seed: int, told: Told = ()
+        self, problems: Sequence[Problem], regression: Regression, found: Taken, seed: int, told: Told = ()
     ) -> None:
         self.problems, self.regression, self.found, self.told = problems, regression, found, told
         self._kept: dict[tuple[tuple[int, ...], bool], Refit] = {}
@@ -273,7 +273,7 @@ def _share(whole: Gap, without: float) -> float:
     return (without**2 - whole.after**2) / removable if removable > 0 else 0.0
 
 
-def _weights(regression: Regression, found: Found) -> Whitener:
+def _weights(regression: Regression, found: Taken) -> Whitener:
     """Every group of rows in units of the rms of what the search leaves of it, no colour."""
     rows = regression.rows
     design = np.hstack([rows.baseline, regression.columns_of(found.variants)])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.linear import least_squares
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Rows
-from ident.diagnosis.whitening import Whitener
+from ident.diagnosis.whitening import Whitening
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ class SmoothFunction:
         seed: of the cosines.
     """
 
-    def __init__(self, regression: Regression, whitener: Whitener, seed: int) -> None:
+    def __init__(self, regression: Regression, whitener: Whitening, seed: int) -> None:
         self._regression, self._whitener = regression, whitener
         self._functions = _functions(regression.rows, seed)
         self._white = whitener.apply(regression.rows, self._functions)

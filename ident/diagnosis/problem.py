@@ -11,6 +11,7 @@ p shared by all blocks, θ by all blocks in which a candidate acts.
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -145,6 +146,7 @@ class Candidate:
         price: log evidence that the choice of its variants costs beyond that of its coefficients.
         learnt: its columns are a function that was learnt on fitted rows and tried on the confirming ones, uncertain
             where the fitted ones are few; they need not confirm it again as if it were known exactly.
+        usual: its size in practice; inf where nothing is known of it.
         along: effect at the same place that comes along with it in its widest variant; both at once are that variant.
     """
 
@@ -167,6 +169,7 @@ class Candidate:
     periodic: Periodic | None = None
     price: float = 0.0
     learnt: bool = False
+    usual: float = math.inf
 
     @property
     def key(self) -> str:

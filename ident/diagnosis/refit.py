@@ -13,7 +13,7 @@ from ident.diagnosis.linear import least_squares
 from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Column, Rows
-from ident.diagnosis.whitening import Whitener
+from ident.diagnosis.whitening import Whitening
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -102,7 +102,7 @@ def refit(
     problems: Sequence[Problem],
     regression: Regression,
     variants: Sequence[int],
-    whitener: Whitener,
+    whitener: Whitening,
     rows: Mask,
     *,
     exact: bool = True,
@@ -149,7 +149,7 @@ class _Model:
         problems: Sequence[Problem],
         regression: Regression,
         variants: Sequence[int],
-        whitener: Whitener,
+        whitener: Whitening,
         chosen: Mask,
         *,
         exact: bool,

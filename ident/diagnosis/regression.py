@@ -16,7 +16,7 @@ from ident.diagnosis.linear import least_squares, unit_of
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.rows import Rows
 from ident.diagnosis.settings import Settings
-from ident.diagnosis.whitening import ORDER, Colour, Whitener, colours_of_repeats, fit_whitener
+from ident.diagnosis.whitening import ORDER, Colour, Whitener, Whitening, colours_of_repeats, fit_whitener
 
 Array = NDArray[np.float64]
 
@@ -194,7 +194,7 @@ class Regression:
                 best.setdefault(self.owners[variant], variant)
         return list(best.values())
 
-    def white(self, whitener: Whitener, given: Sequence[int], columns: Array | None = None) -> White:
+    def white(self, whitener: Whitening, given: Sequence[int], columns: Array | None = None) -> White:
         """Whitened rows, variants that are given beside the baseline; columns (n, K) of all candidates, or others."""
         rows = self.rows
         taken = self.columns_of(given)

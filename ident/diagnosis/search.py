@@ -13,22 +13,31 @@ from dataclasses import dataclass
 from ident.diagnosis.pairs import best_pair
 from ident.diagnosis.regression import Regression, Slot, Whole
 from ident.diagnosis.settings import Settings
-from ident.diagnosis.whitening import Whitener
+from ident.diagnosis.whitening import Whitening
 
 
 @dataclass(frozen=True)
-class Found:
+class Taken:
+    """Effects that an answer consists of.
+
+    Attributes:
+        variants: of them.
+        whitener: of what they leave.
+    """
+
+    variants: tuple[int, ...]
+    whitener: Whitening
+
+
+@dataclass(frozen=True)
+class Found(Taken):
     """What the search ends with.
 
     Attributes:
-        variants: taken, in the order of the search.
-        whitener: of what they leave.
         slots: what may stand in the place of each one taken, the others given.
         rest: what may stand beside them.
     """
 
-    variants: tuple[int, ...]
-    whitener: Whitener
     slots: tuple[Slot, ...]
     rest: Slot
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,13 @@ class Predictor:
             for start in range(len(matrix), len(run), STRIDE)
         ]
         return np.concatenate([first, *rest])
+
+
+class Whitening(Protocol):
+    """What turns rows of coloured noise into rows of white noise of unit variance."""
+
+    def apply(self, rows: Rows, values: Array) -> Array:
+        """Whitened copy of (n,) or (n, k)."""
 
 
 @dataclass(frozen=True)
@@ -175,6 +182,11 @@ def _colour(residual: Array, age: NDArray[np.int64], chosen: NDArray[np.bool_], 
         later = place[age[place] >= lag]
         covariance[lag] = residual[later] @ residual[later - lag]
     return Colour(covariance * inflation / max(len(place), 1), len(place))
+
+
+def predictor_of(colour: Colour) -> Predictor:
+    """Of noise that has a colour."""
+    return _predictor(colour, np.zeros(ORDER + 1), ORDER)
 
 
 def _predictor(colour: Colour, tolerated: Array, order: int) -> Predictor:

@@ -23,7 +23,7 @@ from ident.diagnosis.linear import orthonormal
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Rows
-from ident.diagnosis.whitening import Whitener
+from ident.diagnosis.whitening import Whitening
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -97,7 +97,7 @@ class _Beside:
 class Learner:
     """Learns dependences beside some variants that are taken."""
 
-    def __init__(self, regression: Regression, whitener: Whitener, taken: Sequence[int]) -> None:
+    def __init__(self, regression: Regression, whitener: Whitening, taken: Sequence[int]) -> None:
         rows = regression.rows
         self._whitener, self.rows = whitener, rows
         white = regression.white(whitener, tuple(taken), np.zeros((len(rows), 0)))

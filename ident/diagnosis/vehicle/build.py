@@ -25,7 +25,7 @@ from ident.diagnosis.vehicle.moments import apart_from_moments
 from ident.diagnosis.vehicle.rattling import SHAKEN
 from ident.diagnosis.vehicle.regions import coordinate_motion, features_of, regions_of
 from ident.diagnosis.vehicle.sources import DIAGNOSED, Source, processing_of, sources_of
-from ident.effects import Effect
+from ident.effects import EFFECTS, Effect
 from ident.estimate.filters import Processing
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
@@ -78,7 +78,10 @@ def build_problem(
     tables = [table_of(source, context, units) for source in sources]
     blocks = [block for source, table in zip(sources, tables, strict=True) for block in _blocks(source, table, context)]
     columns = iter(range(MODEL_COLUMNS, MODEL_COLUMNS + len(units)))
-    candidates = [candidate_of(cause, columns, sources, tables, context) for cause in causes]
+    candidates = [
+        replace(found, usual=abs(EFFECTS[found.effect].usual(vehicle, found.where)))
+        for found in (candidate_of(cause, columns, sources, tables, context) for cause in causes)
+    ]
     slid = slid_by_any(sources, context)
     return Problem(
         names=(*PARAMETER_NAMES, *UNSTATED),

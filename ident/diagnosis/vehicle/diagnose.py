@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -28,6 +28,13 @@ from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 UNSTATED_STD: Final = 1e-3
 """Standard deviation of a model's value that comes without one, relative to the value."""
+
+
+class Judge(Protocol):
+    """What finds the causes of a gap."""
+
+    def __call__(self, fit: Problem, confirm: Problem, *, seed: int, stage: Stage) -> Findings:
+        """The causes, by records to fit and to confirm."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,7 @@ def diagnose_vehicle(
     seed: int = 1,
     effects: Sequence[EffectName] = tuple(EffectName),
     stage: Stage = untold,
+    judged: Judge = judge,
 ) -> VehicleDiagnosis:
     """What the model of the platform lacks.
 
@@ -70,6 +78,7 @@ def diagnose_vehicle(
         seed: of the surrogates.
         effects: that are looked for.
         stage: told what begins.
+        judged: finds the causes.
 
     Raises:
         RecordError: a record is of another vehicle, does not move, has no torques or holds none of the steps of a
@@ -80,7 +89,7 @@ def diagnose_vehicle(
     with threadpool_limits(limits=1, user_api="blas"):
         stage("rows of the records")
         question = pose_vehicle(fit, confirm, vehicle, model, effects)
-        findings = judge(*question.problems, seed=seed, stage=stage)
+        findings = judged(*question.problems, seed=seed, stage=stage)
         invisible = tuple(str(name) for name in effects if name in question.hidden or name in findings.invisible)
         findings = replace(findings, invisible=invisible)
         stage("the next experiment")

@@ -1,0 +1,257 @@
+"""The answer: what follows from the best set of hypotheses, and from what may stand in the place of each member."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.diagnosis import Verdict
+from ident.diagnosis.findings import LAW, Cause, Findings, ordered
+from ident.diagnosis.fitted import Fitted
+from ident.diagnosis.law.answer import Alternative, LawAnswer, alternatives, law_answer, same_names
+from ident.diagnosis.law.free import Curve
+from ident.diagnosis.law.learning import Designs, Learner
+from ident.diagnosis.law.neighbours import channel_of
+from ident.diagnosis.law.reach import told_samples
+from ident.diagnosis.law.stage import SAME, Law, with_law
+from ident.diagnosis.orders import with_orders
+from ident.diagnosis.posterior.bends import Bends
+from ident.diagnosis.posterior.hypotheses import Design, make_design
+from ident.diagnosis.posterior.noise import Colours
+from ident.diagnosis.posterior.search import Search, State
+from ident.diagnosis.posterior.slots import Slot, slot_of
+from ident.diagnosis.problem import Problem
+from ident.diagnosis.regression import Regression
+from ident.diagnosis.remainder import repeated, shares
+from ident.diagnosis.rows import make_rows
+from ident.diagnosis.search import Taken
+from ident.diagnosis.settings import Settings
+from ident.stages import Stage, untold
+
+Array = NDArray[np.float64]
+
+DOUBTED: Final = 0.5
+"""Probability of nothing in its place from which a member is none."""
+
+EXACT: Final = 0.01
+"""Share of the held-out gap that a member must close beside others, whose columns are exact to about as much."""
+
+SIZED: Final = 2.0
+"""Standard deviations that a size is from zero, at least."""
+
+OPEN: Final = 0.5
+"""Share of the held-out gap that members leave, more being lacking than is tolerated, from which they are no answer."""
+
+
+def judge_by_posterior(
+    fit: Problem, confirm: Problem, *, seed: int, settings: Settings | None = None, stage: Stage = untold
+) -> Findings:
+    """Find the causes of a gap.
+
+    Args:
+        fit: records that effects are looked for in.
+        confirm: independent records.
+        seed: of the smooth function of what is left.
+        settings: of the rows.
+        stage: told what begins.
+    """
+    fit, confirm = with_orders((fit, confirm))
+    problems = (fit, confirm)
+    regression = Regression(fit, make_rows(fit, confirm), settings or Settings(), seed)
+    stage(f"comparing {len(fit.candidates)} causes and {len(fit.dependences)} laws")
+    colours, designs = Colours(regression), Designs(problems, regression.rows)
+    design = make_design(problems, regression, colours, designs)
+    known = np.zeros(len(fit.names))
+    known[fit.known.places] = fit.known.values
+    search = Search(design, colours, Bends(problems, regression.rows, known))
+    state = search.run()
+    stage("numbers of the answer")
+    answer = _Answer(problems, regression, designs, search, state, seed)
+    while (fewer := answer.worthwhile()) != answer.state.members.keys():
+        members = {index: one for index, one in answer.state.members.items() if index in fewer}
+        revised = search.against_rivals(search.state(members, answer.state))
+        answer = _Answer(problems, regression, designs, search, revised, seed)
+    return answer.findings()
+
+
+@dataclass(frozen=True)
+class _Taken:
+    """Members as variants of candidates, laws among them.
+
+    Attributes:
+        problems, regression: with a candidate for every law.
+        variants: by hypothesis.
+        laws: by hypothesis.
+    """
+
+    problems: tuple[Problem, ...]
+    regression: Regression
+    variants: Mapping[int, int]
+    laws: Mapping[int, Law]
+
+
+class _Answer:
+    """What is computed of the best set."""
+
+    def __init__(
+        self,
+        problems: tuple[Problem, Problem],
+        regression: Regression,
+        designs: Designs,
+        search: Search,
+        state: State,
+        seed: int,
+    ) -> None:
+        self.search, self.state, self.design = search, state, search.design
+        self.slots = {index: slot_of(search, state, index) for index in state.members}
+        self.taken = _as_variants(problems, regression, designs, self.design, state, self.slots)
+        variants = tuple(self.taken.variants.values())
+        keys = [law.dependence.key for law in self.taken.laws.values()]
+        found = Taken(variants, state.evidence.noise)
+        told = told_samples(regression.rows, self.taken.problems, keys)
+        self.fitted = Fitted(self.taken.problems, self.taken.regression, found, seed, told)
+
+    def worthwhile(self) -> frozenset[int]:
+        """Members that are likely to be there, and close something."""
+        members = tuple(self.taken.variants)
+        doubted = [index for index in self.state.members if self.slots[index].nothing > DOUBTED or index not in members]
+        if doubted:
+            return frozenset(self.state.members) - {max(doubted, key=lambda index: self.slots[index].nothing)}
+        sizeless = [index for place, index in enumerate(members) if not self._has_size(place)]
+        if sizeless:
+            return frozenset(members) - {sizeless[-1]}
+        if len(members) > 1:
+            closed = self.fitted.lacking
+            least = min(range(len(members)), key=lambda place: closed[place])
+            if closed[least] < EXACT:
+                return frozenset(members) - {members[least]}
+        return frozenset(members)
+
+    def _has_size(self, place: int) -> bool:
+        """Whether a size is surely not zero."""
+        part = self.fitted.after.parts[place]
+        return bool(abs(part.values[0]) > SIZED * part.std[0])
+
+    def findings(self) -> Findings:
+        """The answer, with all that reports show of it."""
+        fitted, regression = self.fitted, self.taken.regression
+        causes = ordered([self._cause(place, index) for place, index in enumerate(self.taken.variants)])
+        verdict = self._verdict()
+        lasting = any(self.state.evidence.sizes)
+        return Findings(
+            verdict=verdict,
+            causes=causes,
+            doubtful={},
+            events=(),
+            gap=fitted.settled if verdict is Verdict.NONE else fitted.exactly,
+            where=shares(regression.rows, fitted.floors, fitted.judged()),
+            invisible=self._invisible(),
+            before=fitted.before,
+            after=fitted.after,
+            significance=min((slot.nothing for slot in self.slots.values()), default=1.0),
+            remainder=fitted.rest,
+            lasting=lasting,
+            repeated_before=repeated(regression.rows, fitted.floors, fitted.judged()),
+            repeated_after=repeated(regression.rows, fitted.floors, fitted.after.blocks),
+            problem=self.taken.problems[0],
+            held_out=fitted.held_out(),
+        )
+
+    def _verdict(self) -> Verdict:
+        lacking = any(self.state.evidence.sizes)
+        if not self.taken.variants:
+            return Verdict.UNKNOWN if lacking else Verdict.NONE
+        if lacking and self.fitted.exactly.closed < 1 - OPEN:
+            return Verdict.UNKNOWN
+        return Verdict.LAW if self.taken.laws else Verdict.EFFECT
+
+    def _invisible(self) -> tuple[str, ...]:
+        shown = {one.name for one in self.design.hypotheses}
+        names = dict.fromkeys(str(one.effect) for one in self.taken.problems[0].candidates)
+        return tuple(name for name in names if name not in shown and not name.startswith(LAW))
+
+    def _cause(self, place: int, index: int) -> Cause:
+        slot, law, problem = self.slots[index], self.taken.laws.get(index), self.taken.problems[0]
+        hypotheses = self.design.hypotheses
+        return Cause(
+            candidate=self.fitted.candidate(place),
+            part=self.fitted.after.parts[place],
+            ranked=slot.ranked(hypotheses),
+            probability=slot.probability(hypotheses),
+            log_evidence=slot.logs[index],
+            log_predictive=math.nan,
+            closed=self.fitted.lacking[place],
+            needed=self.fitted.closed[place],
+            biased=self.fitted.biased(place),
+            curve=Curve.ITS_OWN,
+            sizeless=False,
+            law=law,
+            law_answer=None if law is None else self._law_answer(law, index),
+            alternatives=self._alternatives(index) if law is None else alternatives(law, problem.dependences),
+        )
+
+    def _alternatives(self, index: int) -> tuple[Alternative, ...]:
+        return same_names([self.design.hypotheses[one].key for one in self.slots[index].alike])
+
+    def _law_answer(self, law: Law, index: int) -> LawAnswer:
+        column = self.taken.regression.rows.layout[self.taken.variants[index]]
+        named = [(one, cosine) for one, cosine in self.slots[index].cosines.items() if not self._is_free(one)]
+        nearest = max(named, key=lambda one: one[1], default=None)
+        near = None if nearest is None else (self.design.hypotheses[nearest[0]].key, nearest[1])
+        return law_answer(law, channel_of(self.taken.problems[0], column), near)
+
+    def _is_free(self, index: int) -> bool:
+        return self.design.hypotheses[index].free
+
+
+def _as_variants(
+    problems: tuple[Problem, ...],
+    regression: Regression,
+    designs: Designs,
+    design: Design,
+    state: State,
+    slots: Mapping[int, Slot],
+) -> _Taken:
+    """Members as variants of candidates; a law that the fitted rows do not show by themselves is none."""
+    variants, laws, rows = dict[int, int](), dict[int, Law](), regression.rows
+    for index, member in state.members.items():
+        column = design.hypotheses[index].blocks[member.block].column
+        if column is not None:
+            variants[index] = rows.layout.index(column)
+    for index in [one for one in state.members if design.hypotheses[one].free]:
+        law = _law(problems, regression, designs, design, state, slots[index], index, tuple(variants.values()))
+        if law is not None:
+            problems, regression, variants[index] = with_law(problems, regression, law)
+            laws[index] = law
+    kept = {index: variants[index] for index in state.members if index in variants}
+    return _Taken(problems, regression, kept, laws)
+
+
+def _law(
+    problems: Sequence[Problem],
+    regression: Regression,
+    designs: Designs,
+    design: Design,
+    state: State,
+    slot: Slot,
+    index: int,
+    others: tuple[int, ...],
+) -> Law | None:
+    number = design.hypotheses[index].dependence
+    assert number is not None
+    knots = designs.knots(number)
+    assert knots is not None
+    learnt = Learner(regression, state.evidence.noise, others).learn(number, designs.columns(number), knots)
+    if learnt is None:
+        return None
+    free = {one: log for one, log in slot.logs.items() if design.hypotheses[one].free}
+    odds = {design.hypotheses[one].key: log for one, log in free.items()}
+    same = [design.hypotheses[one].key for one in free if slot.cosines.get(one, 0.0) > SAME]
+    key = design.hypotheses[index].key
+    alike = (key, *(one for one in same if one != key))
+    return Law(problems[0].dependences[number], learnt, odds, alike, len(problems[0].candidates))

@@ -1,0 +1,252 @@
+"""Evidence: how much more likely rows are with hypotheses than without, all of their numbers integrated.
+
+White rows are y = B θ + X a + ε, θ ~ N(0, 1) in what is known of the parameters, a ~ N(0, s² Φ Φᵀ). The scale s of a
+cause is unknown by a factor: every one between what the rows could just show and far beyond is as likely (Jeffreys
+1961). All of it is algebra of the products of columns: a hypothesis costs a small eigenproblem.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+from scipy.special import logsumexp
+
+from ident.diagnosis.posterior.bends import Bent
+from ident.diagnosis.posterior.hypotheses import Block, Design, Hypothesis
+from ident.diagnosis.posterior.noise import Colours, Noise, Sizes
+
+Array = NDArray[np.float64]
+
+OCTAVES: Final = 1.0
+"""Between neighbouring scales, in doublings: the evidence of one is that of the other but for a tenth."""
+
+LARGEST: Final = 100.0
+"""Scale, in units of the noise, that is tried at most."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """A hypothesis that is taken, at the numbers that make its evidence largest: its block, and its scale."""
+
+    block: int
+    scale: float
+
+
+Members = Mapping[int, Member]
+"""By number of the hypothesis."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Evidence of one hypothesis, beside others.
+
+    Attributes:
+        scales: (S,) tried.
+        logs: (G, S) log evidence against its absence, by its numbers and scale, the prior mass of each included.
+        masses: (G,) log of that.
+    """
+
+    scales: Array
+    logs: Array
+    masses: Array
+
+    @property
+    def total(self) -> float:
+        """Log evidence, numbers and scale integrated."""
+        return float(logsumexp(self.logs)) if self.is_there else -math.inf
+
+    @property
+    def is_there(self) -> bool:
+        """Whether it can be there at all."""
+        return bool(np.isfinite(self.logs).any())
+
+    @property
+    def best(self) -> Member:
+        """The numbers with the largest evidence."""
+        row, column = np.unravel_index(int(np.argmax(self.logs)), self.logs.shape)
+        return Member(int(row), float(self.scales[column]))
+
+    @property
+    def inside(self) -> float:
+        """What integrating adds to the log likelihood at the best numbers, and what those cost."""
+        if not self.is_there:
+            return -math.inf
+        return self.total - float(self.logs.max()) + float(self.masses[self.best.block])
+
+
+class Products:
+    """Products of all white columns, by label and by what is lacking there: every noise is made of them.
+
+    Args:
+        design: of the rows.
+        colours: of their noise.
+    """
+
+    def __init__(self, design: Design, colours: Colours) -> None:
+        self.design, self.colours = design, colours
+        self._stacked = np.column_stack([design.baseline, design.columns, design.target])
+        self._kept: dict[tuple[int, int], tuple[Array, float]] = {}
+
+    def of(self, label: int, size: int) -> tuple[Array, float]:
+        """(p + K + 1, p + K + 1), the target last, and half the log of the determinant of the noise."""
+        if (label, size) not in self._kept:
+            white, volume = self.colours.of_label(label, size, self._stacked)
+            self._kept[label, size] = white.T @ white, volume
+        return self._kept[label, size]
+
+    def missing(self, label: int, size: int, missed: Array) -> tuple[Array, float]:
+        """(p + K + 1,) products of what columns miss (n,) with all columns and the target, and of it with itself."""
+        weighted, power = self.colours.weighted(label, size, missed)
+        return self._stacked.T @ weighted, power
+
+
+class Evidence:
+    """The evidence of all hypotheses with one noise.
+
+    Args:
+        products: of the rows.
+        sizes: of what is lacking.
+    """
+
+    def __init__(self, products: Products, sizes: Sizes) -> None:
+        self.design, self.products, self.sizes = products.design, products, sizes
+        parts = [products.of(label, size) for label, size in enumerate(sizes)]
+        whole, width = np.sum([one for one, _ in parts], axis=0), self.design.baseline.shape[1]
+        self._volume = sum(volume for _, volume in parts)
+        self._baseline = linalg.cho_factor(np.eye(width) + whole[:width, :width])
+        self._across = linalg.cho_solve(self._baseline, whole[:width, width:])
+        self._beside = whole[width:, width:] - whole[:width, width:].T @ self._across
+        self._determinant = float(np.sum(np.log(np.diag(self._baseline[0]))))
+        smallest = 1 / math.sqrt(len(self.design.target))
+        self.scales = np.geomspace(smallest, LARGEST, 1 + math.ceil(math.log2(LARGEST / smallest) / OCTAVES))
+
+    @property
+    def noise(self) -> Noise:
+        """Of the rows."""
+        return Noise(self.products.colours, self.sizes)
+
+    def target_beside(self, bends: Collection[Bent]) -> Target:
+        """The rows without what the columns of some members miss of them, and with what is expected of those."""
+        missed = sum((bent.missed for bent in bends), np.zeros(len(self.design.target)))
+        found = self._beside.copy() if bends else self._beside
+        if missed.any():
+            width = len(self._across)
+            parts = [self.products.missing(label, size, missed) for label, size in enumerate(self.sizes)]
+            along, power = np.sum([one for one, _ in parts], axis=0), sum(own for _, own in parts)
+            beside = along[width:] - self._across.T @ along[:width]
+            power -= float(along[:width] @ linalg.cho_solve(self._baseline, along[:width]))
+            last = found[:, -1] - beside
+            last[-1] += power - beside[-1]
+            found[:, -1] = found[-1] = last
+        for bent in bends:
+            slopes, target = bent.expected
+            found[bent.place, bent.place] += slopes.T @ slopes
+            found[bent.place, -1] += slopes.T @ target
+            found[-1, bent.place] += slopes.T @ target
+            found[-1, -1] += target @ target
+        return Target(self, found, -0.5 * float(found[-1, -1]) - self._volume - self._determinant)
+
+
+@dataclass(frozen=True)
+class Target:
+    """Products of all columns and, last, a target, the baseline integrated.
+
+    Attributes:
+        evidence: of which noise.
+        products: (K + 1, K + 1).
+        nothing: log likelihood without any hypothesis.
+    """
+
+    evidence: Evidence
+    products: Array
+    nothing: float
+
+    def beside(self, members: Members) -> Array:
+        """The products, members integrated."""
+        if not members:
+            return self.products
+        own, rows = self._stacked(members)
+        inner = np.eye(own.shape[1]) + own.T @ self.products[np.ix_(rows, rows)] @ own
+        across = self.products[:, rows] @ own
+        return np.asarray(self.products - across @ linalg.solve(inner, across.T, assume_a="pos"))
+
+    def log_likelihood(self, members: Members) -> float:
+        """With members of these numbers, against none."""
+        if not members:
+            return 0.0
+        own, rows = self._stacked(members)
+        inner = np.eye(own.shape[1]) + own.T @ self.products[np.ix_(rows, rows)] @ own
+        amplitude, factor = own.T @ self.products[rows, -1], linalg.cho_factor(inner)
+        gained = 0.5 * float(amplitude @ linalg.cho_solve(factor, amplitude))
+        return gained - float(np.sum(np.log(np.diag(factor[0]))))
+
+    def means(self, members: Members) -> dict[int, Array]:
+        """Coefficients (K,) of the columns of every member."""
+        if not members:
+            return {}
+        own, rows = self._stacked(members)
+        inner = np.eye(own.shape[1]) + own.T @ self.products[np.ix_(rows, rows)] @ own
+        mean = np.zeros(len(self.products) - 1)
+        mean[rows] = own @ linalg.solve(inner, own.T @ self.products[rows, -1], assume_a="pos")
+        return {index: mean[self._block(index, one).place] for index, one in members.items()}
+
+    def table(self, hypothesis: int, products: Array) -> Table:
+        """Log evidence of a hypothesis, by products beside the others."""
+        blocks = self.evidence.design.hypotheses[hypothesis].blocks
+        masses = np.array([self._mass(block) for block in blocks])
+        logs = np.stack([self._logs(block, products) for block in blocks])
+        return Table(self.evidence.scales, logs + masses[:, None], masses)
+
+    def _mass(self, block: Block) -> float:
+        """Log of the prior mass of a block at one scale."""
+        count = max(int(np.sum(self.evidence.scales <= block.largest)), 1)
+        return block.weight - math.log(count) + (math.log(2) if block.least == 0 else 0.0)
+
+    def _logs(self, block: Block, products: Array) -> Array:
+        """(S,) of one block."""
+        place, squares = block.place, self.evidence.scales[:, None] ** 2
+        if block.factor.shape == (1, 1):
+            power, amplitude = max(float(products[place, place][0, 0]), 0.0), float(products[place.start, -1])
+            if _is_refused(block, power, amplitude):
+                return np.full(len(squares), -math.inf)
+            powers, amplitudes = np.array([power]), np.array([amplitude])
+        else:
+            powers, turn = np.linalg.eigh(block.factor.T @ products[place, place] @ block.factor)
+            powers, amplitudes = np.maximum(powers, 0.0), turn.T @ (block.factor.T @ products[place, -1])
+        gains = squares / (1 + squares * powers)
+        logs = 0.5 * np.sum(gains * amplitudes**2 - np.log1p(squares * powers), axis=1)
+        allowed = self.evidence.scales <= max(block.largest, self.evidence.scales[0])
+        return np.where(allowed, logs, -math.inf)
+
+    def _block(self, index: int, member: Member) -> Block:
+        return self.evidence.design.hypotheses[index].blocks[member.block]
+
+    def _stacked(self, members: Members) -> tuple[Array, NDArray[np.int64]]:
+        """(r, R) factors of all members beside each other, and the columns (r,) that they have."""
+        places = [self._block(index, one) for index, one in members.items()]
+        columns = np.unique(np.concatenate([np.arange(one.place.start, one.place.stop) for one in places]))
+        parts = []
+        for block, one in zip(places, members.values(), strict=True):
+            part = np.zeros((len(columns), block.factor.shape[1]))
+            first = int(np.searchsorted(columns, block.place.start))
+            part[first : first + len(block.factor)] = one.scale * block.factor
+            parts.append(part)
+        return np.hstack(parts), columns
+
+
+def _is_refused(block: Block, power: float, amplitude: float) -> bool:
+    """Whether a single coefficient is what the hypothesis is not: of the other sign, or too small to mean it."""
+    size = amplitude / max(power, np.finfo(float).tiny) / float(block.sizes[0])
+    negative, positive = block.negligible
+    return size <= block.least or -negative <= size < 0 or 0 < size <= positive
+
+
+def named(hypotheses: Sequence[Hypothesis]) -> list[int]:
+    """Numbers of those that have a name."""
+    return [number for number, one in enumerate(hypotheses) if not one.free]

@@ -1,0 +1,196 @@
+"""Noise of the rows: what differs between repeats, and what a model may lack beside it.
+
+Rows of a block have the covariance R + q² t² C. R is that of the mean over the repeats, by what differs between them.
+t is what no model is expected to have right (`Block.tolerance`), a process that remembers, as slow as the motion or
+faster. Its size q is one unless the rows say otherwise: one number for all blocks of a step and a coordinate, the most
+likely beside the hypotheses that are taken. A q of more than one is a price, and says that something is lacking.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from ident.diagnosis.regression import Regression
+from ident.diagnosis.rows import Rows
+from ident.diagnosis.whitening import Colour, predictor_of
+
+Array = NDArray[np.float64]
+Sizes = tuple[int, ...]
+"""Of what is lacking, by label: number among `SIZES`."""
+
+SIZES: Final = (1.0, 3.0, 10.0, 30.0, 100.0)
+"""Of what a model lacks, over what is tolerated."""
+
+PRICE: Final = 2.0
+"""Log odds against the next of them: one in seven."""
+
+MEMORIES: Final = (0.1, 0.5, 2.0)
+"""Of what a model lacks [s], a third of its power each: contacts and friction have it at every one."""
+
+ROUNDING: Final = 1e-9
+"""White share of a covariance, so that a band without any power is not blown up."""
+
+ROUNDS: Final = 4
+"""Times that the sizes of all labels are looked at."""
+
+USUAL: Final = 0
+
+
+class Colours:
+    """Covariances of the rows of every block.
+
+    Attributes:
+        rows: of the problems.
+        labels: channel, step and coordinate, of blocks that share what they lack.
+        blocks: rows of every block, by label.
+    """
+
+    def __init__(self, regression: Regression) -> None:
+        self.rows: Rows = regression.rows
+        found: dict[str, list[int]] = {}
+        self._places: list[slice] = []
+        self._noise: list[Array] = []
+        self._lacking: list[Array] = []
+        for (block, kept), place in zip(self.rows.blocks, self.rows.block_slices, strict=True):
+            if place.stop == place.start:
+                continue
+            found.setdefault(f"{block.channel}/{block.label}", []).append(len(self._places))
+            colour = regression.repeats[self.rows.group[place.start]]
+            self._places.append(place)
+            self._noise.append(_covariance(colour, self.rows.run[place]))
+            time = kept.samples[0] * block.sample_time
+            self._lacking.append(block.tolerance**2 * _remembering(np.abs(np.subtract.outer(time, time))))
+        self.labels = tuple(found)
+        self.blocks = tuple(tuple(numbers) for numbers in found.values())
+        self._factors: dict[tuple[int, int], Array] = {}
+
+    @property
+    def usual(self) -> Sizes:
+        """Nothing is lacking but what is tolerated."""
+        return (USUAL,) * len(self.labels)
+
+    def white(self, values: Array, sizes: Sizes) -> tuple[Array, float]:
+        """All rows (n, k) in units of the noise, and half the log of its determinant."""
+        found, volume = np.array(values, dtype=float), 0.0
+        for label, size in enumerate(sizes):
+            for number in self.blocks[label]:
+                place, factor = self._places[number], self._factor(number, size)
+                found[place] = linalg.solve_triangular(factor, found[place], lower=True, check_finite=False)
+                volume += float(np.sum(np.log(np.diag(factor))))
+        return found, volume
+
+    def of_label(self, label: int, size: int, values: Array) -> tuple[Array, float]:
+        """White rows of a label alone, of values (n, k) of all rows; and half the log of the determinant."""
+        parts, volume = [], 0.0
+        for number in self.blocks[label]:
+            factor = self._factor(number, size)
+            parts.append(linalg.solve_triangular(factor, values[self._places[number]], lower=True, check_finite=False))
+            volume += float(np.sum(np.log(np.diag(factor))))
+        return np.vstack(parts), volume
+
+    def weighted(self, label: int, size: int, series: Array) -> tuple[Array, float]:
+        """A series (n,) of all rows times the inverse of the covariance of a label, and its own white power."""
+        found, power = np.zeros(len(series)), 0.0
+        for number in self.blocks[label]:
+            place, factor = self._places[number], self._factor(number, size)
+            white = linalg.solve_triangular(factor, series[place], lower=True, check_finite=False)
+            found[place] = linalg.solve_triangular(factor, white, lower=True, trans="T", check_finite=False)
+            power += float(white @ white)
+        return found, power
+
+    def _factor(self, number: int, size: int) -> Array:
+        """(n, n) lower triangular, of the covariance of a block."""
+        if (number, size) not in self._factors:
+            whole = self._noise[number] + SIZES[size] ** 2 * self._lacking[number]
+            whole += ROUNDING * np.trace(whole) / len(whole) * np.eye(len(whole))
+            self._factors[number, size] = linalg.cholesky(whole, lower=True, check_finite=False)
+        return self._factors[number, size]
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of all rows, as what turns them into white ones (`Whitener` of the refit and of laws).
+
+    Attributes:
+        colours: of the rows.
+        sizes: of what is lacking, by label.
+    """
+
+    colours: Colours
+    sizes: Sizes
+
+    def apply(self, rows: Rows, values: Array) -> Array:
+        """Whitened copy of (n,) or (n, k)."""
+        del rows
+        columns = values[:, None] if np.ndim(values) == 1 else values
+        return self.colours.white(columns, self.sizes)[0].reshape(np.shape(values))
+
+    @property
+    def price(self) -> float:
+        """Log odds against so much being lacking."""
+        return price_of(self.sizes)
+
+
+def price_of(sizes: Sizes) -> float:
+    """Log odds against so much being lacking."""
+    return PRICE * sum(sizes)
+
+
+def most_likely(parts: Sequence[Sequence[tuple[Array, float]]], start: Sizes) -> Sizes:
+    """Sizes of what is lacking, by label, that are the most likely.
+
+    One label after the other: what a coefficient is in one step holds in all.
+
+    Args:
+        parts: of every label and size, products (k + 1, k + 1) of white columns whose coefficients have unit variance,
+            and of the target, the last; and half the log of the determinant of the noise.
+        start: sizes to begin with.
+    """
+    found = list(start)
+    products = np.sum([parts[label][size][0] for label, size in enumerate(found)], axis=0)
+    logs = -sum(parts[label][size][1] + PRICE * size for label, size in enumerate(found))
+    best = logs + _log(products)
+    for _ in range(ROUNDS):
+        before = tuple(found)
+        for label, sizes in enumerate(parts):
+            for size, (other, volume) in enumerate(sizes):
+                now, now_volume = sizes[found[label]]
+                changed = products - now + other
+                gained = now_volume - volume + PRICE * (found[label] - size)
+                log = logs + gained + _log(changed)
+                if log > best:
+                    best, products, logs, found[label] = log, changed, logs + gained, size
+        if tuple(found) == before:
+            break
+    return tuple(found)
+
+
+def _log(products: Array) -> float:
+    """Log likelihood of white rows by their products (k + 1, k + 1), the target last, coefficients integrated."""
+    width = len(products) - 1
+    inner = np.eye(width) + products[:width, :width]
+    factor = linalg.cholesky(inner, lower=True, check_finite=False)
+    explained = linalg.solve_triangular(factor, products[:width, width], lower=True, check_finite=False)
+    return -0.5 * float(products[width, width] - explained @ explained) - float(np.sum(np.log(np.diag(factor))))
+
+
+def _remembering(distance: Array) -> Array:
+    """Correlation at distances in time [s]."""
+    return np.asarray(np.mean([np.exp(-distance / memory) for memory in MEMORIES], axis=0))
+
+
+def _covariance(colour: Colour, runs: NDArray[np.int64]) -> Array:
+    """(n, n) of the noise of a block, by the autoregression of its colour; uninterrupted runs are independent."""
+    predictor, found = predictor_of(colour), np.zeros((len(runs), len(runs)))
+    for run in np.unique(runs):
+        place = np.flatnonzero(runs == run)
+        white = predictor.apply(np.eye(len(place)))
+        back = linalg.solve_triangular(white, np.eye(len(place)), lower=True)
+        found[np.ix_(place, place)] = back @ back.T
+    return found

@@ -1,0 +1,274 @@
+"""The search: sets of hypotheses, one after the other, each with the noise that it leaves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.posterior.bends import Bends, Bent
+from ident.diagnosis.posterior.evidence import Evidence, Member, Members, Products, Table, Target
+from ident.diagnosis.posterior.hypotheses import Design
+from ident.diagnosis.posterior.noise import SIZES, Colours, Sizes, most_likely, price_of
+
+Array = NDArray[np.float64]
+
+SWEEPS: Final = 4
+"""Times that the numbers of all members are chosen anew, each beside the others, and what their columns miss."""
+
+SETTLED: Final = 0.1
+"""Change of the log posterior from which that has settled."""
+
+MOST: Final = 4
+"""Members of a set."""
+
+INSTEAD: Final = 2
+"""Names that may stand for a law."""
+
+SURVIVORS: Final = 5
+"""Hypotheses that are fitted exactly at every step."""
+
+DISTINCT: Final = 0.02
+"""Power of a column that must be left beside the members: columns are exact to about a hundredth."""
+
+SURELY: Final = 3.0
+"""Log posterior by which a law must be better than names to stand in their place: twenty to one."""
+
+MARGIN: Final = 4.0
+"""Log posterior below the best one's from which a hypothesis is not fitted exactly."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A set of hypotheses.
+
+    Attributes:
+        members: by number.
+        bends: what the columns of a member miss of it, by number.
+        evidence: with the noise that is most likely beside them.
+    """
+
+    members: Members
+    bends: Mapping[int, Bent]
+    evidence: Evidence
+
+    @cached_property
+    def target(self) -> Target:
+        """The rows without what columns miss."""
+        return self.evidence.target_beside(self.bends.values())
+
+    @cached_property
+    def log_posterior(self) -> float:
+        """But for a constant."""
+        tables = {index: self.table(index) for index in self.members}
+        if not all(table.is_there for table in tables.values()):
+            return -math.inf
+        hypotheses = self.evidence.design.hypotheses
+        inside = sum(table.inside for table in tables.values())
+        price = sum(hypotheses[index].price for index in self.members) + price_of(self.evidence.sizes)
+        return self.target.nothing + self.target.log_likelihood(self.members) + inside - price
+
+    def table(self, hypothesis: int) -> Table:
+        """Evidence of a hypothesis beside the other members, what its own columns miss taken off as well."""
+        return self.target.table(hypothesis, self.target.beside(self.without(hypothesis)))
+
+    def tables(self) -> dict[int, Table]:
+        """Evidence of all other hypotheses beside the members, but of those that are the same as some of these."""
+        beside, hypotheses = self.target.beside(self.members), self.evidence.design.hypotheses
+        left = np.diag(beside) / np.maximum(np.diag(self.target.products), np.finfo(float).tiny)
+        return {
+            index: self.target.table(index, beside)
+            for index, one in enumerate(hypotheses)
+            if index not in self.members and any(left[block.place].max() > DISTINCT for block in one.blocks)
+        }
+
+    def without(self, hypothesis: int) -> dict[int, Member]:
+        """The other members."""
+        return {index: one for index, one in self.members.items() if index != hypothesis}
+
+
+class Search:
+    """Looks for the set of hypotheses with the largest posterior.
+
+    Args:
+        design: of the rows.
+        colours: of their noise.
+        bends: of the hypotheses.
+    """
+
+    def __init__(self, design: Design, colours: Colours, bends: Bends) -> None:
+        self.design, self.colours, self.bends = design, colours, bends
+        self._products = Products(design, colours)
+        self._kept: dict[frozenset[int], State] = {}
+        self._evidence: dict[Sizes, Evidence] = {}
+
+    def run(self) -> State:
+        """The best set that was found."""
+        state = self.nothing
+        while len(state.members) < MOST:
+            further = max(self._expanded(state), key=lambda one: one.log_posterior, default=state)
+            further = self._pruned(further)
+            if further.log_posterior <= state.log_posterior:
+                break
+            state = further
+        return self._named(self.against_rivals(state))
+
+    def against_rivals(self, state: State) -> State:
+        """With the best hypothesis in the place of every member."""
+        for _ in range(SWEEPS):
+            before = state
+            for index in before.members:
+                bare = self.state(before.without(index), before)
+                state = max(state, *self._expanded(bare), key=lambda one: one.log_posterior)
+            if state is before:
+                break
+        return state
+
+    @property
+    def nothing(self) -> State:
+        """No hypothesis at all."""
+        return self.state({}, None)
+
+    def state(self, members: Members, before: State | None) -> State:
+        """A set, its members' numbers fitted by turns, with the noise that they leave.
+
+        Args:
+            members: to begin with.
+            before: a set that is nearly the same, whose noise is taken first.
+        """
+        key = frozenset(members)
+        if key not in self._kept:
+            start = self.colours.usual if before is None else before.evidence.sizes
+            bends = {} if before is None else {index: bend for index, bend in before.bends.items() if index in members}
+            found = self._settled(State(members, bends, self._evidence_with(start)))
+            for _ in range(SWEEPS):
+                noise = self._noise_beside(found)
+                if noise == found.evidence.sizes:
+                    break
+                found = self._settled(replace(found, evidence=self._evidence_with(noise)))
+            self._kept[key] = found
+        return self._kept[key]
+
+    def _evidence_with(self, sizes: Sizes) -> Evidence:
+        if sizes not in self._evidence:
+            self._evidence[sizes] = Evidence(self._products, sizes)
+        return self._evidence[sizes]
+
+    def _noise_beside(self, state: State) -> Sizes:
+        """What is most likely lacking beside a set."""
+        width, hypotheses = self.design.baseline.shape[1], self.design.hypotheses
+        count = width + self.design.columns.shape[1]
+        turns = [np.eye(count + 1)[:, :width]]
+        for index, one in state.members.items():
+            block = hypotheses[index].blocks[one.block]
+            turn = np.zeros((count + 1, block.factor.shape[1]))
+            turn[width + block.place.start : width + block.place.stop] = one.scale * block.factor
+            turns.append(turn)
+        turn = np.column_stack([*turns, np.eye(count + 1)[:, -1]])
+        missed = sum((bent.missed for bent in state.bends.values()), np.zeros(len(self.design.target)))
+        parts = [
+            [self._part(label, size, turn, missed) for size in range(len(SIZES))]
+            for label in range(len(self.colours.labels))
+        ]
+        expected = sum((_expected(bent, turn[width:]) for bent in state.bends.values()), np.zeros((turn.shape[1],) * 2))
+        return most_likely([*parts, [(expected, 0.0)]], (*state.evidence.sizes, 0))[:-1]
+
+    def _part(self, label: int, size: int, turn: Array, missed: Array) -> tuple[Array, float]:
+        """Products (k + 1, k + 1) of some combinations of columns, what is missed taken off the target."""
+        products, volume = self._products.of(label, size)
+        rows = np.flatnonzero(turn.any(axis=1))
+        found = turn[rows].T @ products[np.ix_(rows, rows)] @ turn[rows]
+        if missed.any():
+            along, power = self._products.missing(label, size, missed)
+            turned = turn.T @ along
+            found[:, -1] -= turned
+            found[-1, :] -= turned
+            found[-1, -1] += power
+        return found, volume
+
+    def _settled(self, state: State) -> State:
+        """With the numbers of every member chosen anew, each beside the others, and what its columns miss."""
+        before = -math.inf
+        for _ in range(SWEEPS):
+            for index in state.members:
+                table = state.table(index)
+                if not table.is_there:
+                    return state
+                state = replace(state, members={**state.members, index: table.best})
+            state = self._bent(state)
+            if abs(state.log_posterior - before) < SETTLED:
+                break
+            before = state.log_posterior
+        return state
+
+    def _bent(self, state: State) -> State:
+        """With what the columns of its members miss."""
+        means, hypotheses = state.target.means(state.members), self.design.hypotheses
+        found = {
+            index: self.bends.bend(hypotheses[index], hypotheses[index].blocks[one.block], means[index])
+            for index, one in state.members.items()
+            if self.bends.is_bent(hypotheses[index], hypotheses[index].blocks[one.block])
+        }
+        return replace(state, bends=found) if found else state
+
+    def _expanded(self, state: State, *, named: bool = False) -> Sequence[State]:
+        """Sets with one member more, of those that promise most; or of those alone that have a name."""
+        return [
+            self.state({**state.members, index: one}, state) for index, one in self._promising(state, named).items()
+        ]
+
+    def _promising(self, state: State, named: bool) -> dict[int, Member]:
+        """Hypotheses by the noise that is left, and by that of which nothing is lacking.
+
+        What a model lacks may be as large as what is looked for, and hide it.
+        """
+        hypotheses = self.design.hypotheses
+        usual = replace(state, evidence=self._evidence_with(self.colours.usual))
+        found: dict[int, Member] = {}
+        for one in (state, usual) if usual.evidence is not state.evidence else (state,):
+            tables = {
+                index: table
+                for index, table in one.tables().items()
+                if table.is_there and not (named and hypotheses[index].free)
+            }
+            odds = {index: table.total - hypotheses[index].price for index, table in tables.items()}
+            most = max(odds.values(), default=0.0)
+            best = [index for index in sorted(odds, key=lambda index: -odds[index]) if odds[index] > most - MARGIN]
+            for index in best[:SURVIVORS]:
+                if odds[index] > -MARGIN:
+                    found.setdefault(index, tables[index].best)
+        return found
+
+    def _pruned(self, state: State) -> State:
+        """Without members that the others make needless."""
+        while len(state.members) > 1:
+            fewer = [self.state(state.without(index), state) for index in state.members]
+            best = max(fewer, key=lambda one: one.log_posterior)
+            if best.log_posterior < state.log_posterior:
+                break
+            state = best
+        return state
+
+    def _named(self, state: State) -> State:
+        """With names in the place of every law that is not surely better."""
+        for index in [one for one in state.members if self.design.hypotheses[one].free]:
+            instead = self.state(state.without(index), state)
+            for _ in range(INSTEAD):
+                further = self._expanded(instead, named=True)
+                instead = max(further, key=lambda one: one.log_posterior, default=instead)
+                if instead.log_posterior > state.log_posterior - SURELY:
+                    state = instead
+                    break
+        return state
+
+
+def _expected(bent: Bent, turn: Array) -> Array:
+    """Products (k + 1, k + 1) of the rows of what is expected of a member, by what turns columns into combinations."""
+    slopes, target = bent.expected
+    rows = np.column_stack([slopes @ turn[bent.place][:, :-1], target])
+    return np.asarray(rows.T @ rows)

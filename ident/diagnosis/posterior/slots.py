@@ -1,0 +1,122 @@
+"""What may stand in the place of a member, the others given: nothing, and every hypothesis by its posterior."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from ident.diagnosis.posterior.hypotheses import Hypothesis
+from ident.diagnosis.posterior.search import Search, State
+from ident.diagnosis.probability import ALIKE, Ranked
+
+Array = NDArray[np.float64]
+
+NEAR: Final = 6.0
+"""Log posterior below a member's from which a rival is fitted exactly as well: one in four hundred."""
+
+RIVALS: Final = 4
+"""That are fitted exactly."""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One place of the best set.
+
+    Attributes:
+        member: what stands there.
+        logs: log posterior odds of every hypothesis against nothing there, the greatest first.
+        cosines: of what the member adds and what every other can.
+        alike: hypotheses that add the same, the member first.
+    """
+
+    member: int
+    logs: Mapping[int, float]
+    cosines: Mapping[int, float]
+    alike: tuple[int, ...]
+
+    @cached_property
+    def _whole(self) -> float:
+        return float(logsumexp([0.0, *self.logs.values()]))
+
+    @property
+    def nothing(self) -> float:
+        """Probability that there is nothing."""
+        return math.exp(-self._whole)
+
+    def names(self, hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
+        """Probability of every name, the most probable first."""
+        found: dict[str, float] = {}
+        for index, log in self.logs.items():
+            name = hypotheses[index].name
+            found[name] = found.get(name, 0.0) + math.exp(log - self._whole)
+        return dict(sorted(found.items(), key=lambda entry: -entry[1]))
+
+    def probability(self, hypotheses: Sequence[Hypothesis]) -> float:
+        """That the name of the member is right, or that of one which adds the same."""
+        names = self.names(hypotheses)
+        return min(sum(names[name] for name in {hypotheses[one].name for one in self.alike}), 1.0)
+
+    def ranked(self, hypotheses: Sequence[Hypothesis]) -> Ranked:
+        """As reports show it."""
+        probabilities = {hypotheses[index].key: math.exp(log - self._whole) for index, log in self.logs.items()}
+        evidence = {hypotheses[index].key: log for index, log in self.logs.items()}
+        alike = tuple(hypotheses[one].key for one in self.alike)
+        return Ranked(probabilities, self.names(hypotheses), alike, evidence)
+
+
+def slot_of(search: Search, state: State, index: int) -> Slot:
+    """What may stand in the place of a member: rivals that come near by their columns are fitted exactly."""
+    hypotheses = search.design.hypotheses
+    others = state.without(index)
+    without = replace(state, members=others, bends={one: bend for one, bend in state.bends.items() if one != index})
+    beside, bare = without.target.beside(others), search.state(others, state).log_posterior
+    # Without it the rows may have another noise.
+    base = without.log_posterior - bare
+    logs: dict[int, float] = {}
+    for number, hypothesis in enumerate(hypotheses):
+        if number not in others:
+            table = without.target.table(number, beside)
+            if table.is_there:
+                logs[number] = base + table.total - hypothesis.price
+    logs[index] = state.log_posterior - bare
+    near = sorted((one for one in logs if one != index), key=lambda one: -logs[one])[:RIVALS]
+    for rival in [one for one in near if logs[one] > logs[index] - NEAR]:
+        table = without.target.table(rival, beside)
+        logs[rival] = search.state({**others, rival: table.best}, state).log_posterior - bare
+    logs = {one: log for one, log in sorted(logs.items(), key=lambda entry: -entry[1]) if math.isfinite(log)}
+    cosines = _cosines(state, index, logs)
+    width = _width(search, state, index)
+    alike = [one for one, cosine in cosines.items() if cosine > ALIKE and one != index]
+    alike = [one for one in alike if not hypotheses[one].free and len(hypotheses[one].blocks[0].factor) == width]
+    return Slot(index, logs, cosines, (index, *(alike if not hypotheses[index].free else [])))
+
+
+def _width(search: Search, state: State, index: int) -> int:
+    return len(search.design.hypotheses[index].blocks[state.members[index].block].factor)
+
+
+def _cosines(state: State, index: int, others: Mapping[int, float]) -> dict[int, float]:
+    """Of what a member adds to the white rows, beside the other members, and what each other can."""
+    products = state.target.beside(state.without(index))
+    hypotheses = state.evidence.design.hypotheses
+    own = hypotheses[index].blocks[state.members[index].block]
+    mean = state.target.means(state.members)[index]
+    power = float(mean @ products[own.place, own.place] @ mean)
+    found = {}
+    for other in others:
+        most = 0.0
+        for block in hypotheses[other].blocks:
+            inner, across = products[block.place, block.place], products[block.place, own.place] @ mean
+            turned = block.factor.T @ inner @ block.factor
+            along = block.factor.T @ across
+            made = float(along @ np.linalg.pinv(turned, rcond=1e-9, hermitian=True) @ along)
+            most = max(most, made)
+        found[other] = math.sqrt(min(most / power, 1.0)) if power > 0 else 0.0
+    return found
