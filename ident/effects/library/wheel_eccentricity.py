@@ -20,7 +20,7 @@ def _warped_by(wheel: int) -> tuple[int, ...]:
 
 class _Eccentricity(EffectTerm):
     def radii(self, beta: Expression) -> Expression:
-        """First harmonic over the angle of the wheel; of all wheels, as far as they roll on what the warp leaves them."""
+        """First harmonic over the angle of the wheel; of all wheels, as far as they roll on what warp leaves."""
         more = ca.SX(4, 1)
         for wheel in self.among(WHEEL_PLACES):
             higher = self["amplitude"] * ca.cos(beta[wheel] + self["phase"])
