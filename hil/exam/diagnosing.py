@@ -23,11 +23,11 @@ from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.core.answer import diagnose_by_core
 from ident.diagnosis.diagnosis import faulty
 from ident.diagnosis.findings import Findings
-from ident.diagnosis.judge import judge
+from ident.diagnosis.judge import Judge, judge
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.posterior.answer import judge_by_posterior
 from ident.diagnosis.problem import Problem
-from ident.diagnosis.vehicle.diagnose import Judge, diagnose_vehicle
+from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.effects.extended import ExtendedModel
 from ident.errors import UserError
 from ident.faults import sure_faults

@@ -33,7 +33,7 @@ AXES: Final = "drawn axes"
 
 
 class Core(enum.StrEnum):
-    """What diagnoses: what `quasiomni diagnose` does, or the one comparison that is tried beside it, of axes alone."""
+    """What diagnoses: what `quasiomni diagnose` does, or the one comparison that is tried beside it."""
 
     STANDING = "standing"
     ONE = "one"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -27,6 +27,13 @@ from ident.stages import Stage, untold
 
 MOST_LAWS: Final = 2
 """Of which an answer consists; more would be a black box."""
+
+
+class Judge(Protocol):
+    """What finds the causes of a gap."""
+
+    def __call__(self, fit: Problem, confirm: Problem, *, seed: int, stage: Stage) -> Findings:
+        """The causes, by records to fit and to confirm."""
 
 
 def judge(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from threadpoolctl import threadpool_limits
@@ -12,7 +13,7 @@ from ident.diagnosis.axis.problem import axis_problem, delayed_axes
 from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_other_axes
 from ident.diagnosis.axis.scale import Scale
 from ident.diagnosis.findings import Findings
-from ident.diagnosis.judge import judge
+from ident.diagnosis.judge import Judge, judge
 from ident.diagnosis.limits import Limits
 from ident.diagnosis.names import LATE
 from ident.diagnosis.problem import Problem
@@ -33,6 +34,7 @@ def diagnose_axis(
     cutoff: float | None = None,
     lacking: Collection[str] = (),
     stage: Stage = untold,
+    judged: Judge | None = None,
 ) -> Findings:
     """What the model M a + Fv v + Fc sign(v) + offset lacks.
 
@@ -43,6 +45,7 @@ def diagnose_axis(
         cutoff: of the position filter [rad/s]; None: chosen from the records.
         lacking: names of effects that are not looked for.
         stage: told what begins.
+        judged: finds the causes; None: what stands.
 
     Raises:
         RecordError: the records do not have the same axes.
@@ -50,7 +53,7 @@ def diagnose_axis(
     """
     # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        return _diagnosed(fit, confirm, seed, cutoff, lacking, stage)
+        return _diagnosed(fit, confirm, seed, cutoff, lacking, stage, judged or partial(judge, limits=LIMITS))
 
 
 def _diagnosed(
@@ -60,13 +63,14 @@ def _diagnosed(
     cutoff: float | None,
     lacking: Collection[str],
     stage: Stage,
+    finds: Judge,
 ) -> Findings:
     refuse_other_axes([*fit, *confirm])
     stage("filter of the records")
     reference = axis_reference(fit, cutoff, confirm)
 
     def judged(reference: Reference) -> Findings:
-        return judge(*pose_axis(fit, confirm, reference, lacking), seed=seed, limits=LIMITS, stage=stage)
+        return finds(*pose_axis(fit, confirm, reference, lacking), seed=seed, stage=stage)
 
     findings = judged(reference)
     scales = tuple(_on_second_thought(reference.scales, findings, fit[0].axes))

@@ -66,9 +66,7 @@ def judge_by_posterior(
     stage(f"comparing {len(fit.candidates)} causes and {len(fit.dependences)} laws")
     colours, designs = Colours(regression), Designs(problems, regression.rows)
     design = make_design(problems, regression, colours, designs)
-    known = np.zeros(len(fit.names))
-    known[fit.known.places] = fit.known.values
-    search = Search(design, colours, Bends(problems, regression.rows, known))
+    search = Search(design, colours, Bends(problems, regression.rows))
     state = search.run()
     stage("numbers of the answer")
     answer = _Answer(problems, regression, designs, search, state, seed)

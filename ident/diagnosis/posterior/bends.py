@@ -1,7 +1,7 @@
-"""What the columns of a hypothesis miss of it: most effects are not linear in their size, and columns stand near zero.
+"""Hypotheses that are not linear in their size, about the numbers that were found: columns stand near zero.
 
-With coefficients a of columns X, an effect of the numbers that a stands for adds f(a). Its bend f(a) - X a is taken off
-the target, and a is found anew, until both agree: Newton's method with the slope held.
+With coefficients a of its columns, an effect of the numbers that a stands for adds f(a). About some a₀ that is
+f(a₀) - J a₀, which is taken off the target, and J a: the slope J takes the place of the columns (Gauss and Newton).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ident.diagnosis.rows import Rows
 
 Array = NDArray[np.float64]
 
-STEP: Final = 1e-6
+STEP: Final = 1e-4
 """Of a coefficient, for a slope."""
 
 SAME: Final = 0.01
@@ -28,16 +28,20 @@ SAME: Final = 0.01
 
 @dataclass(frozen=True)
 class Bent:
-    """A hypothesis at some coefficients.
+    """A hypothesis about some coefficients.
 
     Attributes:
         place: of its columns among all.
-        missed: (n,) what those miss of it.
+        about: (K,) the coefficients.
+        slopes: (n, K) that take the place of the columns.
+        missed: (n,) what these miss of it.
         expected: (m, K) and (m,) rows beside those of the records, in standard deviations: what physics expects of
             numbers that come along with it.
     """
 
     place: slice
+    about: Array
+    slopes: Array
     missed: Array
     expected: tuple[Array, Array]
 
@@ -48,12 +52,11 @@ class Bends:
     Args:
         problems: to fit and to confirm.
         rows: of them.
-        parameters: (p,) of the plant, as they are known.
     """
 
-    def __init__(self, problems: Sequence[Problem], rows: Rows, parameters: Array) -> None:
-        self.problems, self.rows, self.parameters = problems, rows, parameters
-        self._kept: dict[tuple[str, int], tuple[Array, Bent]] = {}
+    def __init__(self, problems: Sequence[Problem], rows: Rows) -> None:
+        self.problems, self.rows = problems, rows
+        self._kept: dict[tuple[str, int], Bent] = {}
 
     def is_bent(self, hypothesis: Hypothesis, block: Block) -> bool:
         """Whether there is more to a hypothesis than its columns."""
@@ -62,33 +65,39 @@ class Bends:
         candidate = self.problems[0].candidates[hypothesis.candidate]
         return candidate.contribution is not None and candidate.variants[block.column.variant].bent
 
-    def bend(self, hypothesis: Hypothesis, block: Block, coefficients: Array) -> Bent:
-        """What the columns miss; the last answer, where the coefficients are those but for `SAME`.
+    def bend(self, hypothesis: Hypothesis, block: Block, coefficients: Array, parameters: Array) -> Bent:
+        """About some coefficients; the last answer, where they are those but for `SAME`.
 
         Args:
             hypothesis: one that is bent.
             block: of it.
             coefficients: (K,) of its columns, of unit rms.
+            parameters: (p,) of the plant beside it.
         """
         key = hypothesis.key, block.place.start
-        if key in self._kept and np.abs(self._kept[key][0] - coefficients).max() < SAME:
-            return self._kept[key][1]
-        self._kept[key] = coefficients, self._bend(hypothesis, block, coefficients)
-        return self._kept[key][1]
-
-    def _bend(self, hypothesis: Hypothesis, block: Block, coefficients: Array) -> Bent:
+        kept = self._kept.get(key)
+        if kept is not None and np.abs(kept.about - coefficients).max() < SAME:
+            return kept
         assert hypothesis.candidate is not None
         candidates = [problem.candidates[hypothesis.candidate] for problem in self.problems]
-        numbers, series = self._numbers(candidates[0], block, coefficients), list[Array | None]()
-        for candidate in candidates:
-            assert candidate.contribution is not None
-            series += candidate.contribution(numbers, self.parameters)
-        missed = self.rows.stack(series) - self._columns(block) @ _raw(block, coefficients)
-        return Bent(block.place, missed, self._expected(candidates[0], block, coefficients))
 
-    def _columns(self, block: Block) -> Array:
-        assert block.column is not None
-        return self.rows.columns[:, block.column.place]
+        def added(values: Array) -> Array:
+            numbers, series = self._numbers(candidates[0], block, values), list[Array | None]()
+            for candidate in candidates:
+                assert candidate.contribution is not None
+                series += candidate.contribution(numbers, parameters)
+            return self.rows.stack(series)
+
+        here = added(coefficients)
+        slopes = np.empty((len(here), len(coefficients)))
+        for place, step in enumerate(STEP * np.maximum(np.abs(coefficients), 1.0)):
+            ahead = coefficients.copy()
+            ahead[place] += step
+            slopes[:, place] = (added(ahead) - here) / step
+        expected = self._expected(candidates[0], block, coefficients)
+        found = Bent(block.place, coefficients, slopes, here - slopes @ coefficients, expected)
+        self._kept[key] = found
+        return found
 
     def _numbers(self, candidate: Candidate, block: Block, coefficients: Array) -> Array:
         assert block.column is not None

@@ -50,11 +50,13 @@ class Table:
         scales: (S,) tried.
         logs: (G, S) log evidence against its absence, by its numbers and scale, the prior mass of each included.
         masses: (G,) log of that.
+        blocks: (G,) numbers of the blocks.
     """
 
     scales: Array
     logs: Array
     masses: Array
+    blocks: Sequence[int]
 
     @property
     def total(self) -> float:
@@ -70,14 +72,15 @@ class Table:
     def best(self) -> Member:
         """The numbers with the largest evidence."""
         row, column = np.unravel_index(int(np.argmax(self.logs)), self.logs.shape)
-        return Member(int(row), float(self.scales[column]))
+        return Member(self.blocks[int(row)], float(self.scales[column]))
 
     @property
     def inside(self) -> float:
         """What integrating adds to the log likelihood at the best numbers, and what those cost."""
         if not self.is_there:
             return -math.inf
-        return self.total - float(self.logs.max()) + float(self.masses[self.best.block])
+        row = int(np.argmax(self.logs.max(axis=1)))
+        return self.total - float(self.logs.max()) + float(self.masses[row])
 
 
 class Products:
@@ -100,10 +103,10 @@ class Products:
             self._kept[label, size] = white.T @ white, volume
         return self._kept[label, size]
 
-    def missing(self, label: int, size: int, missed: Array) -> tuple[Array, float]:
-        """(p + K + 1,) products of what columns miss (n,) with all columns and the target, and of it with itself."""
-        weighted, power = self.colours.weighted(label, size, missed)
-        return self._stacked.T @ weighted, power
+    def with_others(self, sizes: Sizes, others: Array) -> tuple[Array, Array]:
+        """(p + K + 1, r) products of all columns and the target with others (n, r), and (r, r) of these."""
+        weighted = self.colours.weighted(sizes, others)
+        return self._stacked.T @ weighted, others.T @ weighted
 
 
 class Evidence:
@@ -132,18 +135,8 @@ class Evidence:
         return Noise(self.products.colours, self.sizes)
 
     def target_beside(self, bends: Collection[Bent]) -> Target:
-        """The rows without what the columns of some members miss of them, and with what is expected of those."""
-        missed = sum((bent.missed for bent in bends), np.zeros(len(self.design.target)))
-        found = self._beside.copy() if bends else self._beside
-        if missed.any():
-            width = len(self._across)
-            parts = [self.products.missing(label, size, missed) for label, size in enumerate(self.sizes)]
-            along, power = np.sum([one for one, _ in parts], axis=0), sum(own for _, own in parts)
-            beside = along[width:] - self._across.T @ along[:width]
-            power -= float(along[:width] @ linalg.cho_solve(self._baseline, along[:width]))
-            last = found[:, -1] - beside
-            last[-1] += power - beside[-1]
-            found[:, -1] = found[-1] = last
+        """The rows, some members by their slopes instead of their columns, with what is expected of those."""
+        found = self._bent(bends) if bends else self._beside
         for bent in bends:
             slopes, target = bent.expected
             found[bent.place, bent.place] += slopes.T @ slopes
@@ -151,6 +144,28 @@ class Evidence:
             found[-1, bent.place] += slopes.T @ target
             found[-1, -1] += target @ target
         return Target(self, found, -0.5 * float(found[-1, -1]) - self._volume - self._determinant)
+
+    def parameters(self, added: Array) -> Array:
+        """(p,) of the plant beside what some members add (n,), in their units."""
+        along, _ = self.products.with_others(self.sizes, (self.design.target - added)[:, None])
+        own = linalg.cho_solve(self._baseline, along[: len(self._across), 0])
+        return np.asarray(self.design.known + self.design.spread * own)
+
+    def _bent(self, bends: Collection[Bent]) -> Array:
+        width, found = len(self._across), self._beside.copy()
+        others = np.column_stack([*(bent.slopes for bent in bends), sum(bent.missed for bent in bends)])
+        along, own = self.products.with_others(self.sizes, others)
+        own = own - along[:width].T @ linalg.cho_solve(self._baseline, along[:width])
+        along = along[width:] - self._across.T @ along[:width]
+        replaced = np.concatenate([np.arange(bent.place.start, bent.place.stop) for bent in bends])
+        target = found[:, -1] - along[:, -1]
+        target[replaced] = along[-1, :-1] - own[:-1, -1]
+        target[-1] += own[-1, -1] - along[-1, -1]
+        found[replaced] = along[:, :-1].T
+        found[:, replaced] = along[:, :-1]
+        found[np.ix_(replaced, replaced)] = own[:-1, :-1]
+        found[:, -1] = found[-1] = target
+        return np.asarray(found)
 
 
 @dataclass(frozen=True)
@@ -196,12 +211,14 @@ class Target:
         mean[rows] = own @ linalg.solve(inner, own.T @ self.products[rows, -1], assume_a="pos")
         return {index: mean[self._block(index, one).place] for index, one in members.items()}
 
-    def table(self, hypothesis: int, products: Array) -> Table:
-        """Log evidence of a hypothesis, by products beside the others."""
-        blocks = self.evidence.design.hypotheses[hypothesis].blocks
+    def table(self, hypothesis: int, products: Array, only: int | None = None) -> Table:
+        """Log evidence of a hypothesis, or of one of its blocks alone, by products beside the others."""
+        every = self.evidence.design.hypotheses[hypothesis].blocks
+        numbers = range(len(every)) if only is None else (only,)
+        blocks = [every[number] for number in numbers]
         masses = np.array([self._mass(block) for block in blocks])
         logs = np.stack([self._logs(block, products) for block in blocks])
-        return Table(self.evidence.scales, logs + masses[:, None], masses)
+        return Table(self.evidence.scales, logs + masses[:, None], masses, numbers)
 
     def _mass(self, block: Block) -> float:
         """Log of the prior mass of a block at one scale."""

@@ -99,12 +99,15 @@ class Design:
         columns: (n, K) of all of them.
         baseline: (n, p) of the parameters of the plant, each in standard deviations of what is known of it.
         target: (n,) without what is known of them.
+        known, spread: (p,) of the parameters, in their units.
     """
 
     hypotheses: tuple[Hypothesis, ...]
     columns: Array
     baseline: Array
     target: Array
+    known: Array
+    spread: Array
 
 
 DECADE: float = 10.0
@@ -125,8 +128,10 @@ def make_design(problems: Sequence[Problem], regression: Regression, colours: Co
     rows, known = regression.rows, problems[0].known
     spread = UNKNOWN * float(np.linalg.norm(rows.target)) / np.maximum(np.linalg.norm(rows.baseline, axis=0), 1e-300)
     spread[known.places] = known.std
-    target = rows.target - rows.baseline[:, known.places] @ known.values
-    return Design(tuple(found), np.hstack(builder.columns), rows.baseline * spread, target)
+    values = np.zeros(len(spread))
+    values[known.places] = known.values
+    target = rows.target - rows.baseline @ values
+    return Design(tuple(found), np.hstack(builder.columns), rows.baseline * spread, target, values, spread)
 
 
 class _Builder:

@@ -1,14 +1,14 @@
 """Noise of the rows: what differs between repeats, and what a model may lack beside it.
 
-Rows of a block have the covariance R + q² t² C. R is that of the mean over the repeats, by what differs between them.
-t is what no model is expected to have right (`Block.tolerance`), a process that remembers, as slow as the motion or
-faster. Its size q is one unless the rows say otherwise: one number for all blocks of a step and a coordinate, the most
-likely beside the hypotheses that are taken. A q of more than one is a price, and says that something is lacking.
+Rows of a block have the covariance R + t² C. R is that of the mean over the repeats, by what differs between them;
+without any, that of what the baseline and the strongest candidates leave. t is what no model is expected to have right
+(`Block.tolerance`), a process that remembers, as slow as the motion or faster. Where the rows say so, more is lacking:
+q times as much as noise and tolerance are together, of the same memory. It is one q for all blocks of a step and a
+coordinate, the most likely beside the hypotheses that are taken; each next one has a price.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,14 +18,14 @@ from scipy import linalg
 
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Rows
-from ident.diagnosis.whitening import Colour, predictor_of
+from ident.diagnosis.whitening import Predictor, predictor_of
 
 Array = NDArray[np.float64]
 Sizes = tuple[int, ...]
 """Of what is lacking, by label: number among `SIZES`."""
 
-SIZES: Final = (1.0, 3.0, 10.0, 30.0, 100.0)
-"""Of what a model lacks, over what is tolerated."""
+SIZES: Final = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)
+"""Of what is lacking, over noise and tolerance."""
 
 PRICE: Final = 2.0
 """Log odds against the next of them: one in seven."""
@@ -55,17 +55,22 @@ class Colours:
         self.rows: Rows = regression.rows
         found: dict[str, list[int]] = {}
         self._places: list[slice] = []
-        self._noise: list[Array] = []
+        self._tolerated: list[Array] = []
         self._lacking: list[Array] = []
+        alone = regression.whitener(())
         for (block, kept), place in zip(self.rows.blocks, self.rows.block_slices, strict=True):
             if place.stop == place.start:
                 continue
             found.setdefault(f"{block.channel}/{block.label}", []).append(len(self._places))
-            colour = regression.repeats[self.rows.group[place.start]]
-            self._places.append(place)
-            self._noise.append(_covariance(colour, self.rows.run[place]))
+            group = int(self.rows.group[place.start])
+            colour = regression.repeats[group]
+            predictor = predictor_of(colour) if colour.count else alone.predictors[group]
+            noise = _covariance(predictor, self.rows.run[place])
             time = kept.samples[0] * block.sample_time
-            self._lacking.append(block.tolerance**2 * _remembering(np.abs(np.subtract.outer(time, time))))
+            memory = _remembering(np.abs(np.subtract.outer(time, time)))
+            self._places.append(place)
+            self._tolerated.append(noise + block.tolerance**2 * memory)
+            self._lacking.append(float(np.mean(np.diag(self._tolerated[-1]))) * memory)
         self.labels = tuple(found)
         self.blocks = tuple(tuple(numbers) for numbers in found.values())
         self._factors: dict[tuple[int, int], Array] = {}
@@ -94,20 +99,19 @@ class Colours:
             volume += float(np.sum(np.log(np.diag(factor))))
         return np.vstack(parts), volume
 
-    def weighted(self, label: int, size: int, series: Array) -> tuple[Array, float]:
-        """A series (n,) of all rows times the inverse of the covariance of a label, and its own white power."""
-        found, power = np.zeros(len(series)), 0.0
-        for number in self.blocks[label]:
-            place, factor = self._places[number], self._factor(number, size)
-            white = linalg.solve_triangular(factor, series[place], lower=True, check_finite=False)
-            found[place] = linalg.solve_triangular(factor, white, lower=True, trans="T", check_finite=False)
-            power += float(white @ white)
-        return found, power
+    def weighted(self, sizes: Sizes, values: Array) -> Array:
+        """Rows (n, k) times the inverse of their covariance."""
+        found = np.array(values, dtype=float)
+        for label, size in enumerate(sizes):
+            for number in self.blocks[label]:
+                place = self._places[number]
+                found[place] = linalg.cho_solve((self._factor(number, size), True), found[place], check_finite=False)
+        return found
 
     def _factor(self, number: int, size: int) -> Array:
         """(n, n) lower triangular, of the covariance of a block."""
         if (number, size) not in self._factors:
-            whole = self._noise[number] + SIZES[size] ** 2 * self._lacking[number]
+            whole = self._tolerated[number] + SIZES[size] ** 2 * self._lacking[number]
             whole += ROUNDING * np.trace(whole) / len(whole) * np.eye(len(whole))
             self._factors[number, size] = linalg.cholesky(whole, lower=True, check_finite=False)
         return self._factors[number, size]
@@ -142,18 +146,25 @@ def price_of(sizes: Sizes) -> float:
     return PRICE * sum(sizes)
 
 
-def most_likely(parts: Sequence[Sequence[tuple[Array, float]]], start: Sizes) -> Sizes:
+def most_likely(colours: Colours, columns: Array, target: Array, known: Array, start: Sizes) -> Sizes:
     """Sizes of what is lacking, by label, that are the most likely.
 
     One label after the other: what a coefficient is in one step holds in all.
 
     Args:
-        parts: of every label and size, products (k + 1, k + 1) of white columns whose coefficients have unit variance,
-            and of the target, the last; and half the log of the determinant of the noise.
+        colours: of the rows.
+        columns: (n, k) each with a coefficient of unit variance.
+        target: (n,).
+        known: (k + 1, k + 1) products of rows beside those of the records, the target last.
         start: sizes to begin with.
     """
+    whole = np.column_stack([columns, target])
+    parts: list[list[tuple[Array, float]]] = []
+    for label in range(len(colours.labels)):
+        made = [colours.of_label(label, size, whole) for size in range(len(SIZES))]
+        parts.append([(white.T @ white, volume) for white, volume in made])
     found = list(start)
-    products = np.sum([parts[label][size][0] for label, size in enumerate(found)], axis=0)
+    products = known + np.sum([parts[label][size][0] for label, size in enumerate(found)], axis=0)
     logs = -sum(parts[label][size][1] + PRICE * size for label, size in enumerate(found))
     best = logs + _log(products)
     for _ in range(ROUNDS):
@@ -185,12 +196,11 @@ def _remembering(distance: Array) -> Array:
     return np.asarray(np.mean([np.exp(-distance / memory) for memory in MEMORIES], axis=0))
 
 
-def _covariance(colour: Colour, runs: NDArray[np.int64]) -> Array:
-    """(n, n) of the noise of a block, by the autoregression of its colour; uninterrupted runs are independent."""
-    predictor, found = predictor_of(colour), np.zeros((len(runs), len(runs)))
+def _covariance(predictor: Predictor, runs: NDArray[np.int64]) -> Array:
+    """(n, n) of the noise of a block, by an autoregression; uninterrupted runs are independent."""
+    found = np.zeros((len(runs), len(runs)))
     for run in np.unique(runs):
         place = np.flatnonzero(runs == run)
-        white = predictor.apply(np.eye(len(place)))
-        back = linalg.solve_triangular(white, np.eye(len(place)), lower=True)
+        back = linalg.solve_triangular(predictor.apply(np.eye(len(place))), np.eye(len(place)), lower=True)
         found[np.ix_(place, place)] = back @ back.T
     return found

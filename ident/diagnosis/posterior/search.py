@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.posterior.bends import Bends, Bent
 from ident.diagnosis.posterior.evidence import Evidence, Member, Members, Products, Table, Target
-from ident.diagnosis.posterior.hypotheses import Design
-from ident.diagnosis.posterior.noise import SIZES, Colours, Sizes, most_likely, price_of
+from ident.diagnosis.posterior.hypotheses import Block, Design
+from ident.diagnosis.posterior.noise import Colours, Sizes, most_likely, price_of
 
 Array = NDArray[np.float64]
 
@@ -74,8 +74,9 @@ class State:
         return self.target.nothing + self.target.log_likelihood(self.members) + inside - price
 
     def table(self, hypothesis: int) -> Table:
-        """Evidence of a hypothesis beside the other members, what its own columns miss taken off as well."""
-        return self.target.table(hypothesis, self.target.beside(self.without(hypothesis)))
+        """Evidence of a member beside the others, by its slopes where it has them: those are of one block."""
+        only = self.members[hypothesis].block if hypothesis in self.bends else None
+        return self.target.table(hypothesis, self.target.beside(self.without(hypothesis)), only)
 
     def tables(self) -> dict[int, Table]:
         """Evidence of all other hypotheses beside the members, but of those that are the same as some of these."""
@@ -161,35 +162,24 @@ class Search:
 
     def _noise_beside(self, state: State) -> Sizes:
         """What is most likely lacking beside a set."""
-        width, hypotheses = self.design.baseline.shape[1], self.design.hypotheses
-        count = width + self.design.columns.shape[1]
-        turns = [np.eye(count + 1)[:, :width]]
+        hypotheses, columns, expected = self.design.hypotheses, [self.design.baseline], list[tuple[Array, Array]]()
+        end = self.design.baseline.shape[1]
         for index, one in state.members.items():
-            block = hypotheses[index].blocks[one.block]
-            turn = np.zeros((count + 1, block.factor.shape[1]))
-            turn[width + block.place.start : width + block.place.stop] = one.scale * block.factor
-            turns.append(turn)
-        turn = np.column_stack([*turns, np.eye(count + 1)[:, -1]])
-        missed = sum((bent.missed for bent in state.bends.values()), np.zeros(len(self.design.target)))
-        parts = [
-            [self._part(label, size, turn, missed) for size in range(len(SIZES))]
-            for label in range(len(self.colours.labels))
-        ]
-        expected = sum((_expected(bent, turn[width:]) for bent in state.bends.values()), np.zeros((turn.shape[1],) * 2))
-        return most_likely([*parts, [(expected, 0.0)]], (*state.evidence.sizes, 0))[:-1]
-
-    def _part(self, label: int, size: int, turn: Array, missed: Array) -> tuple[Array, float]:
-        """Products (k + 1, k + 1) of some combinations of columns, what is missed taken off the target."""
-        products, volume = self._products.of(label, size)
-        rows = np.flatnonzero(turn.any(axis=1))
-        found = turn[rows].T @ products[np.ix_(rows, rows)] @ turn[rows]
-        if missed.any():
-            along, power = self._products.missing(label, size, missed)
-            turned = turn.T @ along
-            found[:, -1] -= turned
-            found[-1, :] -= turned
-            found[-1, -1] += power
-        return found, volume
+            block, bent = hypotheses[index].blocks[one.block], state.bends.get(index)
+            factor = one.scale * block.factor
+            columns.append((self.design.columns[:, block.place] if bent is None else bent.slopes) @ factor)
+            if bent is not None:
+                slopes, target = bent.expected
+                rows = np.zeros((len(target), end + factor.shape[1]))
+                rows[:, end:] = slopes @ factor
+                expected.append((rows, target))
+            end += factor.shape[1]
+        known = np.zeros((end + 1, end + 1))
+        for rows, target in expected:
+            whole = np.column_stack([np.pad(rows, ((0, 0), (0, end - rows.shape[1]))), target])
+            known += whole.T @ whole
+        target = self.design.target - sum((bent.missed for bent in state.bends.values()), np.zeros(len(columns[0])))
+        return most_likely(self.colours, np.hstack(columns), target, known, state.evidence.sizes)
 
     def _settled(self, state: State) -> State:
         """With the numbers of every member chosen anew, each beside the others, and what its columns miss."""
@@ -209,12 +199,29 @@ class Search:
     def _bent(self, state: State) -> State:
         """With what the columns of its members miss."""
         means, hypotheses = state.target.means(state.members), self.design.hypotheses
-        found = {
-            index: self.bends.bend(hypotheses[index], hypotheses[index].blocks[one.block], means[index])
-            for index, one in state.members.items()
-            if self.bends.is_bent(hypotheses[index], hypotheses[index].blocks[one.block])
-        }
-        return replace(state, bends=found) if found else state
+        blocks = {index: hypotheses[index].blocks[one.block] for index, one in state.members.items()}
+        if not any(self.bends.is_bent(hypotheses[index], block) for index, block in blocks.items()):
+            return state
+        parameters = state.evidence.parameters(self._added(state, blocks, means))
+        return replace(
+            state,
+            bends={
+                index: self.bends.bend(hypotheses[index], block, means[index], parameters)
+                for index, block in blocks.items()
+                if self.bends.is_bent(hypotheses[index], block)
+            },
+        )
+
+    def _added(self, state: State, blocks: Mapping[int, Block], means: Mapping[int, Array]) -> Array:
+        """(n,) what the members add."""
+        found = np.zeros(len(self.design.target))
+        for index, block in blocks.items():
+            bent = state.bends.get(index)
+            if bent is None:
+                found += self.design.columns[:, block.place] @ means[index]
+            else:
+                found += bent.slopes @ means[index] + bent.missed
+        return found
 
     def _expanded(self, state: State, *, named: bool = False) -> Sequence[State]:
         """Sets with one member more, of those that promise most; or of those alone that have a name."""
@@ -265,10 +272,3 @@ class Search:
                     state = instead
                     break
         return state
-
-
-def _expected(bent: Bent, turn: Array) -> Array:
-    """Products (k + 1, k + 1) of the rows of what is expected of a member, by what turns columns into combinations."""
-    slopes, target = bent.expected
-    rows = np.column_stack([slopes @ turn[bent.place][:, :-1], target])
-    return np.asarray(rows.T @ rows)

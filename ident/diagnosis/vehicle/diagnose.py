@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ident.diagnosis.diagnosis import Diagnosis
 from ident.diagnosis.findings import Findings
-from ident.diagnosis.judge import judge
+from ident.diagnosis.judge import Judge, judge
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.split import split_problem
@@ -28,13 +28,6 @@ from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 UNSTATED_STD: Final = 1e-3
 """Standard deviation of a model's value that comes without one, relative to the value."""
-
-
-class Judge(Protocol):
-    """What finds the causes of a gap."""
-
-    def __call__(self, fit: Problem, confirm: Problem, *, seed: int, stage: Stage) -> Findings:
-        """The causes, by records to fit and to confirm."""
 
 
 @dataclass(frozen=True)
