@@ -41,6 +41,9 @@ DOUBTED: Final = 0.5
 EXACT: Final = 0.01
 """Share of the held-out gap that a member must close beside others, whose columns are exact to about as much."""
 
+ACCIDENT: Final = 0.1
+"""Power of a held-out gap, over that of its noise, that may be an accident of it."""
+
 SIZED: Final = 2.0
 """Standard deviations that a size is from zero, at least."""
 
@@ -66,7 +69,7 @@ def judge_by_posterior(
     stage(f"comparing {len(fit.candidates)} causes and {len(fit.dependences)} laws")
     colours, designs = Colours(regression), Designs(problems, regression.rows)
     design = make_design(problems, regression, colours, designs)
-    search = Search(design, colours, Bends(problems, regression.rows))
+    search = Search(design, colours, Bends(problems, colours))
     state = search.run()
     stage("numbers of the answer")
     answer = _Answer(problems, regression, designs, search, state, seed)
@@ -130,6 +133,10 @@ class _Answer:
                 return frozenset(members) - {members[least]}
         return frozenset(members)
 
+    def _measurable(self) -> bool:
+        """Whether the held-out gap that causes could close is more than an accident of the noise."""
+        return self.fitted.removable > ACCIDENT * self.fitted.whole.floor**2
+
     def _has_size(self, place: int) -> bool:
         """Whether a size is surely not zero."""
         part = self.fitted.after.parts[place]
@@ -183,7 +190,8 @@ class _Answer:
             probability=slot.probability(hypotheses),
             log_evidence=slot.logs[index],
             log_predictive=math.nan,
-            closed=self.fitted.lacking[place],
+            # Nothing is said to widen a gap within the accidents of its noise.
+            closed=max(self.fitted.lacking[place], -math.inf if self._measurable() else 0.0),
             needed=self.fitted.closed[place],
             biased=self.fitted.biased(place),
             curve=Curve.ITS_OWN,

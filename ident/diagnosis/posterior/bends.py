@@ -14,13 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.posterior.hypotheses import Block, Hypothesis
+from ident.diagnosis.posterior.noise import Colours
 from ident.diagnosis.problem import Candidate, Problem
-from ident.diagnosis.rows import Rows
 
 Array = NDArray[np.float64]
 
+NEGLIGIBLE: Final = 0.1
+"""Sum of squares, in units of the noise, that columns may miss."""
+
 STEP: Final = 1e-4
 """Of a coefficient, for a slope."""
+
+NEAR: Final = 0.1
+"""Change of the coefficients, over the largest of them, for which slopes are held."""
 
 SAME: Final = 0.01
 """Of coefficients, in units of the noise of a row, that change nothing."""
@@ -51,11 +57,12 @@ class Bends:
 
     Args:
         problems: to fit and to confirm.
-        rows: of them.
+        colours: of the noise of their rows.
     """
 
-    def __init__(self, problems: Sequence[Problem], rows: Rows) -> None:
-        self.problems, self.rows = problems, rows
+    def __init__(self, problems: Sequence[Problem], colours: Colours) -> None:
+        self.problems, self.colours, self.rows = problems, colours, colours.rows
+        self._straight: dict[tuple[str, int], float] = {}
         self._kept: dict[tuple[str, int], Bent] = {}
 
     def is_bent(self, hypothesis: Hypothesis, block: Block) -> bool:
@@ -65,8 +72,10 @@ class Bends:
         candidate = self.problems[0].candidates[hypothesis.candidate]
         return candidate.contribution is not None and candidate.variants[block.column.variant].bent
 
-    def bend(self, hypothesis: Hypothesis, block: Block, coefficients: Array, parameters: Array) -> Bent:
-        """About some coefficients; the last answer, where they are those but for `SAME`.
+    def bend(self, hypothesis: Hypothesis, block: Block, coefficients: Array, parameters: Array) -> Bent | None:
+        """About some coefficients; None where the columns miss nothing that counts.
+
+        The last answer, where the coefficients are those but for `SAME`.
 
         Args:
             hypothesis: one that is bent.
@@ -75,7 +84,9 @@ class Bends:
             parameters: (p,) of the plant beside it.
         """
         key = hypothesis.key, block.place.start
-        kept = self._kept.get(key)
+        kept, size = self._kept.get(key), float(np.abs(coefficients).max())
+        if size <= self._straight.get(key, 0.0):
+            return None
         if kept is not None and np.abs(kept.about - coefficients).max() < SAME:
             return kept
         assert hypothesis.candidate is not None
@@ -89,15 +100,29 @@ class Bends:
             return self.rows.stack(series)
 
         here = added(coefficients)
-        slopes = np.empty((len(here), len(coefficients)))
-        for place, step in enumerate(STEP * np.maximum(np.abs(coefficients), 1.0)):
-            ahead = coefficients.copy()
-            ahead[place] += step
-            slopes[:, place] = (added(ahead) - here) / step
         expected = self._expected(candidates[0], block, coefficients)
+        if not len(expected[1]) and self._power(here - self._columns(block) @ _raw(block, coefficients)) < NEGLIGIBLE:
+            self._straight[key] = size
+            return None
+        if kept is not None and np.abs(kept.about - coefficients).max() < NEAR * size:
+            slopes = kept.slopes
+        else:
+            slopes = np.empty((len(here), len(coefficients)))
+            for place, step in enumerate(STEP * np.maximum(np.abs(coefficients), 1.0)):
+                ahead = coefficients.copy()
+                ahead[place] += step
+                slopes[:, place] = (added(ahead) - here) / step
         found = Bent(block.place, coefficients, slopes, here - slopes @ coefficients, expected)
         self._kept[key] = found
         return found
+
+    def _columns(self, block: Block) -> Array:
+        assert block.column is not None
+        return self.rows.columns[:, block.column.place]
+
+    def _power(self, series: Array) -> float:
+        """Sum of squares of a series (n,), in units of the noise."""
+        return float(np.sum(self.colours.white(series[:, None], self.colours.usual)[0] ** 2))
 
     def _numbers(self, candidate: Candidate, block: Block, coefficients: Array) -> Array:
         assert block.column is not None

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -18,7 +18,7 @@ from scipy import linalg
 from scipy.special import logsumexp
 
 from ident.diagnosis.posterior.bends import Bent
-from ident.diagnosis.posterior.hypotheses import Block, Design, Hypothesis
+from ident.diagnosis.posterior.hypotheses import Block, Design
 from ident.diagnosis.posterior.noise import Colours, Noise, Sizes
 
 Array = NDArray[np.float64]
@@ -182,14 +182,16 @@ class Target:
     products: Array
     nothing: float
 
-    def beside(self, members: Members) -> Array:
-        """The products, members integrated."""
+    def beside(self, members: Members, columns: NDArray[np.int64] | None = None) -> Array:
+        """The products of columns, of all or of some, and of the target, members integrated."""
+        chosen = np.arange(len(self.products)) if columns is None else np.append(columns, len(self.products) - 1)
+        found = self.products if columns is None else self.products[np.ix_(chosen, chosen)]
         if not members:
-            return self.products
+            return found
         own, rows = self._stacked(members)
         inner = np.eye(own.shape[1]) + own.T @ self.products[np.ix_(rows, rows)] @ own
-        across = self.products[:, rows] @ own
-        return np.asarray(self.products - across @ linalg.solve(inner, across.T, assume_a="pos"))
+        across = self.products[np.ix_(chosen, rows)] @ own
+        return np.asarray(found - across @ linalg.solve(inner, across.T, assume_a="pos"))
 
     def log_likelihood(self, members: Members) -> float:
         """With members of these numbers, against none."""
@@ -211,11 +213,21 @@ class Target:
         mean[rows] = own @ linalg.solve(inner, own.T @ self.products[rows, -1], assume_a="pos")
         return {index: mean[self._block(index, one).place] for index, one in members.items()}
 
-    def table(self, hypothesis: int, products: Array, only: int | None = None) -> Table:
-        """Log evidence of a hypothesis, or of one of its blocks alone, by products beside the others."""
-        every = self.evidence.design.hypotheses[hypothesis].blocks
-        numbers = range(len(every)) if only is None else (only,)
-        blocks = [every[number] for number in numbers]
+    def table_of(self, hypothesis: int, others: Members, only: int | None = None) -> Table:
+        """Log evidence of a hypothesis, or of one of its blocks alone, beside others."""
+        blocks = self.evidence.design.hypotheses[hypothesis].blocks
+        used = blocks if only is None else (blocks[only],)
+        columns = np.unique(np.concatenate([np.arange(one.place.start, one.place.stop) for one in used]))
+        products = self.beside(others, columns)
+        moved = [replace(one, place=_among(columns, one.place)) for one in used]
+        return self._table(moved, products, range(len(blocks)) if only is None else (only,))
+
+    def table(self, hypothesis: int, products: Array) -> Table:
+        """The same, by the products of all columns beside the others."""
+        blocks = self.evidence.design.hypotheses[hypothesis].blocks
+        return self._table(blocks, products, range(len(blocks)))
+
+    def _table(self, blocks: Sequence[Block], products: Array, numbers: Sequence[int]) -> Table:
         masses = np.array([self._mass(block) for block in blocks])
         logs = np.stack([self._logs(block, products) for block in blocks])
         return Table(self.evidence.scales, logs + masses[:, None], masses, numbers)
@@ -257,13 +269,14 @@ class Target:
         return np.hstack(parts), columns
 
 
+def _among(columns: NDArray[np.int64], place: slice) -> slice:
+    """Where columns stand among some, that hold them side by side."""
+    first = int(np.searchsorted(columns, place.start))
+    return slice(first, first + place.stop - place.start)
+
+
 def _is_refused(block: Block, power: float, amplitude: float) -> bool:
     """Whether a single coefficient is what the hypothesis is not: of the other sign, or too small to mean it."""
     size = amplitude / max(power, np.finfo(float).tiny) / float(block.sizes[0])
     negative, positive = block.negligible
     return size <= block.least or -negative <= size < 0 or 0 < size <= positive
-
-
-def named(hypotheses: Sequence[Hypothesis]) -> list[int]:
-    """Numbers of those that have a name."""
-    return [number for number, one in enumerate(hypotheses) if not one.free]

@@ -76,7 +76,7 @@ class State:
     def table(self, hypothesis: int) -> Table:
         """Evidence of a member beside the others, by its slopes where it has them: those are of one block."""
         only = self.members[hypothesis].block if hypothesis in self.bends else None
-        return self.target.table(hypothesis, self.target.beside(self.without(hypothesis)), only)
+        return self.target.table_of(hypothesis, self.without(hypothesis), only)
 
     def tables(self) -> dict[int, Table]:
         """Evidence of all other hypotheses beside the members, but of those that are the same as some of these."""
@@ -203,14 +203,12 @@ class Search:
         if not any(self.bends.is_bent(hypotheses[index], block) for index, block in blocks.items()):
             return state
         parameters = state.evidence.parameters(self._added(state, blocks, means))
-        return replace(
-            state,
-            bends={
-                index: self.bends.bend(hypotheses[index], block, means[index], parameters)
-                for index, block in blocks.items()
-                if self.bends.is_bent(hypotheses[index], block)
-            },
-        )
+        found = {
+            index: self.bends.bend(hypotheses[index], block, means[index], parameters)
+            for index, block in blocks.items()
+            if self.bends.is_bent(hypotheses[index], block)
+        }
+        return replace(state, bends={index: bent for index, bent in found.items() if bent is not None})
 
     def _added(self, state: State, blocks: Mapping[int, Block], means: Mapping[int, Array]) -> Array:
         """(n,) what the members add."""
