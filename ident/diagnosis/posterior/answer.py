@@ -41,7 +41,7 @@ DOUBTED: Final = 0.5
 EXACT: Final = 0.01
 """Share of the held-out gap that a member must close beside others, whose columns are exact to about as much."""
 
-ACCIDENT: Final = 0.1
+ACCIDENT: Final = 0.05
 """Power of a held-out gap, over that of its noise, that may be an accident of it."""
 
 SIZED: Final = 2.0
