@@ -19,10 +19,11 @@ from ident.diagnosis.law.learning import Designs, Learner
 from ident.diagnosis.law.neighbours import channel_of
 from ident.diagnosis.law.reach import told_samples
 from ident.diagnosis.law.stage import SAME, Law, with_law
+from ident.diagnosis.limits import Limits
 from ident.diagnosis.orders import with_orders
 from ident.diagnosis.posterior.bends import Bends
 from ident.diagnosis.posterior.hypotheses import Design, make_design
-from ident.diagnosis.posterior.noise import Colours
+from ident.diagnosis.posterior.noise import SIZES, Colours
 from ident.diagnosis.posterior.search import Search, State
 from ident.diagnosis.posterior.slots import Slot, slot_of
 from ident.diagnosis.problem import Problem
@@ -41,8 +42,11 @@ DOUBTED: Final = 0.5
 EXACT: Final = 0.01
 """Share of the held-out gap that a member must close beside others, whose columns are exact to about as much."""
 
-ACCIDENT: Final = 0.05
-"""Power of a held-out gap, over that of its noise, that may be an accident of it."""
+LIMITS: Final = Limits()
+"""What is much of a held-out gap, and what is an accident of its noise."""
+
+MISTAKEN: Final = 1.0
+"""What is lacking, over noise and tolerance, that may be a mistake in those."""
 
 SIZED: Final = 2.0
 """Standard deviations that a size is from zero, at least."""
@@ -127,15 +131,19 @@ class _Answer:
         if sizeless:
             return frozenset(members) - {sizeless[-1]}
         if len(members) > 1:
-            closed = self.fitted.lacking
-            least = min(range(len(members)), key=lambda place: closed[place])
-            if closed[least] < EXACT:
+            trifles = [place for place in range(len(members)) if not self._pays(place)]
+            if trifles:
+                least = min(trifles, key=lambda place: self.fitted.lacking[place])
                 return frozenset(members) - {members[least]}
         return frozenset(members)
 
+    def _pays(self, place: int) -> bool:
+        """Whether a member closes what its columns are exact to, or much of what a greater one leaves."""
+        return self.fitted.lacking[place] >= EXACT or self.fitted.gain(place, LIMITS.blur) >= LIMITS.name
+
     def _measurable(self) -> bool:
         """Whether the held-out gap that causes could close is more than an accident of the noise."""
-        return self.fitted.removable > ACCIDENT * self.fitted.whole.floor**2
+        return self.fitted.removable > LIMITS.measurable * self.fitted.whole.floor**2
 
     def _has_size(self, place: int) -> bool:
         """Whether a size is surely not zero."""
@@ -147,7 +155,7 @@ class _Answer:
         fitted, regression = self.fitted, self.taken.regression
         causes = ordered([self._cause(place, index) for place, index in enumerate(self.taken.variants)])
         verdict = self._verdict()
-        lasting = any(self.state.evidence.sizes)
+        lasting = self._lacking()
         return Findings(
             verdict=verdict,
             causes=causes,
@@ -167,8 +175,12 @@ class _Answer:
             held_out=fitted.held_out(),
         )
 
+    def _lacking(self) -> bool:
+        """Whether more is lacking somewhere than noise and tolerance that are not known exactly."""
+        return any(SIZES[size] > MISTAKEN for size in self.state.evidence.sizes)
+
     def _verdict(self) -> Verdict:
-        lacking = any(self.state.evidence.sizes)
+        lacking = self._lacking()
         if not self.taken.variants:
             return Verdict.UNKNOWN if lacking else Verdict.NONE
         if lacking and self.fitted.exactly.closed < 1 - OPEN:

@@ -1,12 +1,14 @@
 """Hypotheses that are not linear in their size, about the numbers that were found: columns stand near zero.
 
-With coefficients a of its columns, an effect of the numbers that a stands for adds f(a). About some a₀ that is
-f(a₀) - J a₀, which is taken off the target, and J a: the slope J takes the place of the columns (Gauss and Newton).
+With coefficients a of its columns, an effect of the numbers that a and h stand for adds f(a, h): h are those that every
+column is made for, the rate at which a friction falls off, the order of a ripple. About some a₀ that is f(a₀) - J a₀,
+which is taken off the target, and J a: the slope J takes the place of the columns (Gauss and Newton). h is moved to
+where the rows want it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.posterior.hypotheses import Block, Hypothesis
 from ident.diagnosis.posterior.noise import Colours
 from ident.diagnosis.problem import Candidate, Problem
+from ident.diagnosis.rows import Rows
 
 Array = NDArray[np.float64]
 
@@ -34,11 +37,12 @@ SAME: Final = 0.01
 
 @dataclass(frozen=True)
 class Bent:
-    """A hypothesis about some coefficients.
+    """A hypothesis about some numbers.
 
     Attributes:
         place: of its columns among all.
         about: (K,) the coefficients.
+        held: (H,) the numbers that columns are made for.
         slopes: (n, K) that take the place of the columns.
         missed: (n,) what these miss of it.
         expected: (m, K) and (m,) rows beside those of the records, in standard deviations: what physics expects of
@@ -47,6 +51,7 @@ class Bent:
 
     place: slice
     about: Array
+    held: Array
     slopes: Array
     missed: Array
     expected: tuple[Array, Array]
@@ -61,7 +66,7 @@ class Bends:
     """
 
     def __init__(self, problems: Sequence[Problem], colours: Colours) -> None:
-        self.problems, self.colours, self.rows = problems, colours, colours.rows
+        self.problems, self.colours = problems, colours
         self._straight: dict[tuple[str, int], float] = {}
         self._kept: dict[tuple[str, int], Bent] = {}
 
@@ -72,80 +77,142 @@ class Bends:
         candidate = self.problems[0].candidates[hypothesis.candidate]
         return candidate.contribution is not None and candidate.variants[block.column.variant].bent
 
-    def bend(self, hypothesis: Hypothesis, block: Block, coefficients: Array, parameters: Array) -> Bent | None:
-        """About some coefficients; None where the columns miss nothing that counts.
-
-        The last answer, where the coefficients are those but for `SAME`.
-
-        Args:
-            hypothesis: one that is bent.
-            block: of it.
-            coefficients: (K,) of its columns, of unit rms.
-            parameters: (p,) of the plant beside it.
-        """
-        key = hypothesis.key, block.place.start
-        kept, size = self._kept.get(key), float(np.abs(coefficients).max())
-        if size <= self._straight.get(key, 0.0):
-            return None
-        if kept is not None and np.abs(kept.about - coefficients).max() < SAME:
-            return kept
+    def form(self, hypothesis: Hypothesis, block: Block, parameters: Array) -> Form:
+        """A hypothesis that is bent, beside some parameters (p,) of the plant."""
         assert hypothesis.candidate is not None
         candidates = [problem.candidates[hypothesis.candidate] for problem in self.problems]
+        return Form(hypothesis.key, candidates, block, self.colours.rows, parameters)
 
-        def added(values: Array) -> Array:
-            numbers, series = self._numbers(candidates[0], block, values), list[Array | None]()
-            for candidate in candidates:
-                assert candidate.contribution is not None
-                series += candidate.contribution(numbers, parameters)
-            return self.rows.stack(series)
+    def bend(self, form: Form, coefficients: Array, held: Array | None) -> Bent | None:
+        """About some coefficients (K,) and held numbers (H,), or those of the columns; None where these miss nothing.
 
-        here = added(coefficients)
-        expected = self._expected(candidates[0], block, coefficients)
-        if not len(expected[1]) and self._power(here - self._columns(block) @ _raw(block, coefficients)) < NEGLIGIBLE:
+        The last answer, where the coefficients are those but for `SAME`.
+        """
+        key, size = form.key, float(np.abs(coefficients).max())
+        kept = self._kept.get(key)
+        if held is None and size <= self._straight.get(key, 0.0):
+            return None
+        numbers = form.held(coefficients) if held is None else held
+        alike = kept is not None and np.array_equal(kept.held, numbers)
+        if kept is not None and alike and np.abs(kept.about - coefficients).max() < SAME:
+            return kept
+        here, expected = form.added(coefficients, numbers), form.expected_about(coefficients, numbers)
+        if held is None and not len(expected[1]) and self._power(here - form.by_columns(coefficients)) < NEGLIGIBLE:
             self._straight[key] = size
             return None
-        if kept is not None and np.abs(kept.about - coefficients).max() < NEAR * size:
+        if kept is not None and alike and np.abs(kept.about - coefficients).max() < NEAR * size:
             slopes = kept.slopes
         else:
-            slopes = np.empty((len(here), len(coefficients)))
-            for place, step in enumerate(STEP * np.maximum(np.abs(coefficients), 1.0)):
-                ahead = coefficients.copy()
-                ahead[place] += step
-                slopes[:, place] = (added(ahead) - here) / step
-        found = Bent(block.place, coefficients, slopes, here - slopes @ coefficients, expected)
+            slopes = form.slopes(coefficients, numbers, here)
+        found = Bent(form.block.place, coefficients, numbers, slopes, here - slopes @ coefficients, expected)
         self._kept[key] = found
         return found
-
-    def _columns(self, block: Block) -> Array:
-        assert block.column is not None
-        return self.rows.columns[:, block.column.place]
 
     def _power(self, series: Array) -> float:
         """Sum of squares of a series (n,), in units of the noise."""
         return float(np.sum(self.colours.white(series[:, None], self.colours.usual)[0] ** 2))
 
-    def _numbers(self, candidate: Candidate, block: Block, coefficients: Array) -> Array:
-        assert block.column is not None
-        raw, start = _raw(block, coefficients), candidate.variants[block.column.variant].start
-        return raw if start is None else np.asarray(start(raw), dtype=float)
 
-    def _expected(self, candidate: Candidate, block: Block, coefficients: Array) -> tuple[Array, Array]:
-        """Rows of what is expected, about some coefficients."""
-        expected = candidate.expected
-        if expected is None:
-            return np.zeros((0, len(coefficients))), np.zeros(0)
-        here = expected(self._numbers(candidate, block, coefficients))
-        slopes = np.zeros((len(here), len(coefficients)))
-        for place, step in enumerate(STEP * np.maximum(np.abs(coefficients), 1.0)):
-            ahead = coefficients.copy()
-            ahead[place] += step
-            slopes[:, place] = (expected(self._numbers(candidate, block, ahead)) - here) / step
+@dataclass(frozen=True)
+class Form:
+    """One hypothesis as it is.
+
+    Attributes:
+        name: its key.
+        candidates: it in the problems to fit and to confirm.
+        block: its columns.
+        rows: of the problems.
+        parameters: (p,) of the plant beside it.
+    """
+
+    name: str
+    candidates: Sequence[Candidate]
+    block: Block
+    rows: Rows
+    parameters: Array
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Unique among all blocks."""
+        return self.name, self.block.place.start
+
+    def by_columns(self, coefficients: Array) -> Array:
+        """(n,) what its columns add."""
+        assert self.block.column is not None
+        return np.asarray(self.rows.columns[:, self.block.column.place] @ self._raw(coefficients))
+
+    def added(self, coefficients: Array, held: Array) -> Array:
+        """(n,) what it adds."""
+        numbers, series = self._numbers(coefficients, held), list[Array | None]()
+        for candidate in self.candidates:
+            assert candidate.contribution is not None
+            series += candidate.contribution(numbers, self.parameters)
+        return self.rows.stack(series)
+
+    def slopes(self, coefficients: Array, held: Array, here: Array) -> Array:
+        """(n, K) over the coefficients, `here` being what it adds."""
+        steps = STEP * np.maximum(np.abs(coefficients), 1.0)
+        return _slopes(lambda values: self.added(values, held), coefficients, here, steps)
+
+    def held_slopes(self, bent: Bent) -> Array:
+        """(n, H) over the held numbers."""
+        here, steps = bent.missed + bent.slopes @ bent.about, STEP * np.maximum(np.abs(bent.held), STEP)
+        return _slopes(lambda values: self.added(bent.about, values), bent.held, here, steps)
+
+    def expected_about(self, coefficients: Array, held: Array) -> tuple[Array, Array]:
+        """Rows of what is expected of its numbers, over the coefficients."""
+        here = self._expected(coefficients, held)
+        steps = STEP * np.maximum(np.abs(coefficients), 1.0)
+        slopes = _slopes(lambda values: self._expected(values, held), coefficients, here, steps)
         return slopes, slopes @ coefficients - here
 
+    def expected_of_held(self, bent: Bent) -> Array:
+        """(m, H) the same rows over the held numbers."""
+        here, steps = self._expected(bent.about, bent.held), STEP * np.maximum(np.abs(bent.held), STEP)
+        return _slopes(lambda values: self._expected(bent.about, values), bent.held, here, steps)
 
-def _raw(block: Block, coefficients: Array) -> Array:
-    """Coefficients of all columns of a variant, as the rows have them."""
-    assert block.column is not None
-    found = np.zeros(block.column.width)
-    found[block.kept] = coefficients / block.sizes
+    def held(self, coefficients: Array) -> Array:
+        """(H,) numbers that the coefficients say nothing of, as the columns are made for."""
+        return self._started(coefficients)[self._is_held]
+
+    @property
+    def _is_held(self) -> NDArray[np.bool_]:
+        """(M,) which numbers the coefficients say nothing of; nothing that comes along with the parameters is held."""
+        ones = np.ones(len(self.block.sizes))
+        here, parts = self._started(ones), range(len(ones))
+        moved = [self._started(ones + np.eye(len(ones))[part]) != here for part in parts]
+        found = ~np.logical_or.reduce(moved)
+        found[len(self.candidates[0].parameters) :] = False
+        return np.asarray(found)
+
+    def _numbers(self, coefficients: Array, held: Array) -> Array:
+        found = self._started(coefficients)
+        if held.size:
+            found[self._is_held] = held
+        return found
+
+    def _started(self, coefficients: Array) -> Array:
+        assert self.block.column is not None
+        raw, start = self._raw(coefficients), self.candidates[0].variants[self.block.column.variant].start
+        return raw if start is None else np.array(start(raw), dtype=float)
+
+    def _raw(self, coefficients: Array) -> Array:
+        """Coefficients of all columns of the variant, as the rows have them."""
+        assert self.block.column is not None
+        found = np.zeros(self.block.column.width)
+        found[self.block.kept] = coefficients / self.block.sizes
+        return found
+
+    def _expected(self, coefficients: Array, held: Array) -> Array:
+        expected = self.candidates[0].expected
+        return np.zeros(0) if expected is None else expected(self._numbers(coefficients, held))
+
+
+def _slopes(function: Callable[[Array], Array], about: Array, here: Array, steps: Array) -> Array:
+    """(n, k) by differences."""
+    found = np.empty((len(here), len(about)))
+    for place, step in enumerate(steps.tolist()):
+        ahead = about.copy()
+        ahead[place] += step
+        found[:, place] = (function(ahead) - here) / step
     return found

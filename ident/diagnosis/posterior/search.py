@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.posterior.bends import Bends, Bent
+from ident.diagnosis.posterior.bends import Bends, Bent, Form
 from ident.diagnosis.posterior.evidence import Evidence, Member, Members, Products, Table, Target
 from ident.diagnosis.posterior.hypotheses import Block, Design
 from ident.diagnosis.posterior.noise import Colours, Sizes, most_likely, price_of
@@ -32,6 +32,12 @@ INSTEAD: Final = 2
 
 SURVIVORS: Final = 5
 """Hypotheses that are fitted exactly at every step."""
+
+TELLING: Final = 5.0
+"""Standard deviations of a coefficient from which numbers that its column was made for are moved."""
+
+FURTHEST: Final = 0.3
+"""Share of a held number that it is moved by at once."""
 
 DISTINCT: Final = 0.02
 """Power of a column that must be left beside the members: columns are exact to about a hundredth."""
@@ -167,7 +173,7 @@ class Search:
         for index, one in state.members.items():
             block, bent = hypotheses[index].blocks[one.block], state.bends.get(index)
             factor = one.scale * block.factor
-            columns.append((self.design.columns[:, block.place] if bent is None else bent.slopes) @ factor)
+            columns.append(self._columns(state, index, one))
             if bent is not None:
                 slopes, target = bent.expected
                 rows = np.zeros((len(target), end + factor.shape[1]))
@@ -197,18 +203,64 @@ class Search:
         return state
 
     def _bent(self, state: State) -> State:
-        """With what the columns of its members miss."""
+        """With the exact forms of its members, about the numbers that they have."""
         means, hypotheses = state.target.means(state.members), self.design.hypotheses
         blocks = {index: hypotheses[index].blocks[one.block] for index, one in state.members.items()}
         if not any(self.bends.is_bent(hypotheses[index], block) for index, block in blocks.items()):
             return state
         parameters = state.evidence.parameters(self._added(state, blocks, means))
-        found = {
-            index: self.bends.bend(hypotheses[index], block, means[index], parameters)
+        forms = {
+            index: self.bends.form(hypotheses[index], block, parameters)
             for index, block in blocks.items()
             if self.bends.is_bent(hypotheses[index], block)
         }
-        return replace(state, bends={index: bent for index, bent in found.items() if bent is not None})
+        before = {index: state.bends[index].held if index in state.bends else None for index in forms}
+        found = {index: self.bends.bend(form, means[index], before[index]) for index, form in forms.items()}
+        state = replace(state, bends={index: bent for index, bent in found.items() if bent is not None})
+        for index, form in forms.items():
+            if float(np.abs(means[index]).max()) > self._telling:
+                state = self._moved(state, index, form, means[index])
+        return state
+
+    @property
+    def _telling(self) -> float:
+        """Coefficient of a column of unit rms from which held numbers show: they turn a tenth of it."""
+        return TELLING / math.sqrt(len(self.design.target))
+
+    def _moved(self, state: State, index: int, form: Form, mean: Array) -> State:
+        """With the held numbers of a member moved to where the rows want them, if that is better."""
+        bent = state.bends.get(index) or self.bends.bend(form, mean, form.held(mean))
+        if bent is None or not bent.held.size:
+            return state
+        others = {one: member for one, member in state.members.items() if one != index}
+        step = self._step(replace(state, bends={**state.bends, index: bent}), others, form, bent)
+        moved = self.bends.bend(form, mean, bent.held + step)
+        better = state if moved is None else replace(state, bends={**state.bends, index: moved})
+        return max(state, better, key=lambda one: one.log_posterior)
+
+    def _step(self, state: State, others: Members, form: Form, bent: Bent) -> Array:
+        """(H,) of the held numbers of a member, everything else fitted beside."""
+        free, expected = form.held_slopes(bent), form.expected_of_held(bent)
+        columns = [self.design.baseline, *(self._columns(state, index, one) for index, one in others.items())]
+        missed = sum((one.missed for one in state.bends.values()), np.zeros(len(free)))
+        whole = np.column_stack([*columns, bent.slopes, free, self.design.target - missed])
+        white, _ = self.colours.white(whole, state.evidence.sizes)
+        width, size = sum(one.shape[1] for one in columns), np.linalg.norm(white[:, -1 - free.shape[1] : -1], axis=0)
+        scale = np.concatenate([np.ones(white.shape[1] - 1 - len(size)), 1 / np.maximum(size, np.finfo(float).tiny)])
+        own = np.zeros((len(bent.expected[1]), len(scale)))
+        own[:, width : width + bent.slopes.shape[1]], own[:, -len(size) :] = bent.expected[0], expected
+        ridge = np.eye(len(scale))[:width]
+        rows = np.vstack([white[:, :-1] * scale, own * scale, ridge])
+        target = np.concatenate([white[:, -1], bent.expected[1], np.zeros(width)])
+        found = np.linalg.lstsq(rows, target, rcond=None)[0] * scale
+        most = FURTHEST * np.maximum(np.abs(bent.held), FURTHEST)
+        return np.asarray(np.clip(found[-len(size) :], -most, most))
+
+    def _columns(self, state: State, index: int, member: Member) -> Array:
+        """(n, R) of a member, of unit variance."""
+        block, bent = self.design.hypotheses[index].blocks[member.block], state.bends.get(index)
+        columns = self.design.columns[:, block.place] if bent is None else bent.slopes
+        return np.asarray(columns @ (member.scale * block.factor))
 
     def _added(self, state: State, blocks: Mapping[int, Block], means: Mapping[int, Array]) -> Array:
         """(n,) what the members add."""

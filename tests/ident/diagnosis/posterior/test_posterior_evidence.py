@@ -1,0 +1,116 @@
+"""The evidence is that of Gaussian rows, by a dense covariance; noise and exact forms are found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import stats
+
+from ident.diagnosis.posterior.evidence import Evidence, Member
+from ident.diagnosis.posterior.noise import SIZES
+from ident.diagnosis.problem import Problem, Variant
+
+Array = NDArray[np.float64]
+Asked = Callable[[Problem, Problem], Any]
+
+
+@pytest.fixture
+def problems(world: Callable[..., Any]) -> tuple[Problem, Problem]:
+    made = world(3, samples=120, true={"b": 0.4})
+    return made.problem(0), made.problem(1)
+
+
+def dense(question: Any, sizes: tuple[int, ...], columns: Array) -> float:
+    """Log density of the target, columns (n, k) with coefficients of unit variance beside the baseline's."""
+    count = len(question.design.target)
+    white, volume = question.colours.white(np.eye(count), sizes)
+    noise = np.linalg.inv(white.T @ white)
+    every = np.column_stack([question.design.baseline, columns])
+    assert np.linalg.slogdet(noise)[1] == pytest.approx(2 * volume)
+    density = stats.multivariate_normal(np.zeros(count), noise + every @ every.T, allow_singular=True)
+    return float(density.logpdf(question.design.target)) + 0.5 * count * np.log(2 * np.pi)
+
+
+def test_evidence_is_that_of_gaussian_rows(problems: tuple[Problem, Problem], asked: Asked) -> None:
+    known = tuple(replace(one, spreads=dict.fromkeys(one.names, 3.0)) for one in problems)
+    question = asked(*known)
+    sizes = tuple(1 if label else 0 for label in range(len(question.colours.labels)))
+    members = {question.number("b@place"): Member(0, 0.5), question.number("d@place"): Member(0, 2.0)}
+    target = Evidence(question.products, sizes).target_beside(())
+    columns = [
+        one.scale * question.design.columns[:, question.design.hypotheses[index].blocks[0].place]
+        for index, one in members.items()
+    ]
+    nothing = dense(question, sizes, np.zeros((len(question.design.target), 0)))
+    assert target.nothing == pytest.approx(nothing, abs=1e-4)
+    assert target.nothing + target.log_likelihood(members) == pytest.approx(
+        dense(question, sizes, np.hstack(columns)), abs=1e-4
+    )
+
+
+def test_the_evidence_of_a_hypothesis_integrates_its_scale(problems: tuple[Problem, Problem], asked: Asked) -> None:
+    question = asked(*problems)
+    target = Evidence(question.products, question.colours.usual).target_beside(())
+    number = question.number("b@place")
+    table = target.table(number, target.beside({}))
+    one_by_one = [target.log_likelihood({number: Member(0, scale)}) for scale in table.scales.tolist()]
+    assert table.total == pytest.approx(np.logaddexp.reduce(one_by_one) - np.log(len(one_by_one)))
+    assert target.table_of(number, {}).total == pytest.approx(table.total)
+
+
+def test_slow_noise_that_no_repeat_shows_is_what_a_model_lacks(world: Callable[..., Any], asked: Asked) -> None:
+    """What repeats in one coordinate and is no column is lacking there, and nowhere else."""
+    made = world(5, samples=200, repeats=6)
+    problems = [made.problem(part) for part in (0, 1)]
+    slow = 3.0 * np.sin(np.linspace(0, 12, 200))
+    lacking = [
+        replace(
+            problem,
+            blocks=(replace(problem.blocks[0], target=problem.blocks[0].target + np.tile(slow, 6)), problem.blocks[1]),
+        )
+        for problem in problems
+    ]
+    sizes = asked(*lacking).search.nothing.evidence.sizes
+    labels = asked(*lacking).colours.labels
+    found = dict(zip(labels, (SIZES[size] for size in sizes), strict=True))
+    assert found["dynamic/step/x"] >= 3
+    assert found["dynamic/step/y"] == 0
+    assert not any(asked(*problems).search.nothing.evidence.sizes)
+
+
+def test_a_cause_that_is_not_linear_in_its_size_is_found_as_it_is(world: Callable[..., Any], asked: Asked) -> None:
+    """f(a) = a x + 0.3 a² y: by its column alone y would be left."""
+    made = world(7, samples=300, names=("a", "y"))
+
+    def bent(problem: Problem) -> Problem:
+        line, curve = (
+            [one[:, 0] for one in candidate.variants[0].columns if one is not None] for candidate in problem.candidates
+        )
+
+        def contribution(values: Array, _parameters: Array) -> list[Array | None]:
+            return [
+                values[0] * first + 0.3 * values[0] ** 2 * second for first, second in zip(line, curve, strict=True)
+            ]
+
+        added = contribution(np.array([2.0]), np.zeros(3))
+        blocks = tuple(
+            replace(block, target=block.target + more) for block, more in zip(problem.blocks, added, strict=True)
+        )
+        first = replace(
+            problem.candidates[0],
+            contribution=contribution,
+            variants=(Variant(problem.candidates[0].variants[0].columns),),
+        )
+        return replace(problem, blocks=blocks, candidates=(first, problem.candidates[1]))
+
+    question = asked(bent(made.problem(0)), bent(made.problem(1)))
+    state = question.search.run()
+    assert list(state.members) == [question.number("a@place")]
+    (index,) = state.members
+    size = state.target.means(state.members)[index][0] / question.design.hypotheses[index].blocks[0].sizes[0]
+    assert size == pytest.approx(2.0, abs=0.05)
