@@ -42,7 +42,7 @@ SourceOption = Annotated[
 ]
 
 CoreOption = Annotated[
-    Core, typer.Option(help="What diagnoses: what stands, or the one comparison that is tried beside it (axes alone).")
+    Core, typer.Option(help="What diagnoses: what stands, or the one comparison that is tried beside it.")
 ]
 
 _DEFAULT = Composition()

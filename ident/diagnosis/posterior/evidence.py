@@ -189,29 +189,34 @@ class Target:
         if not members:
             return found
         own, rows = self._stacked(members)
-        inner = np.eye(own.shape[1]) + own.T @ self.products[np.ix_(rows, rows)] @ own
-        across = self.products[np.ix_(chosen, rows)] @ own
-        return np.asarray(found - across @ linalg.solve(inner, across.T, assume_a="pos"))
+        powers, directions = self._directions(own, rows)
+        across = self.products[np.ix_(chosen, rows)] @ directions
+        return np.asarray(found - (across / (1 + powers)) @ across.T)
 
     def log_likelihood(self, members: Members) -> float:
         """With members of these numbers, against none."""
         if not members:
             return 0.0
         own, rows = self._stacked(members)
-        inner = np.eye(own.shape[1]) + own.T @ self.products[np.ix_(rows, rows)] @ own
-        amplitude, factor = own.T @ self.products[rows, -1], linalg.cho_factor(inner)
-        gained = 0.5 * float(amplitude @ linalg.cho_solve(factor, amplitude))
-        return gained - float(np.sum(np.log(np.diag(factor[0]))))
+        powers, directions = self._directions(own, rows)
+        amplitudes = directions.T @ self.products[rows, -1]
+        return 0.5 * float(np.sum(amplitudes**2 / (1 + powers) - np.log1p(powers)))
 
     def means(self, members: Members) -> dict[int, Array]:
         """Coefficients (K,) of the columns of every member."""
         if not members:
             return {}
         own, rows = self._stacked(members)
-        inner = np.eye(own.shape[1]) + own.T @ self.products[np.ix_(rows, rows)] @ own
+        powers, directions = self._directions(own, rows)
         mean = np.zeros(len(self.products) - 1)
-        mean[rows] = own @ linalg.solve(inner, own.T @ self.products[rows, -1], assume_a="pos")
+        mean[rows] = directions @ (directions.T @ self.products[rows, -1] / (1 + powers))
         return {index: mean[self._block(index, one).place] for index, one in members.items()}
+
+    def _directions(self, own: Array, rows: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Powers (R,) of independent combinations of unit variance, and these (r, R), by factors of members (r, R)."""
+        powers, turn = np.linalg.eigh(own.T @ self.products[np.ix_(rows, rows)] @ own)
+        # Columns that are the same but for rounding have no power apart.
+        return np.maximum(powers, 0.0), own @ turn
 
     def table_of(self, hypothesis: int, others: Members, only: int | None = None) -> Table:
         """Log evidence of a hypothesis, or of one of its blocks alone, beside others."""
@@ -242,7 +247,8 @@ class Target:
         place, squares = block.place, self.evidence.scales[:, None] ** 2
         if block.factor.shape == (1, 1):
             power, amplitude = max(float(products[place, place][0, 0]), 0.0), float(products[place.start, -1])
-            if _is_refused(block, power, amplitude):
+            nothing = power <= np.finfo(float).eps * len(self.evidence.design.target)
+            if nothing or _is_refused(block, power, amplitude):
                 return np.full(len(squares), -math.inf)
             powers, amplitudes = np.array([power]), np.array([amplitude])
         else:
@@ -277,6 +283,6 @@ def _among(columns: NDArray[np.int64], place: slice) -> slice:
 
 def _is_refused(block: Block, power: float, amplitude: float) -> bool:
     """Whether a single coefficient is what the hypothesis is not: of the other sign, or too small to mean it."""
-    size = amplitude / max(power, np.finfo(float).tiny) / float(block.sizes[0])
+    size = amplitude / power / float(block.sizes[0])
     negative, positive = block.negligible
     return size <= block.least or -negative <= size < 0 or 0 < size <= positive

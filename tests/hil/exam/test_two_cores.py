@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hil.exam.folder import Core, Exam, ExamFolder, write_exam
+from hil.exam.folder import Core, ExamFolder
 
 ROOT = Path(__file__).parents[3]
 
@@ -29,19 +29,6 @@ def test_answers_of_two_cores_lie_apart(tmp_path: Path, removed: bool) -> None:
     places = {ExamFolder(tmp_path, core).diagnosis("a", removed) for core in Core}
     assert len(places) == len(Core)
     assert ExamFolder(tmp_path).diagnosis("a", removed) in places
-
-
-def test_an_exam_of_vehicles_is_none_for_the_core_of_axes(tmp_path: Path) -> None:
-    folder = ExamFolder(tmp_path)
-    write_exam(folder, Exam("prototype", "pybullet", 0.002, (), ("a",), 1, "", ""))
-    for which in ("fit", "confirm"):
-        record = folder.record("a", which)
-        record.parent.mkdir(exist_ok=True)
-        record.write_bytes(b"")
-    refused = quasiomni("exam", "diagnose", str(tmp_path), "--core", "one")
-    assert refused.returncode == 2
-    assert "axes alone" in " ".join(refused.stderr.split())
-    assert not (tmp_path / "diagnoses_one").exists()
 
 
 @pytest.mark.slow

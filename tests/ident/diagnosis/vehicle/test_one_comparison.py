@@ -1,0 +1,69 @@
+"""The posterior names flaws of a vehicle that nothing of its candidates has made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ident.diagnosis.diagnosis import Verdict
+from ident.diagnosis.findings import Findings
+from ident.diagnosis.posterior.answer import judge_by_posterior
+from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
+from ident.effects.extended import ExtendedModel
+from ident.records.record import Record, Segment
+from ident.vehicle.description import VehicleDescription
+from ident.vehicle.parameters import COULOMB_EPSILON
+
+Drives = Callable[..., tuple[Record, Record]]
+
+
+def sticky(segment: Segment, vehicle: VehicleDescription) -> Segment:
+    """Friction of the right steering that is 3 Nm larger near standstill."""
+    g, rate = vehicle.geometry, np.gradient(segment.steering_angles[:, 1], segment.sample_time)
+    extra = 3.0 * np.exp(-((rate / 0.25) ** 2)) * np.tanh(rate / COULOMB_EPSILON)
+    wheels = extra * g.wheel_radius / (2 * g.wheel_offset * g.gear_ratio)
+    return replace(
+        segment, motor_torques=segment.motor_torques + np.stack([0 * wheels, 0 * wheels, wheels, -wheels], 1)
+    )
+
+
+def weak(segment: Segment, vehicle: VehicleDescription) -> Segment:
+    """A motor that gives 15 % less than it reports."""
+    del vehicle
+    return replace(segment, motor_torques=segment.motor_torques / np.array([1.0, 0.85, 1.0, 1.0]))
+
+
+def plain(segment: Segment, vehicle: VehicleDescription) -> Segment:
+    del vehicle
+    return segment
+
+
+def judged(drives: Drives, flaw: Callable[..., Segment], vehicle: VehicleDescription) -> Findings:
+    fit, confirm = drives(vehicle, lambda segment: flaw(segment, vehicle))
+    model = ExtendedModel(replace(vehicle.prior, std=0.005 * vehicle.prior.values))
+    return diagnose_vehicle([fit], [confirm], vehicle, model, judged=judge_by_posterior).findings
+
+
+@pytest.mark.parametrize(
+    ("flaw", "key", "sizes"),
+    [(sticky, "stribeck@steering_right", (3.0, 0.25)), (weak, "torque_gain@drive_rl", (-0.15,))],
+)
+def test_a_flaw_is_named_with_its_size(
+    flaw: Callable[..., Segment],
+    key: str,
+    sizes: tuple[float, ...],
+    drives: Drives,
+    prototype: VehicleDescription,
+) -> None:
+    findings = judged(drives, flaw, prototype)
+    (cause,) = findings.causes
+    assert cause.candidate.key == key
+    assert cause.part.values == pytest.approx(sizes, rel=0.1)
+    assert cause.closed > 0.9
+
+
+def test_the_model_itself_lacks_nothing(drives: Drives, prototype: VehicleDescription) -> None:
+    assert judged(drives, plain, prototype).verdict is Verdict.NONE
