@@ -122,7 +122,7 @@ class _Answer:
         self.fitted = Fitted(self.taken.problems, self.taken.regression, found, seed, told)
 
     def worthwhile(self) -> frozenset[int]:
-        """Members that are likely to be there, and close something."""
+        """Members that are likely to be there, are of some size, and close something."""
         members = tuple(self.taken.variants)
         doubted = [index for index in self.state.members if self.slots[index].nothing > DOUBTED or index not in members]
         if doubted:
@@ -130,6 +130,9 @@ class _Answer:
         sizeless = [index for place, index in enumerate(members) if not self._has_size(place)]
         if sizeless:
             return frozenset(members) - {sizeless[-1]}
+        widened = [place for place in range(len(members)) if self.fitted.lacking[place] < -LIMITS.widening]
+        if widened and self._measurable():
+            return frozenset(members) - {members[widened[0]]}
         if len(members) > 1:
             trifles = [place for place in range(len(members)) if not self._pays(place)]
             if trifles:
