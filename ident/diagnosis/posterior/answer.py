@@ -22,10 +22,12 @@ from ident.diagnosis.law.stage import SAME, Law, with_law
 from ident.diagnosis.limits import Limits
 from ident.diagnosis.orders import with_orders
 from ident.diagnosis.posterior.bends import Bends
+from ident.diagnosis.posterior.fitting import Fitter
 from ident.diagnosis.posterior.hypotheses import Design, make_design
 from ident.diagnosis.posterior.noise import SIZES, Colours
-from ident.diagnosis.posterior.search import Search, State
+from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.posterior.slots import Slot, slot_of
+from ident.diagnosis.posterior.state import State
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.remainder import repeated, shares
@@ -73,13 +75,13 @@ def judge_by_posterior(
     stage(f"comparing {len(fit.candidates)} causes and {len(fit.dependences)} laws")
     colours, designs = Colours(regression), Designs(problems, regression.rows)
     design = make_design(problems, regression, colours, designs)
-    search = Search(design, colours, Bends(problems, colours))
+    search = Search(Fitter(design, colours, Bends(problems, colours)))
     state = search.run()
     stage("numbers of the answer")
     answer = _Answer(problems, regression, designs, search, state, seed)
     while (fewer := answer.worthwhile()) != answer.state.members.keys():
         members = {index: one for index, one in answer.state.members.items() if index in fewer}
-        revised = search.against_rivals(search.state(members, answer.state))
+        revised = search.against_rivals(search.fitter.state(members, answer.state))
         answer = _Answer(problems, regression, designs, search, revised, seed)
     return answer.findings()
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from ident.diagnosis.posterior.hypotheses import Hypothesis
-from ident.diagnosis.posterior.search import Search, State
+from ident.diagnosis.posterior.search import Search
+from ident.diagnosis.posterior.state import State
 from ident.diagnosis.probability import ALIKE, Ranked
 
 Array = NDArray[np.float64]
@@ -76,7 +77,7 @@ def slot_of(search: Search, state: State, index: int) -> Slot:
     hypotheses = search.design.hypotheses
     others = state.without(index)
     without = replace(state, members=others, bends={one: bend for one, bend in state.bends.items() if one != index})
-    beside, bare = without.target.beside(others), search.state(others, state).log_posterior
+    beside, bare = without.target.beside(others), search.fitter.state(others, state).log_posterior
     # Without it the rows may have another noise.
     base = without.log_posterior - bare
     logs: dict[int, float] = {}
@@ -89,7 +90,7 @@ def slot_of(search: Search, state: State, index: int) -> Slot:
     near = sorted((one for one in logs if one != index), key=lambda one: -logs[one])[:RIVALS]
     for rival in [one for one in near if logs[one] > logs[index] - NEAR]:
         table = without.target.table(rival, beside)
-        logs[rival] = search.state({**others, rival: table.best}, state).log_posterior - bare
+        logs[rival] = search.fitter.state({**others, rival: table.best}, state).log_posterior - bare
     logs = {one: log for one, log in sorted(logs.items(), key=lambda entry: -entry[1]) if math.isfinite(log)}
     cosines = _cosines(state, index, logs)
     width = _width(search, state, index)

@@ -10,6 +10,7 @@ import pytest
 from ident.diagnosis.law.learning import Designs
 from ident.diagnosis.posterior.bends import Bends
 from ident.diagnosis.posterior.evidence import Products
+from ident.diagnosis.posterior.fitting import Fitter
 from ident.diagnosis.posterior.hypotheses import Design, make_design
 from ident.diagnosis.posterior.noise import Colours
 from ident.diagnosis.posterior.search import Search
@@ -38,7 +39,7 @@ def _asked(fit: Problem, confirm: Problem) -> Question:
     regression = Regression(fit, make_rows(fit, confirm), Settings(), 1)
     colours = Colours(regression)
     design = make_design((fit, confirm), regression, colours, Designs((fit, confirm), regression.rows))
-    search = Search(design, colours, Bends((fit, confirm), colours))
+    search = Search(Fitter(design, colours, Bends((fit, confirm), colours)))
     return Question(regression, colours, design, Products(design, colours), search)
 
 

@@ -75,12 +75,12 @@ def test_slow_noise_that_no_repeat_shows_is_what_a_model_lacks(world: Callable[.
         )
         for problem in problems
     ]
-    sizes = asked(*lacking).search.nothing.evidence.sizes
+    sizes = asked(*lacking).search.fitter.nothing.evidence.sizes
     labels = asked(*lacking).colours.labels
     found = dict(zip(labels, (SIZES[size] for size in sizes), strict=True))
     assert found["dynamic/step/x"] >= 3
     assert found["dynamic/step/y"] == 0
-    assert not any(asked(*problems).search.nothing.evidence.sizes)
+    assert not any(asked(*problems).search.fitter.nothing.evidence.sizes)
 
 
 def test_a_cause_that_is_not_linear_in_its_size_is_found_as_it_is(world: Callable[..., Any], asked: Asked) -> None:
@@ -92,18 +92,15 @@ def test_a_cause_that_is_not_linear_in_its_size_is_found_as_it_is(world: Callabl
             [one[:, 0] for one in candidate.variants[0].columns if one is not None] for candidate in problem.candidates
         )
 
-        def contribution(values: Array, _parameters: Array) -> list[Array | None]:
-            return [
-                values[0] * first + 0.3 * values[0] ** 2 * second for first, second in zip(line, curve, strict=True)
-            ]
+        def added(size: float) -> list[Array]:
+            return [size * first + 0.3 * size**2 * second for first, second in zip(line, curve, strict=True)]
 
-        added = contribution(np.array([2.0]), np.zeros(3))
         blocks = tuple(
-            replace(block, target=block.target + more) for block, more in zip(problem.blocks, added, strict=True)
+            replace(block, target=block.target + more) for block, more in zip(problem.blocks, added(2.0), strict=True)
         )
         first = replace(
             problem.candidates[0],
-            contribution=contribution,
+            contribution=lambda values, _: added(float(values[0])),
             variants=(Variant(problem.candidates[0].variants[0].columns),),
         )
         return replace(problem, blocks=blocks, candidates=(first, problem.candidates[1]))

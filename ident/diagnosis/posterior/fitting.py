@@ -1,0 +1,188 @@
+"""A set of hypotheses, fitted: its numbers by turns, its exact forms about those, and the noise that it leaves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.posterior.bends import Bends, Bent, Form
+from ident.diagnosis.posterior.evidence import Evidence, Member, Members, Products
+from ident.diagnosis.posterior.hypotheses import Block, Design
+from ident.diagnosis.posterior.noise import Colours, Sizes, most_likely
+from ident.diagnosis.posterior.state import State
+
+Array = NDArray[np.float64]
+
+SWEEPS: Final = 4
+"""Times that the numbers of all members are chosen anew, each beside the others, and that their noise is."""
+
+SETTLED: Final = 0.1
+"""Change of the log posterior from which that has settled."""
+
+TELLING: Final = 5.0
+"""Standard deviations of a coefficient from which numbers that its column was made for are moved."""
+
+FURTHEST: Final = 0.3
+"""Share of a held number that it is moved by at once."""
+
+
+class Fitter:
+    """Fits sets of hypotheses, each of them once.
+
+    Args:
+        design: of the rows.
+        colours: of their noise.
+        bends: exact forms of the hypotheses.
+    """
+
+    def __init__(self, design: Design, colours: Colours, bends: Bends) -> None:
+        self.design, self._colours, self._bends = design, colours, bends
+        self._products = Products(design, colours)
+        self._kept: dict[frozenset[int], State] = {}
+        self._evidence: dict[Sizes, Evidence] = {}
+
+    def with_nothing_lacking(self, state: State) -> State:
+        """A set with the noise that is beside a complete model."""
+        return replace(state, evidence=self._evidence_with(self._colours.usual))
+
+    @property
+    def nothing(self) -> State:
+        """No hypothesis at all."""
+        return self.state({}, None)
+
+    def state(self, members: Members, before: State | None) -> State:
+        """A set, its members' numbers fitted by turns, with the noise that they leave.
+
+        Args:
+            members: to begin with.
+            before: a set that is nearly the same, whose noise is taken first.
+        """
+        key = frozenset(members)
+        if key not in self._kept:
+            start = self._colours.usual if before is None else before.evidence.sizes
+            bends = {} if before is None else {index: bend for index, bend in before.bends.items() if index in members}
+            found = self._settled(State(members, bends, self._evidence_with(start)))
+            for _ in range(SWEEPS):
+                noise = self._noise_beside(found)
+                if noise == found.evidence.sizes:
+                    break
+                found = self._settled(replace(found, evidence=self._evidence_with(noise)))
+            self._kept[key] = found
+        return self._kept[key]
+
+    def _evidence_with(self, sizes: Sizes) -> Evidence:
+        if sizes not in self._evidence:
+            self._evidence[sizes] = Evidence(self._products, sizes)
+        return self._evidence[sizes]
+
+    def _noise_beside(self, state: State) -> Sizes:
+        """What is most likely lacking beside a set."""
+        hypotheses, columns, expected = self.design.hypotheses, [self.design.baseline], list[tuple[Array, Array]]()
+        end = self.design.baseline.shape[1]
+        for index, one in state.members.items():
+            block, bent = hypotheses[index].blocks[one.block], state.bends.get(index)
+            factor = one.scale * block.factor
+            columns.append(self._columns(state, index, one))
+            if bent is not None:
+                slopes, target = bent.expected
+                rows = np.zeros((len(target), end + factor.shape[1]))
+                rows[:, end:] = slopes @ factor
+                expected.append((rows, target))
+            end += factor.shape[1]
+        known = np.zeros((end + 1, end + 1))
+        for rows, target in expected:
+            whole = np.column_stack([np.pad(rows, ((0, 0), (0, end - rows.shape[1]))), target])
+            known += whole.T @ whole
+        target = self.design.target - sum((bent.missed for bent in state.bends.values()), np.zeros(len(columns[0])))
+        return most_likely(self._colours, np.hstack(columns), target, known, state.evidence.sizes)
+
+    def _settled(self, state: State) -> State:
+        """With the numbers of every member chosen anew, each beside the others, and what its columns miss."""
+        before = -math.inf
+        for _ in range(SWEEPS):
+            for index in state.members:
+                table = state.table(index)
+                if not table.is_there:
+                    return state
+                state = replace(state, members={**state.members, index: table.best})
+            state = self._bent(state)
+            if abs(state.log_posterior - before) < SETTLED:
+                break
+            before = state.log_posterior
+        return state
+
+    def _bent(self, state: State) -> State:
+        """With the exact forms of its members, about the numbers that they have."""
+        means, hypotheses = state.target.means(state.members), self.design.hypotheses
+        blocks = {index: hypotheses[index].blocks[one.block] for index, one in state.members.items()}
+        if not any(self._bends.is_bent(hypotheses[index], block) for index, block in blocks.items()):
+            return state
+        parameters = state.evidence.parameters(self._added(state, blocks, means))
+        forms = {
+            index: self._bends.form(hypotheses[index], block, parameters)
+            for index, block in blocks.items()
+            if self._bends.is_bent(hypotheses[index], block)
+        }
+        before = {index: state.bends[index].held if index in state.bends else None for index in forms}
+        found = {index: self._bends.bend(form, means[index], before[index]) for index, form in forms.items()}
+        state = replace(state, bends={index: bent for index, bent in found.items() if bent is not None})
+        for index, form in forms.items():
+            if float(np.abs(means[index]).max()) > self._telling:
+                state = self._moved(state, index, form, means[index])
+        return state
+
+    @property
+    def _telling(self) -> float:
+        """Coefficient of a column of unit rms from which held numbers show: they turn a tenth of it."""
+        return TELLING / math.sqrt(len(self.design.target))
+
+    def _moved(self, state: State, index: int, form: Form, mean: Array) -> State:
+        """With the held numbers of a member moved to where the rows want them, if that is better."""
+        bent = state.bends.get(index) or self._bends.bend(form, mean, form.held(mean))
+        if bent is None or not bent.held.size:
+            return state
+        others = {one: member for one, member in state.members.items() if one != index}
+        step = self._step(replace(state, bends={**state.bends, index: bent}), others, form, bent)
+        moved = self._bends.bend(form, mean, bent.held + step)
+        better = state if moved is None else replace(state, bends={**state.bends, index: moved})
+        return max(state, better, key=lambda one: one.log_posterior)
+
+    def _step(self, state: State, others: Members, form: Form, bent: Bent) -> Array:
+        """(H,) of the held numbers of a member, everything else fitted beside."""
+        free, expected = form.held_slopes(bent), form.expected_of_held(bent)
+        columns = [self.design.baseline, *(self._columns(state, index, one) for index, one in others.items())]
+        missed = sum((one.missed for one in state.bends.values()), np.zeros(len(free)))
+        whole = np.column_stack([*columns, bent.slopes, free, self.design.target - missed])
+        white, _ = self._colours.white(whole, state.evidence.sizes)
+        width, size = sum(one.shape[1] for one in columns), np.linalg.norm(white[:, -1 - free.shape[1] : -1], axis=0)
+        scale = np.concatenate([np.ones(white.shape[1] - 1 - len(size)), 1 / np.maximum(size, np.finfo(float).tiny)])
+        own = np.zeros((len(bent.expected[1]), len(scale)))
+        own[:, width : width + bent.slopes.shape[1]], own[:, -len(size) :] = bent.expected[0], expected
+        ridge = np.eye(len(scale))[:width]
+        rows = np.vstack([white[:, :-1] * scale, own * scale, ridge])
+        target = np.concatenate([white[:, -1], bent.expected[1], np.zeros(width)])
+        found = np.linalg.lstsq(rows, target, rcond=None)[0] * scale
+        most = FURTHEST * np.maximum(np.abs(bent.held), FURTHEST)
+        return np.asarray(np.clip(found[-len(size) :], -most, most))
+
+    def _columns(self, state: State, index: int, member: Member) -> Array:
+        """(n, R) of a member, of unit variance."""
+        block, bent = self.design.hypotheses[index].blocks[member.block], state.bends.get(index)
+        columns = self.design.columns[:, block.place] if bent is None else bent.slopes
+        return np.asarray(columns @ (member.scale * block.factor))
+
+    def _added(self, state: State, blocks: Mapping[int, Block], means: Mapping[int, Array]) -> Array:
+        """(n,) what the members add."""
+        found = np.zeros(len(self.design.target))
+        for index, block in blocks.items():
+            bent = state.bends.get(index)
+            if bent is None:
+                found += self.design.columns[:, block.place] @ means[index]
+            else:
+                found += bent.slopes @ means[index] + bent.missed
+        return found

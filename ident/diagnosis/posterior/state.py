@@ -1,0 +1,71 @@
+"""A set of hypotheses with its numbers and its noise, and how likely it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.posterior.bends import Bent
+from ident.diagnosis.posterior.evidence import Evidence, Member, Members, Table, Target
+from ident.diagnosis.posterior.noise import price_of
+
+Array = NDArray[np.float64]
+
+DISTINCT: Final = 0.02
+"""Power of a column that must be left beside the members: columns are exact to about a hundredth."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A set of hypotheses.
+
+    Attributes:
+        members: by number.
+        bends: what the columns of a member miss of it, by number.
+        evidence: with the noise that is most likely beside them.
+    """
+
+    members: Members
+    bends: Mapping[int, Bent]
+    evidence: Evidence
+
+    @cached_property
+    def target(self) -> Target:
+        """The rows without what columns miss."""
+        return self.evidence.target_beside(self.bends.values())
+
+    @cached_property
+    def log_posterior(self) -> float:
+        """But for a constant."""
+        tables = {index: self.table(index) for index in self.members}
+        if not all(table.is_there for table in tables.values()):
+            return -math.inf
+        hypotheses = self.evidence.design.hypotheses
+        inside = sum(table.inside for table in tables.values())
+        price = sum(hypotheses[index].price for index in self.members) + price_of(self.evidence.sizes)
+        return self.target.nothing + self.target.log_likelihood(self.members) + inside - price
+
+    def table(self, hypothesis: int) -> Table:
+        """Evidence of a member beside the others, by its slopes where it has them: those are of one block."""
+        only = self.members[hypothesis].block if hypothesis in self.bends else None
+        return self.target.table_of(hypothesis, self.without(hypothesis), only)
+
+    def tables(self) -> dict[int, Table]:
+        """Evidence of all other hypotheses beside the members, but of those that are the same as some of these."""
+        beside, hypotheses = self.target.beside(self.members), self.evidence.design.hypotheses
+        left = np.diag(beside) / np.maximum(np.diag(self.target.products), np.finfo(float).tiny)
+        return {
+            index: self.target.table(index, beside)
+            for index, one in enumerate(hypotheses)
+            if index not in self.members and any(left[block.place].max() > DISTINCT for block in one.blocks)
+        }
+
+    def without(self, hypothesis: int) -> dict[int, Member]:
+        """The other members."""
+        return {index: one for index, one in self.members.items() if index != hypothesis}
