@@ -33,7 +33,7 @@ def dense(question: Any, sizes: tuple[int, ...], columns: Array) -> float:
     every = np.column_stack([question.design.baseline, columns])
     assert np.linalg.slogdet(noise)[1] == pytest.approx(2 * volume)
     density = stats.multivariate_normal(np.zeros(count), noise + every @ every.T, allow_singular=True)
-    return float(density.logpdf(question.design.target)) + 0.5 * count * np.log(2 * np.pi)
+    return float(density.logpdf(question.design.target) + 0.5 * count * np.log(2 * np.pi))
 
 
 def test_evidence_is_that_of_gaussian_rows(problems: tuple[Problem, Problem], asked: Asked) -> None:
