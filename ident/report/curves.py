@@ -37,7 +37,12 @@ OUTSIDE: Final = 0.005
 """Share of the points that may lie above or below what is shown."""
 
 _VERTICAL: Final[Mapping[str, str]] = MappingProxyType(
-    {Partner.DIRECTION: "friction", Partner.RATE: "viscous friction", Partner.ACCELERATION: "inertia"}
+    {
+        Partner.DIRECTION: "friction",
+        Partner.RATE: "viscous friction",
+        Partner.ACCELERATION: "inertia",
+        Partner.ROLLING: "rolling radius",
+    }
 )
 """What a function is, by what it is multiplied with."""
 

@@ -17,6 +17,7 @@ _FORCES: Final = MappingProxyType(
         "direction": "friction that depends on {x}",
         "rate": "viscous friction that depends on {x}",
         "acceleration": "inertia that depends on {x}",
+        "rolling": "a rolling radius that depends on {x}",
     }
 )
 

@@ -47,6 +47,8 @@ class Partner(enum.StrEnum):
     DIRECTION = "direction"
     RATE = "rate"
     ACCELERATION = "acceleration"
+    ROLLING = "rolling"
+    """The rate of a wheel that rolls, in rolling rows: the function is of its radius."""
 
 
 @dataclass(frozen=True)

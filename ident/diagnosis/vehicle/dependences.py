@@ -1,7 +1,8 @@
 """On what the remainder of the vehicle may depend: the motion of its joints, each and all equals, and its own speed.
 
 A torque f at a joint j stands in the generalized rows as H_k(α)ᵀ e_j f, as friction does in (14); so does a force
-against the forward speed of the chassis.
+against the forward speed of the chassis. A radius that is larger by f stands in the rolling rows as the motion of its
+wheel does, by its rate.
 """
 
 from __future__ import annotations
@@ -61,24 +62,32 @@ _UNITS: Final = {
     Partner.DIRECTION: "Nm",
     Partner.RATE: "Nm s/rad",
     Partner.ACCELERATION: "kg m^2",
+    Partner.ROLLING: "m",
 }
 _STEERING: Final = (*STEERING, "steering")
 _LAWS: Final = (
     _Law(Variable.RATE, Partner.NOTHING, "rad/s", JOINTS),
     _Law(Variable.RATE, Partner.NOTHING, "m/s", CHASSIS),
-    *(_Law(Variable.ANGLE, partner, "rad", _STEERING) for partner in Partner),
+    *(_Law(Variable.ANGLE, partner, "rad", _STEERING) for partner in Partner if partner is not Partner.ROLLING),
     *(_Law(Variable.ANGLE, Partner.NOTHING, "rad", _WHEELS, turn) for turn in ("wheel", "motor")),
     *(_Law(Variable.ANGLE, Partner.DIRECTION, "rad", _WHEELS, turn) for turn in ("wheel",)),
     _Law(Variable.PATH_SINCE_REVERSAL, Partner.DIRECTION, "rad", JOINTS),
     _Law(Variable.TIME, Partner.DIRECTION, "s", JOINTS),
+    _Law(Variable.RATE, Partner.ROLLING, "rad/s", _WHEELS),
+    _Law(Variable.ANGLE, Partner.ROLLING, "rad", _WHEELS, "wheel"),
 )
 
 
 def vehicle_dependences(sources: Sequence[Source], context: Context) -> list[Dependence]:
     """Every variable that is tried for the joints of the vehicle, with what the function is multiplied with."""
-    levers = [levers_of(source, context) for source in sources]
+    torques = [levers_of(source, context) for source in sources]
+    radii = [rolling_levers_of(source, context) for source in sources]
     coarse = [Coarse(source, context.processing.cutoff) for source in sources]
-    return [_dependence(law, where, coarse, levers, context) for law in _LAWS for where in law.places]
+    return [
+        _dependence(law, where, coarse, radii if law.partner is Partner.ROLLING else torques, context)
+        for law in _LAWS
+        for where in law.places
+    ]
 
 
 def _dependence(
@@ -148,6 +157,17 @@ def levers_of(source: Source, context: Context) -> Array | None:
     complement = kinematics.complement(spec.mode, inputs[:, SLICES["alpha"]], context.geometry)
     rows = [*range(FIRST_JOINT, FIRST_JOINT + FORWARD), 0]
     return np.asarray(complement[:, rows][:, :, columns])
+
+
+def rolling_levers_of(source: Source, context: Context) -> Array | None:
+    """What a larger radius of each wheel is in the rolling rows of a source (M, 7, rows) [1/s]; None: nothing."""
+    if source.channel is not Channel.KINEMATIC or source.own is not None:
+        return None
+    inputs = context.inputs(source)
+    found = np.zeros((len(inputs), FORWARD + 1, len(source.coordinates)))
+    rolled = context.formulas.rolled(source.spec)(inputs, *context.constants[:2])
+    found[:, len(STEERING) : FORWARD] = rolled.transpose(0, 2, 1)
+    return found
 
 
 def _joint(inputs: Array, joint: int, steering: str, wheel: str) -> Array:

@@ -190,6 +190,7 @@ class Formulas:
     def __init__(self, given: Sequence[EffectTerm] = ()) -> None:
         self._given = tuple(given)
         self._exact: dict[tuple[Channel, RowsOfStep, EffectName | None, str], Vectorised] = {}
+        self._rolled: dict[RowsOfStep, Vectorised] = {}
         self._linearised: dict[tuple[Channel, RowsOfStep, tuple[UnitTerm, ...]], Vectorised] = {}
 
     def linearised(self, channel: Channel, spec: RowsOfStep, units: Sequence[UnitTerm]) -> Vectorised:
@@ -216,6 +217,17 @@ class Formulas:
             inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON, p, values]
             self._exact[key] = Vectorised(ca.Function("rows", inputs, [ca.cse(ca.densify(rows))]))
         return self._exact[key]
+
+    def rolled(self, spec: RowsOfStep) -> Vectorised:
+        """(z, geometry, ε) -> (N, rows, 4): the rolling rows of a step over the radii of the wheels."""
+        if spec not in self._rolled:
+            z, radii = symbolic_inputs(), ca.SX.sym("radii", len(WHEELS))
+            residual = _slip(z, true_steering(self._given, z.alpha), radii)
+            rows = ca.vertcat(*in_coordinates([residual[wheel] for wheel in range(len(WHEELS))], spec))
+            inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON]
+            function = ca.Function("rolled", inputs, [ca.cse(ca.densify(ca.jacobian(rows, radii)))])
+            self._rolled[spec] = Vectorised(function)
+        return self._rolled[spec]
 
 
 def coordinates(channel: Channel, spec: RowsOfStep) -> tuple[str, ...]:

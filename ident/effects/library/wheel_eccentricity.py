@@ -51,5 +51,6 @@ EFFECT: Final = EffectKind(
     term=_Eccentricity,
     words="a radius that varies by {amplitude} over a turn",
     usual=lambda vehicle, where: 0.003 * vehicle.geometry.wheel_radius,
+    over=("angle", "rolling"),
     polar=("amplitude", "phase"),
 )

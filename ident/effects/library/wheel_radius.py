@@ -29,6 +29,7 @@ EFFECT: Final = EffectKind(
     parameters=(EffectParameter("error", "m", "true radius minus the radius of the vehicle file"),),
     term=_WheelRadius,
     words="a radius {error} larger than in the vehicle file",
+    over=("rate", "rolling"),
     usual=lambda vehicle, where: 0.01 * vehicle.geometry.wheel_radius,
     same_records=MappingProxyType({"scaled@beta": WHEEL_PLACES, "scaled@every beta": ALL_WHEELS}),
 )

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.problem import Problem
+from ident.diagnosis.problem import Channel, Problem
 from ident.diagnosis.vehicle.build import build_problem
 from ident.diagnosis.vehicle.ideal import FOUR, ideal_record
 from ident.vehicle.description import VehicleDescription
@@ -19,7 +19,12 @@ Array = NDArray[np.float64]
 
 @pytest.fixture(scope="module")
 def problem(prototype: VehicleDescription) -> Problem:
-    named = (EffectName.QUADRATIC_DRAG, EffectName.ASYMMETRIC_VISCOUS)
+    named = (
+        EffectName.QUADRATIC_DRAG,
+        EffectName.ASYMMETRIC_VISCOUS,
+        EffectName.WHEEL_RADIUS,
+        EffectName.WHEEL_ECCENTRICITY,
+    )
     return build_problem([ideal_record(FOUR, prototype)], prototype, prototype.prior, effects=named)
 
 
@@ -33,11 +38,26 @@ def test_a_rate_without_its_sign_is_an_asymmetric_friction(problem: Problem, whe
     _same(problem, f"law_rate@{where}", f"asymmetric_viscous@{where}", np.abs)
 
 
-def _same(problem: Problem, law: str, name: str, function: Callable[[Array], Array]) -> None:
-    """Columns alike up to one factor in every block, where the vehicle moves."""
+@pytest.mark.parametrize("where", ["wheel_fl", "wheel_rr"])
+def test_a_radius_that_depends_on_nothing_is_another_radius(problem: Problem, where: str) -> None:
+    _same(problem, f"law_rate_rolling@{where}", f"wheel_radius@{where}", np.ones_like, Channel.KINEMATIC)
+
+
+def test_a_radius_over_the_angle_of_its_wheel_is_an_eccentric_wheel(problem: Problem) -> None:
+    _same(problem, "law_angle_wheel_rolling@wheel_fr", "wheel_eccentricity@wheel_fr", np.cos, Channel.KINEMATIC)
+
+
+def _same(
+    problem: Problem, law: str, name: str, function: Callable[[Array], Array], channel: Channel = Channel.DYNAMIC
+) -> None:
+    """Columns alike up to one factor in every block of a channel, where the vehicle moves; the law has no others."""
     (dependence,) = (one for one in problem.dependences if one.key == law)
     made = dependence.design(lambda x: function(x)[..., None])
-    named = problem.candidate(name).variants[0].columns
+    assert all(one is None for block, one in zip(problem.blocks, made, strict=True) if block.channel is not channel)
+    named = [
+        column if block.channel is channel else None
+        for block, column in zip(problem.blocks, problem.candidate(name).variants[0].columns, strict=True)
+    ]
     pairs = [
         (block.moving, one, other)
         for block, one, other in zip(problem.blocks, made, named, strict=True)
