@@ -34,6 +34,7 @@ from ident.diagnosis.remainder import repeated, shares
 from ident.diagnosis.rows import make_rows
 from ident.diagnosis.search import Taken
 from ident.diagnosis.settings import Settings
+from ident.diagnosis.sized import is_nothing, is_sizeless
 from ident.stages import Stage, untold
 
 Array = NDArray[np.float64]
@@ -50,28 +51,22 @@ LIMITS: Final = Limits()
 MISTAKEN: Final = 1.0
 """What is lacking, over noise and tolerance, that may be a mistake in those."""
 
-SIZED: Final = 2.0
-"""Standard deviations that a size is from zero, at least."""
-
 OPEN: Final = 0.5
 """Share of the held-out gap that members leave, more being lacking than is tolerated, from which they are no answer."""
 
 
-def judge_by_posterior(
-    fit: Problem, confirm: Problem, *, seed: int, settings: Settings | None = None, stage: Stage = untold
-) -> Findings:
+def judge_by_posterior(fit: Problem, confirm: Problem, *, seed: int, stage: Stage = untold) -> Findings:
     """Find the causes of a gap.
 
     Args:
         fit: records that effects are looked for in.
         confirm: independent records.
         seed: of the smooth function of what is left.
-        settings: of the rows.
         stage: told what begins.
     """
     fit, confirm = with_orders((fit, confirm))
     problems = (fit, confirm)
-    regression = Regression(fit, make_rows(fit, confirm), settings or Settings(), seed)
+    regression = Regression(fit, make_rows(fit, confirm), Settings(), seed)
     stage(f"comparing {len(fit.candidates)} causes and {len(fit.dependences)} laws")
     colours, designs = Colours(regression), Designs(problems, regression.rows)
     design = make_design(problems, regression, colours, designs)
@@ -79,10 +74,9 @@ def judge_by_posterior(
     state = search.run()
     stage("numbers of the answer")
     answer = _Answer(problems, regression, designs, search, state, seed)
-    while (fewer := answer.worthwhile()) != answer.state.members.keys():
-        members = {index: one for index, one in answer.state.members.items() if index in fewer}
-        revised = search.against_rivals(search.fitter.state(members, answer.state))
-        answer = _Answer(problems, regression, designs, search, revised, seed)
+    while (other := answer.better()) is not None:
+        search, state = other
+        answer = _Answer(problems, regression, designs, search, state, seed)
     return answer.findings()
 
 
@@ -123,24 +117,31 @@ class _Answer:
         told = told_samples(regression.rows, self.taken.problems, keys)
         self.fitted = Fitted(self.taken.problems, self.taken.regression, found, seed, told)
 
-    def worthwhile(self) -> frozenset[int]:
-        """Members that are likely to be there, are of some size, and close something."""
+    def better(self) -> tuple[Search, State] | None:
+        """The search and its set without members that are of no size, or are not worth their place; None: all are."""
         members = tuple(self.taken.variants)
-        doubted = [index for index in self.state.members if self.slots[index].nothing > DOUBTED or index not in members]
-        if doubted:
-            return frozenset(self.state.members) - {max(doubted, key=lambda index: self.slots[index].nothing)}
         sizeless = [index for place, index in enumerate(members) if not self._has_size(place)]
         if sizeless:
-            return frozenset(members) - {sizeless[-1]}
-        widened = [place for place in range(len(members)) if self.fitted.lacking[place] < -LIMITS.widening]
-        if widened and self._measurable():
-            return frozenset(members) - {members[widened[0]]}
-        if len(members) > 1:
-            trifles = [place for place in range(len(members)) if not self._pays(place)]
-            if trifles:
-                least = min(trifles, key=lambda place: self.fitted.lacking[place])
-                return frozenset(members) - {members[least]}
-        return frozenset(members)
+            search = self.search.without(sizeless)
+            return search, search.run()
+        lost = self._lost(members)
+        if lost is None:
+            return None
+        left = {index: one for index, one in self.state.members.items() if index != lost}
+        return self.search, self.search.revised(self.search.fitter.state(left, self.state))
+
+    def _lost(self, members: Sequence[int]) -> int | None:
+        """A member that is hardly likely to be there, widens the held-out gap, or closes next to nothing beside others.
+
+        Or a law that the fitted rows do not show by themselves, which is not among the `members` taken.
+        """
+        doubted = [index for index in self.state.members if self.slots[index].nothing > DOUBTED or index not in members]
+        if doubted:
+            return max(doubted, key=lambda index: self.slots[index].nothing)
+        closed = dict(zip(members, self.fitted.lacking, strict=True))
+        widened = [index for index in members if closed[index] < -LIMITS.widening] if self._measurable() else []
+        trifles = [index for place, index in enumerate(members) if not self._pays(place)] if len(members) > 1 else []
+        return min(widened or trifles, key=lambda index: closed[index], default=None)
 
     def _pays(self, place: int) -> bool:
         """Whether a member closes what its columns are exact to, or much of what a greater one leaves."""
@@ -151,9 +152,9 @@ class _Answer:
         return self.fitted.removable > LIMITS.measurable * self.fitted.whole.floor**2
 
     def _has_size(self, place: int) -> bool:
-        """Whether a size is surely not zero."""
-        part = self.fitted.after.parts[place]
-        return bool(abs(part.values[0]) > SIZED * part.std[0])
+        """Whether a size is surely not zero, and its own, and the numbers are of the effect's family."""
+        candidate, part = self.fitted.candidate(place), self.fitted.after.parts[place]
+        return not (is_nothing(candidate, part, LIMITS) or is_sizeless(candidate, part, LIMITS))
 
     def findings(self) -> Findings:
         """The answer, with all that reports show of it."""
@@ -193,7 +194,7 @@ class _Answer:
         return Verdict.LAW if self.taken.laws else Verdict.EFFECT
 
     def _invisible(self) -> tuple[str, ...]:
-        shown = {one.name for one in self.design.hypotheses}
+        shown = {one.name for index, one in enumerate(self.design.hypotheses) if index not in self.search.invisible}
         names = dict.fromkeys(str(one.effect) for one in self.taken.problems[0].candidates)
         return tuple(name for name in names if name not in shown and not name.startswith(LAW))
 

@@ -8,6 +8,7 @@ where the rows want it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -31,8 +32,11 @@ STEP: Final = 1e-4
 NEAR: Final = 0.1
 """Change of the coefficients, over the largest of them, for which slopes are held."""
 
-SAME: Final = 0.01
-"""Of coefficients, in units of the noise of a row, that change nothing."""
+NEAR_PLANT: Final = 1e-3
+"""Change of the plant's parameters, relative, for which an exact form is held."""
+
+SAME: Final = 0.1
+"""Of coefficients, in standard deviations, that change nothing."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,7 @@ class Bends:
         self.problems, self.colours = problems, colours
         self._straight: dict[tuple[str, int], float] = {}
         self._kept: dict[tuple[str, int], Bent] = {}
+        self._parameters: dict[tuple[str, int], Array] = {}
 
     def is_bent(self, hypothesis: Hypothesis, block: Block) -> bool:
         """Whether there is more to a hypothesis than its columns."""
@@ -93,8 +98,8 @@ class Bends:
         if held is None and size <= self._straight.get(key, 0.0):
             return None
         numbers = form.held(coefficients) if held is None else held
-        alike = kept is not None and np.array_equal(kept.held, numbers)
-        if kept is not None and alike and np.abs(kept.about - coefficients).max() < SAME:
+        alike = kept is not None and np.array_equal(kept.held, numbers) and self._beside_the_same(key, form)
+        if kept is not None and alike and np.abs(kept.about - coefficients).max() < SAME / math.sqrt(len(kept.missed)):
             return kept
         here, expected = form.added(coefficients, numbers), form.expected_about(coefficients, numbers)
         if held is None and not len(expected[1]) and self._power(here - form.by_columns(coefficients)) < NEGLIGIBLE:
@@ -105,8 +110,12 @@ class Bends:
         else:
             slopes = form.slopes(coefficients, numbers, here)
         found = Bent(form.block.place, coefficients, numbers, slopes, here - slopes @ coefficients, expected)
-        self._kept[key] = found
+        self._kept[key], self._parameters[key] = found, form.parameters
         return found
+
+    def _beside_the_same(self, key: tuple[str, int], form: Form) -> bool:
+        """Whether the last answer was for a plant of the same parameters, but for `NEAR_PLANT`."""
+        return bool(np.allclose(self._parameters[key], form.parameters, rtol=NEAR_PLANT, atol=0.0))
 
     def _power(self, series: Array) -> float:
         """Sum of squares of a series (n,), in units of the noise."""

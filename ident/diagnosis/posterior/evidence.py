@@ -115,6 +115,9 @@ class Evidence:
     Args:
         products: of the rows.
         sizes: of what is lacking.
+
+    Attributes:
+        shown: (K,) power of every column beside the plant's parameters, over its own.
     """
 
     def __init__(self, products: Products, sizes: Sizes) -> None:
@@ -125,6 +128,8 @@ class Evidence:
         self._baseline = linalg.cho_factor(np.eye(width) + whole[:width, :width])
         self._across = linalg.cho_solve(self._baseline, whole[:width, width:])
         self._beside = whole[width:, width:] - whole[:width, width:].T @ self._across
+        power = np.maximum(np.diag(whole)[width:-1], np.finfo(float).tiny)
+        self.shown: Array = np.diag(self._beside)[:-1] / power
         self._determinant = float(np.sum(np.log(np.diag(self._baseline[0]))))
         smallest = 1 / math.sqrt(len(self.design.target))
         self.scales = np.geomspace(smallest, LARGEST, 1 + math.ceil(math.log2(LARGEST / smallest) / OCTAVES))
@@ -254,10 +259,18 @@ class Target:
         else:
             powers, turn = np.linalg.eigh(block.factor.T @ products[place, place] @ block.factor)
             powers, amplitudes = np.maximum(powers, 0.0), turn.T @ (block.factor.T @ products[place, -1])
+            if block.least == 0 and self._is_negative(turn, powers, amplitudes):
+                return np.full(len(squares), -math.inf)
         gains = squares / (1 + squares * powers)
         logs = 0.5 * np.sum(gains * amplitudes**2 - np.log1p(squares * powers), axis=1)
         allowed = self.evidence.scales <= max(block.largest, self.evidence.scales[0])
         return np.where(allowed, logs, -math.inf)
+
+    @staticmethod
+    def _is_negative(turn: Array, powers: Array, amplitudes: Array) -> bool:
+        """Whether the first of some coefficients, which is the effect's own, is below zero, by rows alone."""
+        told = powers > np.finfo(float).eps * powers.max(initial=0.0)
+        return float(turn[0, told] @ (amplitudes[told] / powers[told])) <= 0
 
     def _block(self, index: int, member: Member) -> Block:
         return self.evidence.design.hypotheses[index].blocks[member.block]

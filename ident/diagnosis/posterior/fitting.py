@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.directions import VISIBLE
 from ident.diagnosis.posterior.bends import Bends, Bent, Form
 from ident.diagnosis.posterior.evidence import Evidence, Member, Members, Products
 from ident.diagnosis.posterior.hypotheses import Block, Design
@@ -28,7 +29,7 @@ TELLING: Final = 5.0
 """Standard deviations of a coefficient from which numbers that its column was made for are moved."""
 
 FURTHEST: Final = 0.3
-"""Share of a held number that it is moved by at once."""
+"""Share of a held number that it is moved by at once, or of one where it is zero: a phase, a share."""
 
 
 class Fitter:
@@ -45,6 +46,15 @@ class Fitter:
         self._products = Products(design, colours)
         self._kept: dict[frozenset[int], State] = {}
         self._evidence: dict[Sizes, Evidence] = {}
+
+    def invisible(self) -> frozenset[int]:
+        """Hypotheses of which the plant's parameters absorb all but nothing."""
+        evidence = self._evidence_with(self._colours.usual)
+        return frozenset(
+            index
+            for index, one in enumerate(self.design.hypotheses)
+            if all(evidence.shown[block.place].max() < VISIBLE**2 for block in one.blocks)
+        )
 
     def with_nothing_lacking(self, state: State) -> State:
         """A set with the noise that is beside a complete model."""
@@ -72,7 +82,7 @@ class Fitter:
                 if noise == found.evidence.sizes:
                     break
                 found = self._settled(replace(found, evidence=self._evidence_with(noise)))
-            self._kept[key] = found
+            self._kept[key] = found.judged()
         return self._kept[key]
 
     def _evidence_with(self, sizes: Sizes) -> Evidence:
@@ -82,24 +92,11 @@ class Fitter:
 
     def _noise_beside(self, state: State) -> Sizes:
         """What is most likely lacking beside a set."""
-        hypotheses, columns, expected = self.design.hypotheses, [self.design.baseline], list[tuple[Array, Array]]()
-        end = self.design.baseline.shape[1]
-        for index, one in state.members.items():
-            block, bent = hypotheses[index].blocks[one.block], state.bends.get(index)
-            factor = one.scale * block.factor
-            columns.append(self._columns(state, index, one))
-            if bent is not None:
-                slopes, target = bent.expected
-                rows = np.zeros((len(target), end + factor.shape[1]))
-                rows[:, end:] = slopes @ factor
-                expected.append((rows, target))
-            end += factor.shape[1]
-        known = np.zeros((end + 1, end + 1))
-        for rows, target in expected:
-            whole = np.column_stack([np.pad(rows, ((0, 0), (0, end - rows.shape[1]))), target])
-            known += whole.T @ whole
+        columns = [self.design.baseline, *(self._columns(state, index, one) for index, one in state.members.items())]
+        count = sum(one.shape[1] for one in columns)
+        known = np.column_stack(self._expected_beside(state, state.members, count))
         target = self.design.target - sum((bent.missed for bent in state.bends.values()), np.zeros(len(columns[0])))
-        return most_likely(self._colours, np.hstack(columns), target, known, state.evidence.sizes)
+        return most_likely(self._colours, np.hstack(columns), target, known.T @ known, state.evidence.sizes)
 
     def _settled(self, state: State) -> State:
         """With the numbers of every member chosen anew, each beside the others, and what its columns miss."""
@@ -163,12 +160,26 @@ class Fitter:
         scale = np.concatenate([np.ones(white.shape[1] - 1 - len(size)), 1 / np.maximum(size, np.finfo(float).tiny)])
         own = np.zeros((len(bent.expected[1]), len(scale)))
         own[:, width : width + bent.slopes.shape[1]], own[:, -len(size) :] = bent.expected[0], expected
-        ridge = np.eye(len(scale))[:width]
-        rows = np.vstack([white[:, :-1] * scale, own * scale, ridge])
-        target = np.concatenate([white[:, -1], bent.expected[1], np.zeros(width)])
+        beside, wanted = self._expected_beside(state, others, len(scale))
+        rows = np.vstack([white[:, :-1] * scale, own * scale, beside, np.eye(len(scale))[:width]])
+        target = np.concatenate([white[:, -1], bent.expected[1], wanted, np.zeros(width)])
         found = np.linalg.lstsq(rows, target, rcond=None)[0] * scale
-        most = FURTHEST * np.maximum(np.abs(bent.held), FURTHEST)
+        most = FURTHEST * np.where(bent.held == 0, 1.0, np.abs(bent.held))
         return np.asarray(np.clip(found[-len(size) :], -most, most))
+
+    def _expected_beside(self, state: State, members: Members, count: int) -> tuple[Array, Array]:
+        """Rows (m, count) and (m,) of what is expected of members that stand behind the baseline."""
+        end, rows, targets = self.design.baseline.shape[1], [np.zeros((0, count))], [np.zeros(0)]
+        for index, one in members.items():
+            factor = one.scale * self.design.hypotheses[index].blocks[one.block].factor
+            if index in state.bends:
+                slopes, target = state.bends[index].expected
+                part = np.zeros((len(target), count))
+                part[:, end : end + factor.shape[1]] = slopes @ factor
+                rows.append(part)
+                targets.append(target)
+            end += factor.shape[1]
+        return np.vstack(rows), np.concatenate(targets)
 
     def _columns(self, state: State, index: int, member: Member) -> Array:
         """(n, R) of a member, of unit variance."""

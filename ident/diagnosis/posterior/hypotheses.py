@@ -11,24 +11,33 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.findings import LAW
 from ident.diagnosis.law.learning import LENGTHS, Designs
 from ident.diagnosis.law.spline import Knots
 from ident.diagnosis.posterior.noise import Colours
-from ident.diagnosis.problem import Problem
+from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Column
 
 Array = NDArray[np.float64]
 
-LEAST: float = 1e-9
+LEAST: Final = 1e-9
 """Size of a column, over the largest of the same hypothesis, that is nothing."""
 
-SAME: float = 1e-5
+SAME: Final = 1e-5
 """Share of the power of a free function that a direction must have: less changes no row."""
+
+
+DECADE: Final = 10.0
+"""Size of an effect over its usual one, at most."""
+
+UNKNOWN: Final = 1e3
+"""Standard deviation of a parameter of which nothing is known, over what makes all of the target."""
 
 
 @dataclass(frozen=True)
@@ -110,15 +119,6 @@ class Design:
     spread: Array
 
 
-DECADE: float = 10.0
-"""Size of an effect over its usual one, at most."""
-
-UNKNOWN: float = 1e3
-"""Standard deviation of a parameter of which nothing is known, over what makes all of the target."""
-
-LAW: str = "law"
-
-
 def make_design(problems: Sequence[Problem], regression: Regression, colours: Colours, designs: Designs) -> Design:
     """Columns of everything that may be there."""
     builder = _Builder(regression, colours)
@@ -126,7 +126,9 @@ def make_design(problems: Sequence[Problem], regression: Regression, colours: Co
     kinds = math.log(len(names) + 1)
     found = [*builder.named(problems[0], kinds), *builder.free(problems[0], designs, kinds)]
     rows, known = regression.rows, problems[0].known
-    spread = UNKNOWN * float(np.linalg.norm(rows.target)) / np.maximum(np.linalg.norm(rows.baseline, axis=0), 1e-300)
+    length = np.linalg.norm(rows.baseline, axis=0)
+    whole = UNKNOWN * float(np.linalg.norm(rows.target))
+    spread = np.divide(whole, length, out=np.zeros_like(length), where=length > 0)
     spread[known.places] = known.std
     values = np.zeros(len(spread))
     values[known.places] = known.values
@@ -153,10 +155,9 @@ class _Builder:
         places = Counter(str(one.effect) for one in problem.candidates if not one.excluded)
         found = []
         for number, candidate in enumerate(problem.candidates):
-            shown = [one for one in layout[number] if one.width and sizes[one.place][0] > 0]
+            shown = [one for one in layout[number] if one.width and sizes[one.place].max() > 0]
             weight = -math.log(max(len(shown), 1))
-            largest = DECADE * candidate.usual
-            blocks = tuple(self._block(column, sizes[column.place], weight, largest) for column in shown)
+            blocks = tuple(self._block(column, sizes[column.place], weight, candidate) for column in shown)
             if blocks and not candidate.excluded:
                 price = kinds + math.log(places[str(candidate.effect)]) + candidate.price
                 found.append(Hypothesis(candidate.key, str(candidate.effect), price, blocks, candidate=number))
@@ -172,10 +173,14 @@ class _Builder:
                 found.append(Hypothesis(dependence.key, LAW, price, blocks, dependence=number))
         return found
 
-    def _block(self, column: Column, sizes: Array, weight: float, largest: float) -> Block:
+    def _block(self, column: Column, sizes: Array, weight: float, candidate: Candidate) -> Block:
         kept = sizes > LEAST * sizes.max()
         place = self._appended(self.regression.rows.columns[:, column.place][:, kept] / sizes[kept])
-        return Block(place, np.eye(int(kept.sum())), weight, column, kept, sizes[kept], largest * sizes[0])
+        start = candidate.variants[column.variant].start
+        # The size that a coefficient of one is: a ripple's is told at the motor, its column at the wheel.
+        unit = 1.0 if start is None else abs(float(start(np.eye(column.width)[0])[0]))
+        largest = DECADE * candidate.usual / unit * sizes[0] if kept[0] and unit else math.inf
+        return Block(place, np.eye(int(kept.sum())), weight, column, kept, sizes[kept], largest)
 
     def _function(self, columns: Array, knots: Knots) -> tuple[Block, ...]:
         """A function at every length, in the directions that they have in common."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from ident.diagnosis.linear import rms
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Rows
 from ident.diagnosis.whitening import Predictor, predictor_of
@@ -40,6 +41,7 @@ ROUNDS: Final = 4
 """Times that the sizes of all labels are looked at."""
 
 USUAL: Final = 0
+"""Number of nothing among them."""
 
 
 class Colours:
@@ -57,19 +59,22 @@ class Colours:
         self._places: list[slice] = []
         self._tolerated: list[Array] = []
         self._lacking: list[Array] = []
-        alone = regression.whitener(())
+        alone = None if all(colour.count for colour in regression.repeats) else regression.whitener(())
         for (block, kept), place in zip(self.rows.blocks, self.rows.block_slices, strict=True):
             if place.stop == place.start:
                 continue
             found.setdefault(f"{block.channel}/{block.label}", []).append(len(self._places))
             group = int(self.rows.group[place.start])
             colour = regression.repeats[group]
-            predictor = predictor_of(colour) if colour.count else alone.predictors[group]
-            noise = _covariance(predictor, self.rows.run[place])
             time = kept.samples[0] * block.sample_time
             memory = _remembering(np.abs(np.subtract.outer(time, time)))
+            # What nothing that repeats tells apart has what is tolerated in it.
+            predictor = predictor_of(colour) if alone is None or colour.count else alone.predictors[group]
+            tolerated = block.tolerance**2 * memory if colour.count else np.zeros_like(memory)
+            least = (ROUNDING * rms(self.rows.target[place])) ** 2 * np.eye(len(memory))
+            noise = _covariance(predictor, self.rows.run[place]) + least
             self._places.append(place)
-            self._tolerated.append(noise + block.tolerance**2 * memory)
+            self._tolerated.append(noise + tolerated)
             self._lacking.append(float(np.mean(np.diag(self._tolerated[-1]))) * memory)
         self.labels = tuple(found)
         self.blocks = tuple(tuple(numbers) for numbers in found.values())
@@ -134,11 +139,6 @@ class Noise:
         del rows
         columns = values[:, None] if np.ndim(values) == 1 else values
         return self.colours.white(columns, self.sizes)[0].reshape(np.shape(values))
-
-    @property
-    def price(self) -> float:
-        """Log odds against so much being lacking."""
-        return price_of(self.sizes)
 
 
 def price_of(sizes: Sizes) -> float:

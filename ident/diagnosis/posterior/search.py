@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from ident.diagnosis.posterior.evidence import Member
@@ -19,7 +19,7 @@ INSTEAD: Final = 2
 """Names that may stand for a law."""
 
 SURVIVORS: Final = 5
-"""Hypotheses that are fitted exactly at every step."""
+"""Hypotheses that are fitted exactly at every step, by either noise."""
 
 SURELY: Final = 3.0
 """Log posterior by which a law must be better than names to stand in their place: twenty to one."""
@@ -33,10 +33,17 @@ class Search:
 
     Args:
         fitter: of the sets.
+        refuted: hypotheses that the records speak against.
     """
 
-    def __init__(self, fitter: Fitter) -> None:
+    def __init__(self, fitter: Fitter, refuted: frozenset[int] = frozenset()) -> None:
         self.fitter, self.design = fitter, fitter.design
+        self.invisible = fitter.invisible()
+        self.refuted = refuted | self.invisible
+
+    def without(self, refuted: Collection[int]) -> Search:
+        """The same search without some hypotheses more."""
+        return Search(self.fitter, self.refuted | frozenset(refuted))
 
     def run(self) -> State:
         """The best set that was found."""
@@ -47,9 +54,13 @@ class Search:
             if further.log_posterior <= state.log_posterior:
                 break
             state = further
-        return self._named(self.against_rivals(state))
+        return self.revised(state)
 
-    def against_rivals(self, state: State) -> State:
+    def revised(self, state: State) -> State:
+        """With the best hypothesis in every place, and names for laws."""
+        return self._named(self._against_rivals(state))
+
+    def _against_rivals(self, state: State) -> State:
         """With the best hypothesis in the place of every member."""
         for _ in range(TURNS):
             before = state
@@ -79,7 +90,7 @@ class Search:
             tables = {
                 index: table
                 for index, table in one.tables().items()
-                if table.is_there and not (named and hypotheses[index].free)
+                if table.is_there and index not in self.refuted and not (named and hypotheses[index].free)
             }
             odds = {index: table.total - hypotheses[index].price for index, table in tables.items()}
             most = max(odds.values(), default=0.0)
@@ -102,11 +113,11 @@ class Search:
     def _named(self, state: State) -> State:
         """With names in the place of every law that is not surely better."""
         for index in [one for one in state.members if self.design.hypotheses[one].free]:
-            instead = self.fitter.state(state.without(index), state)
+            bare = self.fitter.state(state.without(index), state)
+            least, instead = max(state.log_posterior - SURELY, bare.log_posterior), bare
             for _ in range(INSTEAD):
-                further = self._expanded(instead, named=True)
-                instead = max(further, key=lambda one: one.log_posterior, default=instead)
-                if instead.log_posterior > state.log_posterior - SURELY:
+                instead = max(self._expanded(instead, named=True), key=lambda one: one.log_posterior, default=instead)
+                if instead is not bare and instead.log_posterior > least:
                     state = instead
                     break
         return state

@@ -31,13 +31,11 @@ class Slot:
     """One place of the best set.
 
     Attributes:
-        member: what stands there.
         logs: log posterior odds of every hypothesis against nothing there, the greatest first.
         cosines: of what the member adds and what every other can.
         alike: hypotheses that add the same, the member first.
     """
 
-    member: int
     logs: Mapping[int, float]
     cosines: Mapping[int, float]
     alike: tuple[int, ...]
@@ -78,11 +76,13 @@ def slot_of(search: Search, state: State, index: int) -> Slot:
     others = state.without(index)
     without = replace(state, members=others, bends={one: bend for one, bend in state.bends.items() if one != index})
     beside, bare = without.target.beside(others), search.fitter.state(others, state).log_posterior
+    # Others that cannot be there without it, by their sign, are no ground to stand on.
+    bare = bare if math.isfinite(bare) else search.fitter.nothing.log_posterior
     # Without it the rows may have another noise.
-    base = without.log_posterior - bare
+    base = without.log_posterior - bare if math.isfinite(without.log_posterior) else 0.0
     logs: dict[int, float] = {}
     for number, hypothesis in enumerate(hypotheses):
-        if number not in others:
+        if number not in others and number not in search.refuted:
             table = without.target.table(number, beside)
             if table.is_there:
                 logs[number] = base + table.total - hypothesis.price
@@ -93,18 +93,17 @@ def slot_of(search: Search, state: State, index: int) -> Slot:
         logs[rival] = search.fitter.state({**others, rival: table.best}, state).log_posterior - bare
     logs = {one: log for one, log in sorted(logs.items(), key=lambda entry: -entry[1]) if math.isfinite(log)}
     cosines = _cosines(state, index, logs)
-    width = _width(search, state, index)
-    alike = [one for one, cosine in cosines.items() if cosine > ALIKE and one != index]
-    alike = [one for one in alike if not hypotheses[one].free and len(hypotheses[one].blocks[0].factor) == width]
-    return Slot(index, logs, cosines, (index, *(alike if not hypotheses[index].free else [])))
+    width = len(hypotheses[index].blocks[state.members[index].block].factor)
+    alike = [
+        one
+        for one, (cosine, size) in cosines.items()
+        if cosine > ALIKE and size == width and one != index and not (hypotheses[one].free or hypotheses[index].free)
+    ]
+    return Slot(logs, {one: cosine for one, (cosine, _) in cosines.items()}, (index, *alike))
 
 
-def _width(search: Search, state: State, index: int) -> int:
-    return len(search.design.hypotheses[index].blocks[state.members[index].block].factor)
-
-
-def _cosines(state: State, index: int, others: Mapping[int, float]) -> dict[int, float]:
-    """Of what a member adds to the white rows, beside the other members, and what each other can."""
+def _cosines(state: State, index: int, others: Mapping[int, float]) -> dict[int, tuple[float, int]]:
+    """Of what a member adds to the white rows beside the others, and what each other can; by how many columns."""
     products = state.target.beside(state.without(index))
     hypotheses = state.evidence.design.hypotheses
     own = hypotheses[index].blocks[state.members[index].block]
@@ -112,12 +111,12 @@ def _cosines(state: State, index: int, others: Mapping[int, float]) -> dict[int,
     power = float(mean @ products[own.place, own.place] @ mean)
     found = {}
     for other in others:
-        most = 0.0
+        best = 0.0, 0
         for block in hypotheses[other].blocks:
             inner, across = products[block.place, block.place], products[block.place, own.place] @ mean
             turned = block.factor.T @ inner @ block.factor
             along = block.factor.T @ across
             made = float(along @ np.linalg.pinv(turned, rcond=1e-9, hermitian=True) @ along)
-            most = max(most, made)
-        found[other] = math.sqrt(min(most / power, 1.0)) if power > 0 else 0.0
+            best = max(best, (made, len(block.factor)), key=lambda one: one[0])
+        found[other] = math.sqrt(min(best[0] / power, 1.0)) if power > 0 else 0.0, best[1]
     return found

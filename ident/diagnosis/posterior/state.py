@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -50,6 +50,12 @@ class State:
         inside = sum(table.inside for table in tables.values())
         price = sum(hypotheses[index].price for index in self.members) + price_of(self.evidence.sizes)
         return self.target.nothing + self.target.log_likelihood(self.members) + inside - price
+
+    def judged(self) -> State:
+        """The same, its posterior computed, without the products of its rows: those are as large as of everything."""
+        found = replace(self)
+        found.__dict__["log_posterior"] = self.log_posterior
+        return found
 
     def table(self, hypothesis: int) -> Table:
         """Evidence of a member beside the others, by its slopes where it has them: those are of one block."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.posterior.answer import judge_by_posterior
+from ident.diagnosis.problem import Problem, Variant
+from ident.effects import EffectParameter
 
 World = Callable[..., Any]
 
@@ -72,7 +75,75 @@ def test_without_repeats_a_cause_is_still_found(world: World) -> None:
 
 def test_probabilities_are_of_what_may_stand_there(world: World) -> None:
     findings = judged(world(11, true={"b": 0.08}))
-    for cause in findings.causes:
-        total = sum(cause.ranked.probabilities.values())
-        assert 0 < total <= 1 + 1e-9
-        assert np.all(np.diff(list(cause.ranked.probabilities.values())) <= 1e-12)
+    (cause,) = findings.causes
+    assert sum(cause.ranked.probabilities.values()) + findings.significance == pytest.approx(1.0)
+    assert 0.5 < cause.probability < 1.0
+
+
+def with_candidates(made: Any, *merged: tuple[str, ...], least: float | None = None) -> list[Problem]:
+    """The world's problems, some of its columns being those of one candidate each, of the first one's name."""
+    found = []
+    for problem in (made.problem(0), made.problem(1)):
+        columns = {str(one.effect): one.variants[0].columns for one in problem.candidates}
+        candidates = tuple(
+            replace(
+                problem.candidate(f"{names[0]}@place"),
+                parameters=tuple(EffectParameter(name, "Nm", "") for name in names),
+                variants=(Variant(tuple(np.hstack(parts) for parts in zip(*map(columns.get, names), strict=True))),),
+                least=least,
+            )
+            for names in merged
+        )
+        found.append(replace(problem, candidates=candidates))
+    return found
+
+
+def test_a_cause_of_two_numbers_is_named_if_either_is_there(world: World) -> None:
+    for seed in (12, 13, 14):
+        problems = with_candidates(world(seed, true={"b": 0.4}), ("a", "b"), ("c",))
+        findings = judge_by_posterior(*problems, seed=1)
+        assert named(findings) == ["a"]
+        assert findings.causes[0].part.values == pytest.approx([0.0, 0.4], abs=0.15)
+
+
+def test_a_cause_of_one_sign_is_none_of_the_other(world: World) -> None:
+    for names in (("a",), ("a", "b")):
+        problems = with_candidates(world(15, true={"a": -2.0}), names, ("c",), least=0.0)
+        findings = judge_by_posterior(*problems, seed=1)
+        assert not findings.causes
+        assert findings.verdict is Verdict.UNKNOWN
+
+
+def test_two_causes_of_which_neither_makes_sense_alone_are_both_named(world: World) -> None:
+    """By itself the second one has the wrong sign, as most of it goes against the first."""
+    made = world(16, true={"a": 2.0, "b": 1.0})
+
+    def opposed(problem: Problem) -> Problem:
+        first, second = (
+            [one for one in problem.candidate(f"{name}@place").variants[0].columns if one is not None] for name in "ab"
+        )
+        against = tuple(0.3 * y - x for x, y in zip(first, second, strict=True))
+        noise = [b.target - 2.0 * x[:, 0] - y[:, 0] for b, x, y in zip(problem.blocks, first, second, strict=True)]
+        whole = [t + 6 * x[:, 0] + 4 * z[:, 0] for t, x, z in zip(noise, first, against, strict=True)]
+        candidates = (
+            problem.candidate("a@place"),
+            replace(problem.candidate("b@place"), variants=(Variant(against),), least=0.0),
+        )
+        blocks = tuple(replace(b, target=t) for b, t in zip(problem.blocks, whole, strict=True))
+        return replace(problem, blocks=blocks, candidates=candidates)
+
+    findings = judge_by_posterior(opposed(made.problem(0)), opposed(made.problem(1)), seed=1)
+    assert sorted(named(findings)) == ["a", "b"]
+
+
+def test_what_the_baseline_absorbs_is_said_to_be_invisible(world: World) -> None:
+    made = world(17, true={"b": 0.5})
+
+    def absorbed(problem: Problem) -> Problem:
+        columns = tuple(block.baseline[:, :1] for block in problem.blocks)
+        first = replace(problem.candidates[0], variants=(Variant(columns),))
+        return replace(problem, candidates=(first, *problem.candidates[1:]))
+
+    findings = judge_by_posterior(absorbed(made.problem(0)), absorbed(made.problem(1)), seed=1)
+    assert findings.invisible == ("a",)
+    assert named(findings) == ["b"]
