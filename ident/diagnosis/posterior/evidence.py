@@ -151,10 +151,12 @@ class Evidence:
         return Target(self, found, -0.5 * float(found[-1, -1]) - self._volume - self._determinant)
 
     def parameters(self, added: Array) -> Array:
-        """(p,) of the plant beside what some members add (n,), in their units."""
+        """(p,) of the plant beside what some members add (n,), in their units; those that are known as they are."""
+        if not self.design.free.any():
+            return self.design.known
         along, _ = self.products.with_others(self.sizes, (self.design.target - added)[:, None])
         own = linalg.cho_solve(self._baseline, along[: len(self._across), 0])
-        return np.asarray(self.design.known + self.design.spread * own)
+        return np.asarray(self.design.known + np.where(self.design.free, self.design.spread * own, 0.0))
 
     def _bent(self, bends: Collection[Bent]) -> Array:
         width, found = len(self._across), self._beside.copy()

@@ -32,6 +32,10 @@ FURTHEST: Final = 0.3
 """Share of a held number that it is moved by at once, or of one where it is zero: a phase, a share."""
 
 
+STILL: Final = 0.03
+"""Part of the furthest step from which a held number stays where it is: a hundredth of it."""
+
+
 class Fitter:
     """Fits sets of hypotheses, each of them once.
 
@@ -145,9 +149,11 @@ class Fitter:
             return state
         others = {one: member for one, member in state.members.items() if one != index}
         step = self._step(replace(state, bends={**state.bends, index: bent}), others, form, bent)
+        if np.abs(step).max() < STILL * FURTHEST * np.abs(_range(bent.held)).max():
+            return state
         moved = self._bends.bend(form, mean, bent.held + step)
         better = state if moved is None else replace(state, bends={**state.bends, index: moved})
-        return max(state, better, key=lambda one: one.log_posterior)
+        return better if better.log_posterior > state.log_posterior + SETTLED else state
 
     def _step(self, state: State, others: Members, form: Form, bent: Bent) -> Array:
         """(H,) of the held numbers of a member, everything else fitted beside."""
@@ -164,7 +170,7 @@ class Fitter:
         rows = np.vstack([white[:, :-1] * scale, own * scale, beside, np.eye(len(scale))[:width]])
         target = np.concatenate([white[:, -1], bent.expected[1], wanted, np.zeros(width)])
         found = np.linalg.lstsq(rows, target, rcond=None)[0] * scale
-        most = FURTHEST * np.where(bent.held == 0, 1.0, np.abs(bent.held))
+        most = FURTHEST * _range(bent.held)
         return np.asarray(np.clip(found[-len(size) :], -most, most))
 
     def _expected_beside(self, state: State, members: Members, count: int) -> tuple[Array, Array]:
@@ -197,3 +203,8 @@ class Fitter:
             else:
                 found += bent.slopes @ means[index] + bent.missed
         return found
+
+
+def _range(held: Array) -> Array:
+    """(H,) what held numbers are measured by: themselves, or one where they are zero."""
+    return np.where(held == 0, 1.0, np.abs(held))

@@ -109,6 +109,7 @@ class Design:
         baseline: (n, p) of the parameters of the plant, each in standard deviations of what is known of it.
         target: (n,) without what is known of them.
         known, spread: (p,) of the parameters, in their units.
+        free: (p,) of which nothing is known.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -117,6 +118,7 @@ class Design:
     target: Array
     known: Array
     spread: Array
+    free: NDArray[np.bool_]
 
 
 def make_design(problems: Sequence[Problem], regression: Regression, colours: Colours, designs: Designs) -> Design:
@@ -130,10 +132,11 @@ def make_design(problems: Sequence[Problem], regression: Regression, colours: Co
     whole = UNKNOWN * float(np.linalg.norm(rows.target))
     spread = np.divide(whole, length, out=np.zeros_like(length), where=length > 0)
     spread[known.places] = known.std
-    values = np.zeros(len(spread))
+    values, free = np.zeros(len(spread)), np.ones(len(spread), dtype=bool)
+    free[known.places] = False
     values[known.places] = known.values
     target = rows.target - rows.baseline @ values
-    return Design(tuple(found), np.hstack(builder.columns), rows.baseline * spread, target, values, spread)
+    return Design(tuple(found), np.hstack(builder.columns), rows.baseline * spread, target, values, spread, free)
 
 
 class _Builder:
