@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any, Final
@@ -92,8 +93,8 @@ def diagnose_exam(
         removed: candidate that is taken out of the library, by case; all of them are left in without.
 
     Raises:
-        UserError: there is no exam, or it has no records yet; or candidates are to be
-            removed from a sealed one before all of its cases have been diagnosed with all of them.
+        UserError: there is no exam, or it has no records yet; or candidates are to be removed from a sealed one before
+            all of its cases have been diagnosed with all of them.
     """
     forbid_emulator()
     exam = read_exam(folder)
@@ -215,13 +216,6 @@ def diagnose_case(
     return identifier, _timed(answer)
 
 
-def diagnose_case_by_posterior(
-    identifier: str, fit: bytes, confirm: bytes, vehicle: str, model: str, removed: str | None
-) -> tuple[str, bytes]:
-    """The same by the core `one`."""
-    return diagnose_case(identifier, fit, confirm, vehicle, model, removed, judge_by_posterior)
-
-
 def described(vehicle: str, model: str) -> tuple[VehicleDescription, ExtendedModel]:
     """What the texts of their files say of vehicle and model."""
     with tempfile.TemporaryDirectory() as scratch:
@@ -259,7 +253,7 @@ _FUNCTIONS: Final[Mapping[tuple[Core, bool], Callable[..., tuple[str, bytes]]]] 
     {
         (Core.STANDING, False): diagnose_case,
         (Core.STANDING, True): diagnose_axis_case,
-        (Core.ONE, False): diagnose_case_by_posterior,
+        (Core.ONE, False): partial(diagnose_case, judged=judge_by_posterior),
         (Core.ONE, True): diagnose_axis_by_core,
     }
 )

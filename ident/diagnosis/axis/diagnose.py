@@ -25,6 +25,9 @@ LIMITS: Final = Limits(nearly=0.6, humble=True)
 """Of an axis. Its effort has little noise, beside which cogging and errors of its pitch always repeat, without a name:
 what they leave does not take the name from a cause that closes one and a half times as much, but makes it less sure."""
 
+STANDING: Final[Judge] = partial(judge, limits=LIMITS)
+"""What finds the causes of an axis, unless something else is asked to."""
+
 
 def diagnose_axis(
     fit: Sequence[AxisRecord],
@@ -34,7 +37,7 @@ def diagnose_axis(
     cutoff: float | None = None,
     lacking: Collection[str] = (),
     stage: Stage = untold,
-    judged: Judge | None = None,
+    judged: Judge = STANDING,
 ) -> Findings:
     """What the model M a + Fv v + Fc sign(v) + offset lacks.
 
@@ -45,7 +48,7 @@ def diagnose_axis(
         cutoff: of the position filter [rad/s]; None: chosen from the records.
         lacking: names of effects that are not looked for.
         stage: told what begins.
-        judged: finds the causes; None: what stands.
+        judged: finds the causes.
 
     Raises:
         RecordError: the records do not have the same axes.
@@ -53,7 +56,7 @@ def diagnose_axis(
     """
     # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        return _diagnosed(fit, confirm, seed, cutoff, lacking, stage, judged or partial(judge, limits=LIMITS))
+        return _diagnosed(fit, confirm, seed, cutoff, lacking, stage, judged)
 
 
 def _diagnosed(
@@ -63,21 +66,21 @@ def _diagnosed(
     cutoff: float | None,
     lacking: Collection[str],
     stage: Stage,
-    finds: Judge,
+    judged: Judge,
 ) -> Findings:
     refuse_other_axes([*fit, *confirm])
     stage("filter of the records")
     reference = axis_reference(fit, cutoff, confirm)
 
-    def judged(reference: Reference) -> Findings:
-        return finds(*pose_axis(fit, confirm, reference, lacking), seed=seed, stage=stage)
+    def found_by(reference: Reference) -> Findings:
+        return judged(*pose_axis(fit, confirm, reference, lacking), seed=seed, stage=stage)
 
-    findings = judged(reference)
+    findings = found_by(reference)
     scales = tuple(_on_second_thought(reference.scales, findings, fit[0].axes))
     if all(scale is before for scale, before in zip(scales, reference.scales, strict=True)):
         return findings
     stage("again, an axis being late, or not")
-    return judged(replace(reference, scales=scales))
+    return found_by(replace(reference, scales=scales))
 
 
 def pose_axis(

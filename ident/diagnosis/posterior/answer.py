@@ -194,7 +194,9 @@ class _Answer:
         return Verdict.LAW if self.taken.laws else Verdict.EFFECT
 
     def _invisible(self) -> tuple[str, ...]:
-        shown = {one.name for index, one in enumerate(self.design.hypotheses) if index not in self.search.invisible}
+        shown = {
+            one.name for index, one in enumerate(self.design.hypotheses) if index not in self.search.fitter.invisible
+        }
         names = dict.fromkeys(str(one.effect) for one in self.taken.problems[0].candidates)
         return tuple(name for name in names if name not in shown and not name.startswith(LAW))
 
@@ -224,13 +226,12 @@ class _Answer:
 
     def _law_answer(self, law: Law, index: int) -> LawAnswer:
         column = self.taken.regression.rows.layout[self.taken.variants[index]]
-        named = [(one, cosine) for one, cosine in self.slots[index].cosines.items() if not self._is_free(one)]
+        named = [
+            (one, cosine) for one, cosine in self.slots[index].cosines.items() if not self.design.hypotheses[one].free
+        ]
         nearest = max(named, key=lambda one: one[1], default=None)
         near = None if nearest is None else (self.design.hypotheses[nearest[0]].key, nearest[1])
         return law_answer(law, channel_of(self.taken.problems[0], column), near)
-
-    def _is_free(self, index: int) -> bool:
-        return self.design.hypotheses[index].free
 
 
 def _as_variants(

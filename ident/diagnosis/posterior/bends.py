@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -184,7 +185,7 @@ class Form:
         """(H,) numbers that the coefficients say nothing of, as the columns are made for."""
         return self._started(coefficients)[self._is_held]
 
-    @property
+    @cached_property
     def _is_held(self) -> NDArray[np.bool_]:
         """(M,) which numbers the coefficients say nothing of; nothing that comes along with the parameters is held."""
         ones = np.ones(len(self.block.sizes))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -31,7 +32,6 @@ TELLING: Final = 5.0
 FURTHEST: Final = 0.3
 """Share of a held number that it is moved by at once, or of one where it is zero: a phase, a share."""
 
-
 STILL: Final = 0.03
 """Part of the furthest step from which a held number stays where it is: a hundredth of it."""
 
@@ -51,6 +51,7 @@ class Fitter:
         self._kept: dict[frozenset[int], State] = {}
         self._evidence: dict[Sizes, Evidence] = {}
 
+    @cached_property
     def invisible(self) -> frozenset[int]:
         """Hypotheses of which the plant's parameters absorb all but nothing."""
         evidence = self._evidence_with(self._colours.usual)
@@ -99,7 +100,7 @@ class Fitter:
         columns = [self.design.baseline, *(self._columns(state, index, one) for index, one in state.members.items())]
         count = sum(one.shape[1] for one in columns)
         known = np.column_stack(self._expected_beside(state, state.members, count))
-        target = self.design.target - sum((bent.missed for bent in state.bends.values()), np.zeros(len(columns[0])))
+        target = self.design.target - state.missed
         return most_likely(self._colours, np.hstack(columns), target, known.T @ known, state.evidence.sizes)
 
     def _settled(self, state: State) -> State:
@@ -121,14 +122,11 @@ class Fitter:
         """With the exact forms of its members, about the numbers that they have."""
         means, hypotheses = state.target.means(state.members), self.design.hypotheses
         blocks = {index: hypotheses[index].blocks[one.block] for index, one in state.members.items()}
-        if not any(self._bends.is_bent(hypotheses[index], block) for index, block in blocks.items()):
+        bent_ones = [index for index, block in blocks.items() if self._bends.is_bent(hypotheses[index], block)]
+        if not bent_ones:
             return state
-        parameters = state.evidence.parameters(self._added(state, blocks, means))
-        forms = {
-            index: self._bends.form(hypotheses[index], block, parameters)
-            for index, block in blocks.items()
-            if self._bends.is_bent(hypotheses[index], block)
-        }
+        parameters = self._parameters(state, blocks, means)
+        forms = {index: self._bends.form(hypotheses[index], blocks[index], parameters) for index in bent_ones}
         before = {index: state.bends[index].held if index in state.bends else None for index in forms}
         found = {index: self._bends.bend(form, means[index], before[index]) for index, form in forms.items()}
         state = replace(state, bends={index: bent for index, bent in found.items() if bent is not None})
@@ -147,8 +145,7 @@ class Fitter:
         bent = state.bends.get(index) or self._bends.bend(form, mean, form.held(mean))
         if bent is None or not bent.held.size:
             return state
-        others = {one: member for one, member in state.members.items() if one != index}
-        step = self._step(replace(state, bends={**state.bends, index: bent}), others, form, bent)
+        step = self._step(replace(state, bends={**state.bends, index: bent}), state.without(index), form, bent)
         if np.abs(step).max() < STILL * FURTHEST * np.abs(_range(bent.held)).max():
             return state
         moved = self._bends.bend(form, mean, bent.held + step)
@@ -159,8 +156,7 @@ class Fitter:
         """(H,) of the held numbers of a member, everything else fitted beside."""
         free, expected = form.held_slopes(bent), form.expected_of_held(bent)
         columns = [self.design.baseline, *(self._columns(state, index, one) for index, one in others.items())]
-        missed = sum((one.missed for one in state.bends.values()), np.zeros(len(free)))
-        whole = np.column_stack([*columns, bent.slopes, free, self.design.target - missed])
+        whole = np.column_stack([*columns, bent.slopes, free, self.design.target - state.missed])
         white, _ = self._colours.white(whole, state.evidence.sizes)
         width, size = sum(one.shape[1] for one in columns), np.linalg.norm(white[:, -1 - free.shape[1] : -1], axis=0)
         scale = np.concatenate([np.ones(white.shape[1] - 1 - len(size)), 1 / np.maximum(size, np.finfo(float).tiny)])
@@ -193,16 +189,15 @@ class Fitter:
         columns = self.design.columns[:, block.place] if bent is None else bent.slopes
         return np.asarray(columns @ (member.scale * block.factor))
 
-    def _added(self, state: State, blocks: Mapping[int, Block], means: Mapping[int, Array]) -> Array:
-        """(n,) what the members add."""
-        found = np.zeros(len(self.design.target))
+    def _parameters(self, state: State, blocks: Mapping[int, Block], means: Mapping[int, Array]) -> Array:
+        """(p,) of the plant beside the members: those that are known as they are, the others fitted."""
+        if not self.design.free.any():
+            return self.design.known
+        added = state.missed
         for index, block in blocks.items():
             bent = state.bends.get(index)
-            if bent is None:
-                found += self.design.columns[:, block.place] @ means[index]
-            else:
-                found += bent.slopes @ means[index] + bent.missed
-        return found
+            added = added + (self.design.columns[:, block.place] if bent is None else bent.slopes) @ means[index]
+        return state.evidence.parameters(added)
 
 
 def _range(held: Array) -> Array:

@@ -90,19 +90,15 @@ class Colours:
         found, volume = np.array(values, dtype=float), 0.0
         for label, size in enumerate(sizes):
             for number in self.blocks[label]:
-                place, factor = self._places[number], self._factor(number, size)
-                found[place] = linalg.solve_triangular(factor, found[place], lower=True, check_finite=False)
-                volume += float(np.sum(np.log(np.diag(factor))))
+                place = self._places[number]
+                found[place], more = self._whitened(number, size, found[place])
+                volume += more
         return found, volume
 
     def of_label(self, label: int, size: int, values: Array) -> tuple[Array, float]:
         """White rows of a label alone, of values (n, k) of all rows; and half the log of the determinant."""
-        parts, volume = [], 0.0
-        for number in self.blocks[label]:
-            factor = self._factor(number, size)
-            parts.append(linalg.solve_triangular(factor, values[self._places[number]], lower=True, check_finite=False))
-            volume += float(np.sum(np.log(np.diag(factor))))
-        return np.vstack(parts), volume
+        made = [self._whitened(number, size, values[self._places[number]]) for number in self.blocks[label]]
+        return np.vstack([white for white, _ in made]), sum(volume for _, volume in made)
 
     def weighted(self, sizes: Sizes, values: Array) -> Array:
         """Rows (n, k) times the inverse of their covariance."""
@@ -112,6 +108,12 @@ class Colours:
                 place = self._places[number]
                 found[place] = linalg.cho_solve((self._factor(number, size), True), found[place], check_finite=False)
         return found
+
+    def _whitened(self, number: int, size: int, values: Array) -> tuple[Array, float]:
+        """White rows of a block, of values (m, k) of its rows; and half the log of the determinant."""
+        factor = self._factor(number, size)
+        white = linalg.solve_triangular(factor, values, lower=True, check_finite=False)
+        return white, float(np.sum(np.log(np.diag(factor))))
 
     def _factor(self, number: int, size: int) -> Array:
         """(n, n) lower triangular, of the covariance of a block."""

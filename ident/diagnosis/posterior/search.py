@@ -38,8 +38,7 @@ class Search:
 
     def __init__(self, fitter: Fitter, refuted: frozenset[int] = frozenset()) -> None:
         self.fitter, self.design = fitter, fitter.design
-        self.invisible = fitter.invisible()
-        self.refuted = refuted | self.invisible
+        self.refuted = refuted | fitter.invisible
 
     def without(self, refuted: Collection[int]) -> Search:
         """The same search without some hypotheses more."""

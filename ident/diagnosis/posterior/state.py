@@ -57,6 +57,11 @@ class State:
         found.__dict__["log_posterior"] = self.log_posterior
         return found
 
+    @property
+    def missed(self) -> Array:
+        """(n,) of the target, what neither the columns nor the slopes of its members have."""
+        return sum((bent.missed for bent in self.bends.values()), np.zeros(len(self.evidence.design.target)))
+
     def table(self, hypothesis: int) -> Table:
         """Evidence of a member beside the others, by its slopes where it has them: those are of one block."""
         only = self.members[hypothesis].block if hypothesis in self.bends else None

@@ -117,7 +117,12 @@ def dynamic_rows(mode: Mode | None, z: Inputs, parameters: Expression, terms: Se
 
 def kinematic_rows(spec: RowsOfStep, z: Inputs, terms: Sequence[EffectTerm]) -> Expression:
     """Velocities that rolling wheels do not have, in `kinematic_coordinates` [m/s]."""
-    residual = _slip(z, true_steering(terms, z.alpha), rolling_radii(terms, z.beta))
+    return _rolling(spec, z, terms, rolling_radii(terms, z.beta))
+
+
+def _rolling(spec: RowsOfStep, z: Inputs, terms: Sequence[EffectTerm], radii: Expression) -> Expression:
+    """The same on any radii (4,)."""
+    residual = _slip(z, true_steering(terms, z.alpha), radii)
     return ca.vertcat(*in_coordinates([residual[wheel] for wheel in range(len(WHEELS))], spec))
 
 
@@ -222,8 +227,7 @@ class Formulas:
         """(z, geometry, ε) -> (N, rows, 4): the rolling rows of a step over the radii of the wheels."""
         if spec not in self._rolled:
             z, radii = symbolic_inputs(), ca.SX.sym("radii", len(WHEELS))
-            residual = _slip(z, true_steering(self._given, z.alpha), radii)
-            rows = ca.vertcat(*in_coordinates([residual[wheel] for wheel in range(len(WHEELS))], spec))
+            rows = _rolling(spec, z, self._given, radii)
             inputs = [z.all, symbolic.GEOMETRY, symbolic.EPSILON]
             function = ca.Function("rolled", inputs, [ca.cse(ca.densify(ca.jacobian(rows, radii)))])
             self._rolled[spec] = Vectorised(function)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
-import numpy as np
 import pytest
 
 from ident.diagnosis.diagnosis import Verdict
@@ -15,25 +15,9 @@ from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.effects.extended import ExtendedModel
 from ident.records.record import Record, Segment
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.parameters import COULOMB_EPSILON
+from tests.ident.diagnosis.vehicle.flaws import rippled, sticky
 
 Drives = Callable[..., tuple[Record, Record]]
-
-
-def sticky(segment: Segment, vehicle: VehicleDescription) -> Segment:
-    """Friction of the right steering that is 3 Nm larger near standstill."""
-    g, rate = vehicle.geometry, np.gradient(segment.steering_angles[:, 1], segment.sample_time)
-    extra = 3.0 * np.exp(-((rate / 0.25) ** 2)) * np.tanh(rate / COULOMB_EPSILON)
-    wheels = extra * g.wheel_radius / (2 * g.wheel_offset * g.gear_ratio)
-    return replace(
-        segment, motor_torques=segment.motor_torques + np.stack([0 * wheels, 0 * wheels, wheels, -wheels], 1)
-    )
-
-
-def rippled(segment: Segment, vehicle: VehicleDescription) -> Segment:
-    """A motor that gives 0.1 Nm more or less than it reports, twice a revolution."""
-    torque = 0.1 * np.sin(2 * vehicle.geometry.gear_ratio * segment.wheel_angles[:, 2] + 0.4)
-    return replace(segment, motor_torques=segment.motor_torques - torque[:, None] * np.array([0, 0, 1, 0]))
 
 
 def plain(segment: Segment, vehicle: VehicleDescription) -> Segment:
@@ -49,7 +33,10 @@ def judged(drives: Drives, flaw: Callable[..., Segment], vehicle: VehicleDescrip
 
 @pytest.mark.parametrize(
     ("flaw", "key", "sizes"),
-    [(sticky, "stribeck@steering_right", (3.0, 0.25)), (rippled, "torque_ripple@drive_fr", (0.1, 2.0, 0.4))],
+    [
+        (partial(sticky, friction=3.0, fall=0.25), "stribeck@steering_right", (3.0, 0.25)),
+        (partial(rippled, amplitude=0.1), "torque_ripple@drive_fr", (0.1, 2.0, 0.4)),
+    ],
 )
 def test_a_flaw_is_named_with_its_size(
     flaw: Callable[..., Segment],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ from ident.effects import EFFECTS, Effect, make_effect
 from ident.effects.extended import ExtendedModel
 from ident.records.record import Record, Segment
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES, Parameters
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
+from tests.ident.diagnosis.vehicle.flaws import rippled, sticky
 
 Drives = Callable[..., tuple[Record, Record]]
 
@@ -56,28 +58,16 @@ def test_a_centre_of_mass_far_off_the_centre_is_found_with_the_inertia_that_it_m
     assert channel_gaps([confirm], prototype, model, extended)[Channel.OUTCOME].after < 1.2
 
 
-def sticky(segment: Segment, vehicle: VehicleDescription) -> Segment:
-    """Friction of the right steering that is 6 Nm larger near standstill."""
-    g, rate = vehicle.geometry, np.gradient(segment.steering_angles[:, 1], segment.sample_time)
-    extra = 6.0 * np.exp(-((rate / 0.3) ** 2)) * np.tanh(rate / COULOMB_EPSILON)
-    wheels = extra * g.wheel_radius / (2 * g.wheel_offset * g.gear_ratio)
-    return replace(
-        segment, motor_torques=segment.motor_torques + np.stack([0 * wheels, 0 * wheels, wheels, -wheels], 1)
-    )
-
-
-def rippled(segment: Segment, vehicle: VehicleDescription) -> Segment:
-    """A motor that gives 0.3 Nm more or less than it reports, twice a revolution."""
-    torque = 0.3 * np.sin(2 * vehicle.geometry.gear_ratio * segment.wheel_angles[:, 2] + 0.4)
-    return replace(segment, motor_torques=segment.motor_torques - torque[:, None] * np.array([0, 0, 1, 0]))
-
-
 @pytest.mark.parametrize(
     ("flaw", "half", "size"),
     [
-        (sticky, make_effect(EffectName.STRIBECK, "steering_right", {"amplitude": 3.0, "velocity": 0.3}), 6.0),
         (
-            rippled,
+            partial(sticky, friction=6.0, fall=0.3),
+            make_effect(EffectName.STRIBECK, "steering_right", {"amplitude": 3.0, "velocity": 0.3}),
+            6.0,
+        ),
+        (
+            partial(rippled, amplitude=0.3),
             make_effect(EffectName.TORQUE_RIPPLE, "drive_fr", {"amplitude": 0.15, "order": 2.0, "phase": 0.4}),
             0.3,
         ),
