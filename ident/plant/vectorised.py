@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_OPERATIONS: Final[Mapping[int, Callable[..., Any]]] = MappingProxyType(
+OPERATIONS: Final[Mapping[int, Callable[..., Any]]] = MappingProxyType(
     {
         ca.OP_ASSIGN: lambda x: x,
         ca.OP_ADD: np.add,
@@ -52,7 +52,7 @@ _OPERATIONS: Final[Mapping[int, Callable[..., Any]]] = MappingProxyType(
 CHUNK: Final = 8192
 """Samples at a time: so many that calling numpy costs little, so few that they stay in the processor's cache."""
 
-_Instruction = tuple[int, tuple[int, ...], tuple[int, ...], float]
+Instruction = tuple[int, tuple[int, ...], tuple[int, ...], float]
 """CasADi's code of the operation, where its operands are, where its result goes, value of a constant."""
 
 
@@ -65,6 +65,7 @@ class Vectorised:
     Attributes:
         shape: rows and columns of its output.
         places: rows (E,) and columns (E,) of the entries of its output that are no structural zeros.
+        program: its instructions, in their order.
         inputs: (argument, element) of all that its output depends on.
 
     Raises:
@@ -75,9 +76,9 @@ class Vectorised:
         self.shape: tuple[int, int] = function.size_out(0)
         pattern = function.sparsity_out(0)
         self.places = (np.array(pattern.row(), dtype=np.int64), np.array(pattern.get_col(), dtype=np.int64))
-        self._program = [_instruction(function, index) for index in range(function.n_instructions())]
-        self.inputs = frozenset(sources for code, sources, *_ in self._program if code == ca.OP_INPUT)
-        unknown = {code for code, *_ in self._program} - _OPERATIONS.keys() - {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST}
+        self.program = [_instruction(function, index) for index in range(function.n_instructions())]
+        self.inputs = frozenset(sources for code, sources, *_ in self.program if code == ca.OP_INPUT)
+        unknown = {code for code, *_ in self.program} - OPERATIONS.keys() - {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST}
         if unknown:
             raise ValueError(f"no numpy counterpart of the CasADi operations {sorted(unknown)}")
 
@@ -106,7 +107,7 @@ class Vectorised:
 
     def _run(self, columns: Sequence[Sequence[Any]], result: Array) -> None:
         work: dict[int, Any] = {}
-        for code, sources, targets, constant in self._program:
+        for code, sources, targets, constant in self.program:
             if code == ca.OP_INPUT:
                 work[targets[0]] = columns[sources[0]][sources[1]]
             elif code == ca.OP_CONST:
@@ -114,12 +115,12 @@ class Vectorised:
             elif code == ca.OP_OUTPUT:
                 result[targets[1]] = work[sources[0]]
             elif len(sources) == 1:
-                work[targets[0]] = _OPERATIONS[code](work[sources[0]])
+                work[targets[0]] = OPERATIONS[code](work[sources[0]])
             else:
-                work[targets[0]] = _OPERATIONS[code](work[sources[0]], work[sources[1]])
+                work[targets[0]] = OPERATIONS[code](work[sources[0]], work[sources[1]])
 
 
-def _instruction(function: Any, index: int) -> _Instruction:
+def _instruction(function: Any, index: int) -> Instruction:
     code = function.instruction_id(index)
     constant = function.instruction_constant(index) if code == ca.OP_CONST else 0.0
     return code, tuple(function.instruction_input(index)), tuple(function.instruction_output(index)), constant

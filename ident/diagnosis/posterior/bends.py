@@ -31,7 +31,7 @@ STEP: Final = 1e-4
 """Of a coefficient, for a slope."""
 
 NEAR: Final = 0.1
-"""Change of the coefficients, over the largest of them, for which slopes are held."""
+"""Change of the coefficients, over the largest of them, or of the plant's parameters, for which slopes are held."""
 
 NEAR_PLANT: Final = 1e-3
 """Change of the plant's parameters, relative, for which an exact form is held."""
@@ -89,6 +89,14 @@ class Bends:
         candidates = [problem.candidates[hypothesis.candidate] for problem in self.problems]
         return Form(hypothesis.key, candidates, block, self.colours.rows, parameters)
 
+    def last(self, hypothesis: Hypothesis, block: Block) -> Bent | None:
+        """About the numbers that were asked for last, whatever stood beside.
+
+        Where no numbers are held, which might have been moved to where another set wants them.
+        """
+        found = self._kept.get((hypothesis.key, block.place.start))
+        return None if found is None or found.held.size else found
+
     def bend(self, form: Form, coefficients: Array, held: Array | None) -> Bent | None:
         """About some coefficients (K,) and held numbers (H,), or those of the columns; None where these miss nothing.
 
@@ -99,14 +107,16 @@ class Bends:
         if held is None and size <= self._straight.get(key, 0.0):
             return None
         numbers = form.held(coefficients) if held is None else held
-        alike = kept is not None and np.array_equal(kept.held, numbers) and self._beside_the_same(key, form)
-        if kept is not None and alike and np.abs(kept.about - coefficients).max() < SAME / math.sqrt(len(kept.missed)):
-            return kept
+        alike = kept is not None and np.array_equal(kept.held, numbers)
+        moved = math.inf if kept is None else float(np.abs(kept.about - coefficients).max())
+        if kept is not None and alike and moved < SAME / math.sqrt(len(kept.missed)):
+            if self._beside_the_same(key, form, NEAR_PLANT):
+                return kept
         here, expected = form.added(coefficients, numbers), form.expected_about(coefficients, numbers)
         if held is None and not len(expected[1]) and self._power(here - form.by_columns(coefficients)) < NEGLIGIBLE:
             self._straight[key] = size
             return None
-        if kept is not None and alike and np.abs(kept.about - coefficients).max() < NEAR * size:
+        if kept is not None and alike and moved < NEAR * size and self._beside_the_same(key, form, NEAR):
             slopes = kept.slopes
         else:
             slopes = form.slopes(coefficients, numbers, here)
@@ -114,9 +124,9 @@ class Bends:
         self._kept[key], self._parameters[key] = found, form.parameters
         return found
 
-    def _beside_the_same(self, key: tuple[str, int], form: Form) -> bool:
-        """Whether the last answer was for a plant of the same parameters, but for `NEAR_PLANT`."""
-        return bool(np.allclose(self._parameters[key], form.parameters, rtol=NEAR_PLANT, atol=0.0))
+    def _beside_the_same(self, key: tuple[str, int], form: Form, but: float) -> bool:
+        """Whether the last answer was for a plant of the same parameters, but for a share of them."""
+        return bool(np.allclose(self._parameters[key], form.parameters, rtol=but, atol=0.0))
 
     def _power(self, series: Array) -> float:
         """Sum of squares of a series (n,), in units of the noise."""

@@ -103,6 +103,16 @@ class Products:
             self._kept[label, size] = white.T @ white, volume
         return self._kept[label, size]
 
+    def summed(self, sizes: Sizes) -> tuple[Array, float]:
+        """The same of all labels."""
+        width = self._stacked.shape[1]
+        whole, volume = np.zeros((width, width)), 0.0
+        for label, size in enumerate(sizes):
+            part, more = self.of(label, size)
+            whole += part
+            volume += more
+        return whole, volume
+
     def with_others(self, sizes: Sizes, others: Array) -> tuple[Array, Array]:
         """(p + K + 1, r) products of all columns and the target with others (n, r), and (r, r) of these."""
         weighted = self.colours.weighted(sizes, others)
@@ -122,9 +132,8 @@ class Evidence:
 
     def __init__(self, products: Products, sizes: Sizes) -> None:
         self.design, self.products, self.sizes = products.design, products, sizes
-        parts = [products.of(label, size) for label, size in enumerate(sizes)]
-        whole, width = np.sum([one for one, _ in parts], axis=0), self.design.baseline.shape[1]
-        self._volume = sum(volume for _, volume in parts)
+        whole, self._volume = products.summed(sizes)
+        width = self.design.baseline.shape[1]
         self._baseline = linalg.cho_factor(np.eye(width) + whole[:width, :width])
         self._across = linalg.cho_solve(self._baseline, whole[:width, width:])
         self._beside = whole[width:, width:] - whole[:width, width:].T @ self._across

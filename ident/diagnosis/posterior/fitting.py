@@ -80,8 +80,7 @@ class Fitter:
         key = frozenset(members)
         if key not in self._kept:
             start = self._colours.usual if before is None else before.evidence.sizes
-            bends = {} if before is None else {index: bend for index, bend in before.bends.items() if index in members}
-            found = self._settled(State(members, bends, self._evidence_with(start)))
+            found = self._settled(State(members, self._known(members, before), self._evidence_with(start)))
             for _ in range(SWEEPS):
                 noise = self._noise_beside(found)
                 if noise == found.evidence.sizes:
@@ -89,6 +88,17 @@ class Fitter:
                 found = self._settled(replace(found, evidence=self._evidence_with(noise)))
             self._kept[key] = found.judged()
         return self._kept[key]
+
+    def _known(self, members: Members, before: State | None) -> dict[int, Bent]:
+        """Exact forms to begin with: of the set before, or those that were made last."""
+        found = {}
+        for index, one in members.items():
+            hypothesis = self.design.hypotheses[index]
+            known = None if before is None else before.bends.get(index)
+            known = known or self._bends.last(hypothesis, hypothesis.blocks[one.block])
+            if known is not None:
+                found[index] = known
+        return found
 
     def _evidence_with(self, sizes: Sizes) -> Evidence:
         if sizes not in self._evidence:
@@ -111,7 +121,7 @@ class Fitter:
                 table = state.table(index)
                 if not table.is_there:
                     return state
-                state = replace(state, members={**state.members, index: table.best})
+                state = state.with_members({**state.members, index: table.best})
             state = self._bent(state)
             if abs(state.log_posterior - before) < SETTLED:
                 break
@@ -131,7 +141,7 @@ class Fitter:
         found = {index: self._bends.bend(form, means[index], before[index]) for index, form in forms.items()}
         state = replace(state, bends={index: bent for index, bent in found.items() if bent is not None})
         for index, form in forms.items():
-            if float(np.abs(means[index]).max()) > self._telling:
+            if index not in state.resting and float(np.abs(means[index]).max()) > self._telling:
                 state = self._moved(state, index, form, means[index])
         return state
 
@@ -143,14 +153,15 @@ class Fitter:
     def _moved(self, state: State, index: int, form: Form, mean: Array) -> State:
         """With the held numbers of a member moved to where the rows want them, if that is better."""
         bent = state.bends.get(index) or self._bends.bend(form, mean, form.held(mean))
+        rested = replace(state, resting=state.resting | {index})
         if bent is None or not bent.held.size:
-            return state
+            return rested
         step = self._step(replace(state, bends={**state.bends, index: bent}), state.without(index), form, bent)
         if np.abs(step).max() < STILL * FURTHEST * np.abs(_range(bent.held)).max():
-            return state
+            return rested
         moved = self._bends.bend(form, mean, bent.held + step)
         better = state if moved is None else replace(state, bends={**state.bends, index: moved})
-        return better if better.log_posterior > state.log_posterior + SETTLED else state
+        return better if better.log_posterior > state.log_posterior + SETTLED else rested
 
     def _step(self, state: State, others: Members, form: Form, bent: Bent) -> Array:
         """(H,) of the held numbers of a member, everything else fitted beside."""

@@ -29,11 +29,13 @@ class State:
         members: by number.
         bends: what the columns of a member miss of it, by number.
         evidence: with the noise that is most likely beside them.
+        resting: members whose held numbers are where the rows want them.
     """
 
     members: Members
     bends: Mapping[int, Bent]
     evidence: Evidence
+    resting: frozenset[int] = frozenset()
 
     @cached_property
     def target(self) -> Target:
@@ -50,6 +52,12 @@ class State:
         inside = sum(table.inside for table in tables.values())
         price = sum(hypotheses[index].price for index in self.members) + price_of(self.evidence.sizes)
         return self.target.nothing + self.target.log_likelihood(self.members) + inside - price
+
+    def with_members(self, members: Members) -> State:
+        """Other numbers of the same hypotheses, beside the same exact forms."""
+        found = replace(self, members=members)
+        found.__dict__["target"] = self.target
+        return found
 
     def judged(self) -> State:
         """The same, its posterior computed, without the products of its rows: those are as large as of everything."""

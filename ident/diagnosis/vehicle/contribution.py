@@ -15,6 +15,7 @@ from ident.diagnosis.vehicle.library import TermCause
 from ident.diagnosis.vehicle.sliding import SlidingCause
 from ident.diagnosis.vehicle.sources import Source
 from ident.diagnosis.vehicle.transforms import TransformCause
+from ident.plant.prepared import Prepared
 from ident.vehicle.parameters import PARAMETER_NAMES
 
 Array = NDArray[np.float64]
@@ -25,16 +26,18 @@ def contribution_of(
     cause: Cause, acting: Sequence[bool], sources: Sequence[Source], context: Context
 ) -> Callable[[Array, Array], Sequence[Array | None]]:
     """What the cause adds to every block, exactly, for numbers of its own and of the baseline, the model's in front."""
+    if isinstance(cause, TermCause):
+        return _term_contribution(cause, acting, sources, context)
 
     def contribution(values: Array, parameters: Array) -> list[Array | None]:
         found: list[Array | None] = []
         signals, changed = np.zeros(0), None
         for source, acts in zip(sources, acting, strict=True):
             # Both channels of a segment have the same signals: what takes the effect out of them is done once.
-            if acts and not isinstance(cause, TermCause) and source.inputs is not signals:
+            if acts and source.inputs is not signals:
                 signals = source.inputs
                 changed = cause.without(context.inputs(source), values, context.setting(source))
-            change = _change(cause, source, context, values, parameters, changed) if acts else None
+            change = _change(source, context, parameters, changed) if changed is not None and acts else None
             if change is None:
                 found += [None] * len(source.coordinates)
                 continue
@@ -45,26 +48,45 @@ def contribution_of(
     return contribution
 
 
-def _change(
-    cause: Cause, source: Source, context: Context, values: Array, parameters: Array, changed: Array | None
-) -> Array | None:
-    """The same for one source before the filter (M, rows); None where it is zero.
-
-    `changed` are its signals with the effect taken out; None for effects that stand in the equations.
-    """
+def _change(source: Source, context: Context, parameters: Array, changed: Array) -> Array | None:
+    """What it adds to one source before the filter (M, rows), whose signals are `changed` without it; None: nothing."""
     context = replace(context, parameters=parameters[: len(PARAMETER_NAMES)])
     inputs = context.inputs(source)
-    if changed is not None:
-        seen = _seen(source, context)
-        if np.array_equal(changed[:, seen], inputs[:, seen]):
-            return None
-        after = context.rows_of(changed, source)
-    elif source.own is not None:
+    seen = _seen(source, context)
+    if np.array_equal(changed[:, seen], inputs[:, seen]):
         return None
-    else:
-        exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)
-        after = exact(inputs, *context.constants, values)
-    return np.asarray((after - context.plain(source))[..., 0])
+    return np.asarray((context.rows_of(changed, source) - context.plain(source))[..., 0])
+
+
+def _term_contribution(
+    cause: TermCause, acting: Sequence[bool], sources: Sequence[Source], context: Context
+) -> Callable[[Array, Array], Sequence[Array | None]]:
+    """The same of an effect that stands in the equations: all that is not its own is computed once."""
+    kept: dict[int, tuple[bytes, Prepared]] = {}
+
+    def prepared(number: int, source: Source, parameters: Array) -> Prepared:
+        asked, known = parameters.tobytes(), kept.get(number)
+        if known is None or known[0] != asked:
+            exact = context.formulas.exact(source.channel, source.spec, cause.name, cause.where)
+            constants = replace(context, parameters=parameters).constants
+            known = kept[number] = asked, Prepared(exact, context.inputs(source), *constants)
+        return known[1]
+
+    def contribution(values: Array, parameters: Array) -> list[Array | None]:
+        found: list[Array | None] = []
+        for number, (source, acts) in enumerate(zip(sources, acting, strict=True)):
+            columns: list[Array | None] = [None] * len(source.coordinates)
+            if acts and source.own is None:
+                asked = parameters[: len(PARAMETER_NAMES)]
+                rows, exact = prepared(number, source, asked), replace(context, parameters=asked)
+                touched = list(rows.touched)
+                change = rows.entries(values) - exact.plain(source)[:, touched, 0].T
+                for row, column in zip(touched, context.filtered(change.T, source).T, strict=True):
+                    columns[row] = column if np.any(column) else None
+            found += columns
+        return found
+
+    return contribution
 
 
 def _seen(source: Source, context: Context) -> list[int]:

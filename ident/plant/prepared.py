@@ -1,0 +1,105 @@
+"""A function over many samples of which only the last argument changes: what that has no part in is computed once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.plant.vectorised import CHUNK, OPERATIONS, Instruction, Vectorised
+
+Array = NDArray[np.float64]
+
+
+class Prepared:
+    """A vectorised function, all of its arguments but the last given.
+
+    Args:
+        function: of two arguments at least.
+        fixed: all but the last, as for a call; one of them for every sample (N, n).
+
+    Attributes:
+        touched: numbers of the entries that the last argument has a part in.
+    """
+
+    def __init__(self, function: Vectorised, *fixed: Array) -> None:
+        self._samples = next(len(argument) for argument in fixed if argument.ndim == 2)
+        columns = [np.ascontiguousarray(argument.T) for argument in fixed]
+        self._parts: list[tuple[slice, _Rest]] = []
+        for start in range(0, self._samples, CHUNK):
+            part = slice(start, start + CHUNK)
+            inputs = [list(values[:, part] if values.ndim == 2 else values) for values in columns]
+            self._parts.append((part, _rest(function.program, inputs)))
+        rest = self._parts[0][1]
+        self.touched = tuple(sorted(targets[1] for code, _, targets, _ in rest.program if code == ca.OP_OUTPUT))
+
+    def entries(self, last: Array) -> Array:
+        """(len(touched), N) of the entries touched, for a last argument (n,)."""
+        result = np.empty((len(self.touched), self._samples))
+        for part, rest in self._parts:
+            found = rest.run(list(last))
+            for row, entry in enumerate(self.touched):
+                result[row, part] = found[entry]
+        return result
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """What is left to do for some of the samples.
+
+    Attributes:
+        program: instructions that the last argument has a part in.
+        known: what they need of everything else, under negative numbers.
+    """
+
+    program: Sequence[Instruction]
+    known: Mapping[int, Any]
+
+    def run(self, last: Sequence[Any]) -> dict[int, Any]:
+        """Entries by their number."""
+        work, found = dict(self.known), dict[int, Any]()
+        for code, sources, targets, _ in self.program:
+            if code == ca.OP_INPUT:
+                work[targets[0]] = last[sources[1]]
+            elif code == ca.OP_OUTPUT:
+                found[targets[1]] = work[sources[0]]
+            else:
+                work[targets[0]] = OPERATIONS[code](*(work[source] for source in sources))
+        return found
+
+
+def _rest(program: Sequence[Instruction], inputs: Sequence[Sequence[Any]]) -> _Rest:
+    """What is left of a program when everything is done that the last argument has no part in."""
+    work, known = dict[int, Any](), dict[int, Any]()
+    left, waiting = list[Instruction](), set[int]()
+
+    def operand(place: int) -> int:
+        if place in waiting:
+            return place
+        known[-1 - len(known)] = work[place]
+        return -len(known)
+
+    for instruction in program:
+        code, sources, targets, constant = instruction
+        if code == ca.OP_INPUT and sources[0] == len(inputs):
+            left.append(instruction)
+            waiting.add(targets[0])
+        elif code not in (ca.OP_INPUT, ca.OP_CONST) and not waiting.isdisjoint(sources):
+            left.append((code, tuple(map(operand, sources)), targets, constant))
+            waiting.update(targets[:1] if code != ca.OP_OUTPUT else ())
+        elif code != ca.OP_OUTPUT:
+            # Places are used again: what stood here may have waited.
+            waiting.discard(targets[0])
+            work[targets[0]] = _done(instruction, work, inputs)
+    return _Rest(left, known)
+
+
+def _done(instruction: Instruction, work: Mapping[int, Any], inputs: Sequence[Sequence[Any]]) -> Any:
+    code, sources, _, constant = instruction
+    if code == ca.OP_INPUT:
+        return inputs[sources[0]][sources[1]]
+    return constant if code == ca.OP_CONST else OPERATIONS[code](*(work[source] for source in sources))
