@@ -24,7 +24,7 @@ from ident.diagnosis.orders import with_orders
 from ident.diagnosis.posterior.bends import Bends
 from ident.diagnosis.posterior.fitting import Fitter
 from ident.diagnosis.posterior.hypotheses import Design, make_design
-from ident.diagnosis.posterior.noise import SIZES, Colours
+from ident.diagnosis.posterior.noise import LACKING, Colours
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.posterior.slots import Slot, slot_of
 from ident.diagnosis.posterior.state import State
@@ -109,7 +109,8 @@ class _Answer:
         seed: int,
     ) -> None:
         self.search, self.state, self.design = search, state, search.design
-        self.slots = {index: slot_of(search, state, index) for index in state.members}
+        excess = search.fitter.excess(state)
+        self.slots = {index: slot_of(search, state, index, excess[index]) for index in state.members}
         self.taken = _as_variants(problems, regression, designs, self.design, state, self.slots)
         variants = tuple(self.taken.variants.values())
         keys = [law.dependence.key for law in self.taken.laws.values()]
@@ -128,7 +129,9 @@ class _Answer:
         if lost is None:
             return None
         left = {index: one for index, one in self.state.members.items() if index != lost}
-        return self.search, self.search.revised(self.search.fitter.state(left, self.state))
+        # What is doubted once evidence is tempered, the search would take again.
+        search = self.search.without([lost])
+        return search, search.revised(search.fitter.state(left, self.state))
 
     def _lost(self, members: Sequence[int]) -> int | None:
         """A member that is hardly likely to be there, widens the held-out gap, or closes next to nothing beside others.
@@ -183,7 +186,7 @@ class _Answer:
 
     def _lacking(self) -> bool:
         """Whether more is lacking somewhere than noise and tolerance that are not known exactly."""
-        return any(SIZES[size] > MISTAKEN for size in self.state.evidence.sizes)
+        return any(LACKING[size] > MISTAKEN for size in self.state.evidence.sizes)
 
     def _verdict(self) -> Verdict:
         lacking = self._lacking()

@@ -129,8 +129,8 @@ class Bends:
         return bool(np.allclose(self._parameters[key], form.parameters, rtol=but, atol=0.0))
 
     def _power(self, series: Array) -> float:
-        """Sum of squares of a series (n,), in units of the noise."""
-        return float(np.sum(self.colours.white(series[:, None], self.colours.usual)[0] ** 2))
+        """Sum of squares of a series (n,), in units of the least noise."""
+        return float(np.sum(self.colours.white(series[:, None], self.colours.least)[0] ** 2))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -19,7 +20,7 @@ from scipy.special import logsumexp
 
 from ident.diagnosis.posterior.bends import Bent
 from ident.diagnosis.posterior.hypotheses import Block, Design
-from ident.diagnosis.posterior.noise import Colours, Noise, Sizes
+from ident.diagnosis.posterior.noise import TOLERATED, Colours, Noise, Sizes
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,9 @@ OCTAVES: Final = 1.0
 
 LARGEST: Final = 100.0
 """Scale, in units of the noise, that is tried at most."""
+
+KEPT: Final = 32
+"""Products of labels that are kept: those of all columns are large."""
 
 
 @dataclass(frozen=True)
@@ -84,39 +88,42 @@ class Table:
 
 
 class Products:
-    """Products of all white columns, by label and by what is lacking there: every noise is made of them.
+    """Products of white columns: every noise is made of those of its labels.
 
     Args:
         design: of the rows.
         colours: of their noise.
+        columns: (k,) of the design, rising; all of them, or those of a few hypotheses.
     """
 
-    def __init__(self, design: Design, colours: Colours) -> None:
-        self.design, self.colours = design, colours
-        self._stacked = np.column_stack([design.baseline, design.columns, design.target])
-        self._kept: dict[tuple[int, int], tuple[Array, float]] = {}
+    def __init__(self, design: Design, colours: Colours, columns: NDArray[np.int64]) -> None:
+        self.design, self.colours, self.columns = design, colours, columns
+        self._stacked = np.column_stack([design.baseline, design.columns[:, columns], design.target])
+        self._of = lru_cache(maxsize=KEPT)(self._made)
 
-    def of(self, label: int, size: int) -> tuple[Array, float]:
-        """(p + K + 1, p + K + 1), the target last, and half the log of the determinant of the noise."""
-        if (label, size) not in self._kept:
-            white, volume = self.colours.of_label(label, size, self._stacked)
-            self._kept[label, size] = white.T @ white, volume
-        return self._kept[label, size]
+    def at(self, place: slice) -> slice:
+        """Where columns of the design stand among these."""
+        return _among(self.columns, place)
 
     def summed(self, sizes: Sizes) -> tuple[Array, float]:
-        """The same of all labels."""
+        """(p + k + 1, p + k + 1), the target last, and half the log of the determinant of the noise."""
         width = self._stacked.shape[1]
         whole, volume = np.zeros((width, width)), 0.0
         for label, size in enumerate(sizes):
-            part, more = self.of(label, size)
+            part, more = self._of(label, size)
             whole += part
             volume += more
         return whole, volume
 
     def with_others(self, sizes: Sizes, others: Array) -> tuple[Array, Array]:
-        """(p + K + 1, r) products of all columns and the target with others (n, r), and (r, r) of these."""
+        """(p + k + 1, r) products of all columns and the target with others (n, r), and (r, r) of these."""
         weighted = self.colours.weighted(sizes, others)
         return self._stacked.T @ weighted, others.T @ weighted
+
+    def _made(self, label: int, size: int) -> tuple[Array, float]:
+        """The same of one label."""
+        white, volume = self.colours.of_label(label, size, self._stacked)
+        return white.T @ white, volume
 
 
 class Evidence:
@@ -140,7 +147,7 @@ class Evidence:
         power = np.maximum(np.diag(whole)[width:-1], np.finfo(float).tiny)
         self.shown: Array = np.diag(self._beside)[:-1] / power
         self._determinant = float(np.sum(np.log(np.diag(self._baseline[0]))))
-        smallest = 1 / math.sqrt(len(self.design.target))
+        smallest = TOLERATED[0] / math.sqrt(len(self.design.target))
         self.scales = np.geomspace(smallest, LARGEST, 1 + math.ceil(math.log2(LARGEST / smallest) / OCTAVES))
 
     @property
@@ -152,10 +159,10 @@ class Evidence:
         """The rows, some members by their slopes instead of their columns, with what is expected of those."""
         found = self._bent(bends) if bends else self._beside
         for bent in bends:
-            slopes, target = bent.expected
-            found[bent.place, bent.place] += slopes.T @ slopes
-            found[bent.place, -1] += slopes.T @ target
-            found[-1, bent.place] += slopes.T @ target
+            place, (slopes, target) = self.products.at(bent.place), bent.expected
+            found[place, place] += slopes.T @ slopes
+            found[place, -1] += slopes.T @ target
+            found[-1, place] += slopes.T @ target
             found[-1, -1] += target @ target
         return Target(self, found, -0.5 * float(found[-1, -1]) - self._volume - self._determinant)
 
@@ -171,7 +178,7 @@ class Evidence:
         along, own = self.products.with_others(self.sizes, others)
         own = own - along[:width].T @ linalg.cho_solve(self._baseline, along[:width])
         along = along[width:] - self._across.T @ along[:width]
-        replaced = np.concatenate([np.arange(bent.place.start, bent.place.stop) for bent in bends])
+        replaced = np.concatenate([_numbers(self.products.at(bent.place)) for bent in bends])
         target = found[:, -1] - along[:, -1]
         target[replaced] = along[-1, :-1] - own[:-1, -1]
         target[-1] += own[-1, -1] - along[-1, -1]
@@ -224,7 +231,7 @@ class Target:
         powers, directions = self._directions(own, rows)
         mean = np.zeros(len(self.products) - 1)
         mean[rows] = directions @ (directions.T @ self.products[rows, -1] / (1 + powers))
-        return {index: mean[self._block(index, one).place] for index, one in members.items()}
+        return {index: mean[self._place(index, one)] for index, one in members.items()}
 
     def _directions(self, own: Array, rows: NDArray[np.int64]) -> tuple[Array, Array]:
         """Powers (R,) of independent combinations of unit variance, and these (r, R), by factors of members (r, R)."""
@@ -236,19 +243,23 @@ class Target:
         """Log evidence of a hypothesis, or of one of its blocks alone, beside others."""
         blocks = self.evidence.design.hypotheses[hypothesis].blocks
         used = blocks if only is None else (blocks[only],)
-        columns = np.unique(np.concatenate([np.arange(one.place.start, one.place.stop) for one in used]))
+        places = [self.evidence.products.at(one.place) for one in used]
+        columns = np.unique(np.concatenate([_numbers(place) for place in places]))
         products = self.beside(others, columns)
-        moved = [replace(one, place=_among(columns, one.place)) for one in used]
-        return self._table(moved, products, range(len(blocks)) if only is None else (only,))
+        moved = [_among(columns, place) for place in places]
+        return self._table(used, moved, products, range(len(blocks)) if only is None else (only,))
 
     def table(self, hypothesis: int, products: Array) -> Table:
         """The same, by the products of all columns beside the others."""
         blocks = self.evidence.design.hypotheses[hypothesis].blocks
-        return self._table(blocks, products, range(len(blocks)))
+        places = [self.evidence.products.at(block.place) for block in blocks]
+        return self._table(blocks, places, products, range(len(blocks)))
 
-    def _table(self, blocks: Sequence[Block], products: Array, numbers: Sequence[int]) -> Table:
+    def _table(
+        self, blocks: Sequence[Block], places: Sequence[slice], products: Array, numbers: Sequence[int]
+    ) -> Table:
         masses = np.array([self._mass(block) for block in blocks])
-        logs = np.stack([self._logs(block, products) for block in blocks])
+        logs = np.stack([self._logs(block, place, products) for block, place in zip(blocks, places, strict=True)])
         return Table(self.evidence.scales, logs + masses[:, None], masses, numbers)
 
     def _mass(self, block: Block) -> float:
@@ -256,9 +267,9 @@ class Target:
         count = max(int(np.sum(self.evidence.scales <= block.largest)), 1)
         return block.weight - math.log(count) + (math.log(2) if block.least == 0 else 0.0)
 
-    def _logs(self, block: Block, products: Array) -> Array:
-        """(S,) of one block."""
-        place, squares = block.place, self.evidence.scales[:, None] ** 2
+    def _logs(self, block: Block, place: slice, products: Array) -> Array:
+        """(S,) of one block, whose columns stand at a place of the products."""
+        squares = self.evidence.scales[:, None] ** 2
         if block.factor.shape == (1, 1):
             power, amplitude = max(float(products[place, place][0, 0]), 0.0), float(products[place.start, -1])
             nothing = power <= np.finfo(float).eps * len(self.evidence.design.target)
@@ -284,15 +295,18 @@ class Target:
     def _block(self, index: int, member: Member) -> Block:
         return self.evidence.design.hypotheses[index].blocks[member.block]
 
+    def _place(self, index: int, member: Member) -> slice:
+        return self.evidence.products.at(self._block(index, member).place)
+
     def _stacked(self, members: Members) -> tuple[Array, NDArray[np.int64]]:
         """(r, R) factors of all members beside each other, and the columns (r,) that they have."""
-        places = [self._block(index, one) for index, one in members.items()]
-        columns = np.unique(np.concatenate([np.arange(one.place.start, one.place.stop) for one in places]))
+        places = [self._place(index, one) for index, one in members.items()]
+        columns = np.unique(np.concatenate([_numbers(place) for place in places]))
         parts = []
-        for block, one in zip(places, members.values(), strict=True):
-            part = np.zeros((len(columns), block.factor.shape[1]))
-            first = int(np.searchsorted(columns, block.place.start))
-            part[first : first + len(block.factor)] = one.scale * block.factor
+        for place, (index, one) in zip(places, members.items(), strict=True):
+            factor = self._block(index, one).factor
+            part = np.zeros((len(columns), factor.shape[1]))
+            part[_among(columns, place)] = one.scale * factor
             parts.append(part)
         return np.hstack(parts), columns
 
@@ -301,6 +315,10 @@ def _among(columns: NDArray[np.int64], place: slice) -> slice:
     """Where columns stand among some, that hold them side by side."""
     first = int(np.searchsorted(columns, place.start))
     return slice(first, first + place.stop - place.start)
+
+
+def _numbers(place: slice) -> NDArray[np.int64]:
+    return np.arange(place.start, place.stop)
 
 
 def _is_refused(block: Block, power: float, amplitude: float) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
 from typing import Final
 
 import numpy as np
@@ -15,7 +15,8 @@ from ident.diagnosis.directions import VISIBLE
 from ident.diagnosis.posterior.bends import Bends, Bent, Form
 from ident.diagnosis.posterior.evidence import Evidence, Member, Members, Products
 from ident.diagnosis.posterior.hypotheses import Block, Design
-from ident.diagnosis.posterior.noise import Colours, Sizes, most_likely
+from ident.diagnosis.posterior.misfit import excess_of_scatter
+from ident.diagnosis.posterior.noise import USUAL, Colours, Sizes, most_likely
 from ident.diagnosis.posterior.state import State
 
 Array = NDArray[np.float64]
@@ -32,6 +33,9 @@ TELLING: Final = 5.0
 FURTHEST: Final = 0.3
 """Share of a held number that it is moved by at once, or of one where it is zero: a phase, a share."""
 
+WHOLE: Final = 4
+"""Evidences of all hypotheses that are kept, each of another noise: they are large."""
+
 STILL: Final = 0.03
 """Part of the furthest step from which a held number stays where it is: a hundredth of it."""
 
@@ -47,23 +51,27 @@ class Fitter:
 
     def __init__(self, design: Design, colours: Colours, bends: Bends) -> None:
         self.design, self._colours, self._bends = design, colours, bends
-        self._products = Products(design, colours)
+        self._all = Products(design, colours, np.arange(design.columns.shape[1]))
         self._kept: dict[frozenset[int], State] = {}
-        self._evidence: dict[Sizes, Evidence] = {}
+        self._of_all = lru_cache(maxsize=WHOLE)(partial(Evidence, self._all))
 
     @cached_property
     def invisible(self) -> frozenset[int]:
         """Hypotheses of which the plant's parameters absorb all but nothing."""
-        evidence = self._evidence_with(self._colours.usual)
+        evidence = self._of_all(self._colours.usual)
         return frozenset(
             index
             for index, one in enumerate(self.design.hypotheses)
             if all(evidence.shown[block.place].max() < VISIBLE**2 for block in one.blocks)
         )
 
+    def among_all(self, state: State) -> State:
+        """A set with the evidence of all hypotheses beside it."""
+        return replace(state, evidence=self._of_all(state.evidence.sizes))
+
     def with_nothing_lacking(self, state: State) -> State:
-        """A set with the noise that is beside a complete model."""
-        return replace(state, evidence=self._evidence_with(self._colours.usual))
+        """The same with the noise that is beside a complete model."""
+        return replace(state, evidence=self._of_all(tuple(min(size, USUAL) for size in state.evidence.sizes)))
 
     @property
     def nothing(self) -> State:
@@ -80,13 +88,14 @@ class Fitter:
         key = frozenset(members)
         if key not in self._kept:
             start = self._colours.usual if before is None else before.evidence.sizes
-            found = self._settled(State(members, self._known(members, before), self._evidence_with(start)))
+            products = self._products(members)
+            found = self._settled(State(members, self._known(members, before), Evidence(products, start)))
             for _ in range(SWEEPS):
                 noise = self._noise_beside(found)
                 if noise == found.evidence.sizes:
                     break
-                found = self._settled(replace(found, evidence=self._evidence_with(noise)))
-            self._kept[key] = found.judged()
+                found = self._settled(replace(found, evidence=Evidence(products, noise)))
+            self._kept[key] = found
         return self._kept[key]
 
     def _known(self, members: Members, before: State | None) -> dict[int, Bent]:
@@ -100,18 +109,36 @@ class Fitter:
                 found[index] = known
         return found
 
-    def _evidence_with(self, sizes: Sizes) -> Evidence:
-        if sizes not in self._evidence:
-            self._evidence[sizes] = Evidence(self._products, sizes)
-        return self._evidence[sizes]
+    def _products(self, members: Members) -> Products:
+        """Of the columns of some hypotheses alone."""
+        blocks = [block for index in members for block in self.design.hypotheses[index].blocks]
+        columns = [np.zeros(0, dtype=np.int64), *(np.arange(one.place.start, one.place.stop) for one in blocks)]
+        return Products(self.design, self._colours, np.unique(np.concatenate(columns)))
 
     def _noise_beside(self, state: State) -> Sizes:
         """What is most likely lacking beside a set."""
-        columns = [self.design.baseline, *(self._columns(state, index, one) for index, one in state.members.items())]
-        count = sum(one.shape[1] for one in columns)
-        known = np.column_stack(self._expected_beside(state, state.members, count))
-        target = self.design.target - state.missed
-        return most_likely(self._colours, np.hstack(columns), target, known.T @ known, state.evidence.sizes)
+        columns, target, beside = self._rows(state)
+        known = np.column_stack(beside)
+        return most_likely(self._colours, columns, target, known.T @ known, state.evidence.sizes)
+
+    def _rows(self, state: State) -> tuple[Array, Array, tuple[Array, Array]]:
+        """Columns (n, k) of the plant and of all members, the target (n,), and rows of what is expected beside."""
+        members = state.members.items()
+        columns = np.hstack([self.design.baseline, *(self._columns(state, index, one) for index, one in members)])
+        expected = self._expected_beside(state, state.members, columns.shape[1])
+        return columns, self.design.target - state.missed, expected
+
+    def excess(self, state: State) -> dict[int, float]:
+        """What the evidence for every member is divided by: how far rows scatter beyond their noise along it."""
+        columns, target, expected = self._rows(state)
+        white, _ = self._colours.white(np.column_stack([columns, target]), state.evidence.sizes)
+        places, end = list[slice](), self.design.baseline.shape[1]
+        for index, one in state.members.items():
+            width = self.design.hypotheses[index].blocks[one.block].factor.shape[1]
+            places.append(slice(end, end + width))
+            end += width
+        ratios = excess_of_scatter(white[:, :-1], white[:, -1], expected, self._colours.stretch, places)
+        return dict(zip(state.members, ratios, strict=True))
 
     def _settled(self, state: State) -> State:
         """With the numbers of every member chosen anew, each beside the others, and what its columns miss."""

@@ -23,13 +23,19 @@ from ident.diagnosis.whitening import Predictor, predictor_of
 
 Array = NDArray[np.float64]
 Sizes = tuple[int, ...]
-"""Of what is lacking, by label: number among `SIZES`."""
+"""Of what is lacking, by label: number among `LACKING` and `TOLERATED`."""
 
-SIZES: Final = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)
+LACKING: Final = (0.0, 0.0, 0.0, 1.0, 3.0, 10.0, 30.0, 100.0)
 """Of what is lacking, over noise and tolerance."""
 
+TOLERATED: Final = (0.1, 0.3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+"""Of what is tolerated, what is there: that is the most that it may be, and mostly it is less."""
+
+USUAL: Final = 2
+"""Number of the first of them with all of what is tolerated."""
+
 PRICE: Final = 2.0
-"""Log odds against the next of them: one in seven."""
+"""Log odds against the next of them: one in seven; less than what is tolerated is as likely as all of it."""
 
 MEMORIES: Final = (0.1, 0.5, 2.0)
 """Of what a model lacks [s], a third of its power each: contacts and friction have it at every one."""
@@ -40,9 +46,6 @@ ROUNDING: Final = 1e-9
 ROUNDS: Final = 4
 """Times that the sizes of all labels are looked at."""
 
-USUAL: Final = 0
-"""Number of nothing among them."""
-
 
 class Colours:
     """Covariances of the rows of every block.
@@ -51,12 +54,15 @@ class Colours:
         rows: of the problems.
         labels: channel, step and coordinate, of blocks that share what they lack.
         blocks: rows of every block, by label.
+        stretch: (n,) number of the stretch that every row belongs to, rising.
     """
 
     def __init__(self, regression: Regression) -> None:
         self.rows: Rows = regression.rows
+        self.stretch = regression.stretch
         found: dict[str, list[int]] = {}
         self._places: list[slice] = []
+        self._noise: list[Array] = []
         self._tolerated: list[Array] = []
         self._lacking: list[Array] = []
         alone = None if all(colour.count for colour in regression.repeats) else regression.whitener(())
@@ -74,11 +80,17 @@ class Colours:
             least = (ROUNDING * rms(self.rows.target[place])) ** 2 * np.eye(len(memory))
             noise = _covariance(predictor, self.rows.run[place]) + least
             self._places.append(place)
-            self._tolerated.append(noise + tolerated)
-            self._lacking.append(float(np.mean(np.diag(self._tolerated[-1]))) * memory)
+            self._noise.append(noise)
+            self._tolerated.append(tolerated)
+            self._lacking.append(float(np.mean(np.diag(noise + tolerated))) * memory)
         self.labels = tuple(found)
         self.blocks = tuple(tuple(numbers) for numbers in found.values())
         self._factors: dict[tuple[int, int], Array] = {}
+
+    @property
+    def least(self) -> Sizes:
+        """Next to nothing of what is tolerated is there."""
+        return (0,) * len(self.labels)
 
     @property
     def usual(self) -> Sizes:
@@ -118,7 +130,8 @@ class Colours:
     def _factor(self, number: int, size: int) -> Array:
         """(n, n) lower triangular, of the covariance of a block."""
         if (number, size) not in self._factors:
-            whole = self._tolerated[number] + SIZES[size] ** 2 * self._lacking[number]
+            tolerated, lacking = TOLERATED[size] ** 2 * self._tolerated[number], LACKING[size] ** 2 * self._lacking[number]
+            whole = self._noise[number] + tolerated + lacking
             whole += ROUNDING * np.trace(whole) / len(whole) * np.eye(len(whole))
             self._factors[number, size] = linalg.cholesky(whole, lower=True, check_finite=False)
         return self._factors[number, size]
@@ -145,7 +158,11 @@ class Noise:
 
 def price_of(sizes: Sizes) -> float:
     """Log odds against so much being lacking."""
-    return PRICE * sum(sizes)
+    return sum(map(_price, sizes))
+
+
+def _price(size: int) -> float:
+    return PRICE * max(size - USUAL, 0)
 
 
 def most_likely(colours: Colours, columns: Array, target: Array, known: Array, start: Sizes) -> Sizes:
@@ -163,11 +180,11 @@ def most_likely(colours: Colours, columns: Array, target: Array, known: Array, s
     whole = np.column_stack([columns, target])
     parts: list[list[tuple[Array, float]]] = []
     for label in range(len(colours.labels)):
-        made = [colours.of_label(label, size, whole) for size in range(len(SIZES))]
+        made = [colours.of_label(label, size, whole) for size in range(len(LACKING))]
         parts.append([(white.T @ white, volume) for white, volume in made])
     found = list(start)
     products = known + np.sum([parts[label][size][0] for label, size in enumerate(found)], axis=0)
-    logs = -sum(parts[label][size][1] + PRICE * size for label, size in enumerate(found))
+    logs = -sum(parts[label][size][1] + _price(size) for label, size in enumerate(found))
     best = logs + _log(products)
     for _ in range(ROUNDS):
         before = tuple(found)
@@ -175,7 +192,7 @@ def most_likely(colours: Colours, columns: Array, target: Array, known: Array, s
             for size, (other, volume) in enumerate(sizes):
                 now, now_volume = sizes[found[label]]
                 changed = products - now + other
-                gained = now_volume - volume + PRICE * (found[label] - size)
+                gained = now_volume - volume + _price(found[label]) - _price(size)
                 log = logs + gained + _log(changed)
                 if log > best:
                     best, products, logs, found[label] = log, changed, logs + gained, size

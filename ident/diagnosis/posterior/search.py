@@ -83,9 +83,9 @@ class Search:
         What a model lacks may be as large as what is looked for, and hide it.
         """
         hypotheses = self.design.hypotheses
-        usual = self.fitter.with_nothing_lacking(state)
+        whole, usual = self.fitter.among_all(state), self.fitter.with_nothing_lacking(state)
         found: dict[int, Member] = {}
-        for one in (state, usual) if usual.evidence is not state.evidence else (state,):
+        for one in (whole, usual) if usual.evidence is not whole.evidence else (whole,):
             tables = {
                 index: table
                 for index, table in one.tables().items()

@@ -70,9 +70,17 @@ class Slot:
         return Ranked(probabilities, self.names(hypotheses), alike, evidence)
 
 
-def slot_of(search: Search, state: State, index: int) -> Slot:
-    """What may stand in the place of a member: rivals that come near by their columns are fitted exactly."""
+def slot_of(search: Search, state: State, index: int, excess: float = 1.0) -> Slot:
+    """What may stand in the place of a member: rivals that come near by their columns are fitted exactly.
+
+    Args:
+        search: that found the set.
+        state: the set.
+        index: of the member.
+        excess: what the evidence is divided by, where rows scatter beyond their noise.
+    """
     hypotheses = search.design.hypotheses
+    state = search.fitter.among_all(state)
     others = state.without(index)
     without = replace(state, members=others, bends={one: bend for one, bend in state.bends.items() if one != index})
     beside, bare = without.target.beside(others), search.fitter.state(others, state).log_posterior
@@ -91,6 +99,7 @@ def slot_of(search: Search, state: State, index: int) -> Slot:
     for rival in [one for one in near if logs[one] > logs[index] - NEAR]:
         table = without.target.table(rival, beside)
         logs[rival] = search.fitter.state({**others, rival: table.best}, state).log_posterior - bare
+    logs = {one: (log + hypotheses[one].price) / excess - hypotheses[one].price for one, log in logs.items()}
     logs = {one: log for one, log in sorted(logs.items(), key=lambda entry: -entry[1]) if math.isfinite(log)}
     cosines = _cosines(state, index, logs)
     width = len(hypotheses[index].blocks[state.members[index].block].factor)

@@ -59,12 +59,6 @@ class State:
         found.__dict__["target"] = self.target
         return found
 
-    def judged(self) -> State:
-        """The same, its posterior computed, without the products of its rows: those are as large as of everything."""
-        found = replace(self)
-        found.__dict__["log_posterior"] = self.log_posterior
-        return found
-
     @property
     def missed(self) -> Array:
         """(n,) of the target, what neither the columns nor the slopes of its members have."""
@@ -76,7 +70,10 @@ class State:
         return self.target.table_of(hypothesis, self.without(hypothesis), only)
 
     def tables(self) -> dict[int, Table]:
-        """Evidence of all other hypotheses beside the members, but of those that are the same as some of these."""
+        """Evidence of all other hypotheses beside the members, but of those that are the same as some of these.
+
+        For a set with the evidence of all.
+        """
         beside, hypotheses = self.target.beside(self.members), self.evidence.design.hypotheses
         left = np.diag(beside) / np.maximum(np.diag(self.target.products), np.finfo(float).tiny)
         return {
