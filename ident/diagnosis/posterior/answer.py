@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -124,14 +124,18 @@ class _Answer:
         sizeless = [index for place, index in enumerate(members) if not self._has_size(place)]
         if sizeless:
             search = self.search.without(sizeless)
-            return search, search.run()
+            return search, search.further(self._without(search, sizeless))
         lost = self._lost(members)
         if lost is None:
             return None
-        left = {index: one for index, one in self.state.members.items() if index != lost}
         # What is doubted once evidence is tempered, the search would take again.
         search = self.search.without([lost])
-        return search, search.revised(search.fitter.state(left, self.state))
+        return search, search.revised(self._without(search, [lost]))
+
+    def _without(self, search: Search, refuted: Collection[int]) -> State:
+        """The set without some members."""
+        left = {index: one for index, one in self.state.members.items() if index not in refuted}
+        return search.fitter.state(left, self.state)
 
     def _lost(self, members: Sequence[int]) -> int | None:
         """A member that is hardly likely to be there, widens the held-out gap, or closes next to nothing beside others.

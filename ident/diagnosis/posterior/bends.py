@@ -109,9 +109,9 @@ class Bends:
         numbers = form.held(coefficients) if held is None else held
         alike = kept is not None and np.array_equal(kept.held, numbers)
         moved = math.inf if kept is None else float(np.abs(kept.about - coefficients).max())
-        if kept is not None and alike and moved < SAME / math.sqrt(len(kept.missed)):
-            if self._beside_the_same(key, form, NEAR_PLANT):
-                return kept
+        same = kept is not None and alike and moved < SAME / math.sqrt(len(kept.missed))
+        if kept is not None and same and self._beside_the_same(key, form, NEAR_PLANT):
+            return kept
         here, expected = form.added(coefficients, numbers), form.expected_about(coefficients, numbers)
         if held is None and not len(expected[1]) and self._power(here - form.by_columns(coefficients)) < NEGLIGIBLE:
             self._straight[key] = size

@@ -2,7 +2,7 @@
 
 A named hypothesis is a candidate of the problem, whose variants are the values of its nonlinear numbers. A free
 function of a variable is a Gaussian process (`ident.diagnosis.law.spline`), whose lengths stand in the place of those.
-One of all names is as likely as the next, and as a law that has none; of one name, one place as likely as the next.
+One of all names is as likely as the next, and of one name one place as the next; a law without a name is less likely.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ LEAST: Final = 1e-9
 SAME: Final = 1e-5
 """Share of the power of a free function that a direction must have: less changes no row."""
 
+
+UNNAMED: Final = 3.0
+"""Log odds against a law without a name, as against a name: twenty to one."""
 
 DECADE: Final = 10.0
 """Size of an effect over its usual one, at most."""
@@ -162,13 +165,15 @@ class _Builder:
             weight = -math.log(max(len(shown), 1))
             blocks = tuple(self._block(column, sizes[column.place], weight, candidate) for column in shown)
             if blocks and not candidate.excluded:
-                price = kinds + math.log(places[str(candidate.effect)]) + candidate.price
+                # What its choice costs beyond that of the variants, whose shares of the prior are their weights.
+                choice = max(candidate.price + weight, 0.0)
+                price = kinds + math.log(places[str(candidate.effect)]) + choice
                 found.append(Hypothesis(candidate.key, str(candidate.effect), price, blocks, candidate=number))
         return found
 
     def free(self, problem: Problem, designs: Designs, kinds: float) -> list[Hypothesis]:
         """All functions whose variable changes."""
-        found, price = [], kinds + math.log(max(len(problem.dependences), 1))
+        found, price = [], kinds + UNNAMED + math.log(max(len(problem.dependences), 1))
         for number, dependence in enumerate(problem.dependences):
             knots = designs.knots(number)
             blocks = () if knots is None else self._function(designs.columns(number), knots)

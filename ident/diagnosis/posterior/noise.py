@@ -130,8 +130,8 @@ class Colours:
     def _factor(self, number: int, size: int) -> Array:
         """(n, n) lower triangular, of the covariance of a block."""
         if (number, size) not in self._factors:
-            tolerated, lacking = TOLERATED[size] ** 2 * self._tolerated[number], LACKING[size] ** 2 * self._lacking[number]
-            whole = self._noise[number] + tolerated + lacking
+            whole = self._noise[number] + TOLERATED[size] ** 2 * self._tolerated[number]
+            whole += LACKING[size] ** 2 * self._lacking[number]
             whole += ROUNDING * np.trace(whole) / len(whole) * np.eye(len(whole))
             self._factors[number, size] = linalg.cholesky(whole, lower=True, check_finite=False)
         return self._factors[number, size]

@@ -21,9 +21,6 @@ INSTEAD: Final = 2
 SURVIVORS: Final = 5
 """Hypotheses that are fitted exactly at every step, by either noise."""
 
-SURELY: Final = 3.0
-"""Log posterior by which a law must be better than names to stand in their place: twenty to one."""
-
 MARGIN: Final = 4.0
 """Log posterior below the best one's from which a hypothesis is not fitted exactly."""
 
@@ -46,7 +43,10 @@ class Search:
 
     def run(self) -> State:
         """The best set that was found."""
-        state = self.fitter.nothing
+        return self.further(self.fitter.nothing)
+
+    def further(self, state: State) -> State:
+        """The best set that was found, beginning with another."""
         while len(state.members) < MOST:
             further = max(self._expanded(state), key=lambda one: one.log_posterior, default=state)
             further = self._pruned(further)
@@ -110,10 +110,10 @@ class Search:
         return state
 
     def _named(self, state: State) -> State:
-        """With names in the place of every law that is not surely better."""
+        """With names in the place of every law that is not better."""
         for index in [one for one in state.members if self.design.hypotheses[one].free]:
             bare = self.fitter.state(state.without(index), state)
-            least, instead = max(state.log_posterior - SURELY, bare.log_posterior), bare
+            least, instead = max(state.log_posterior, bare.log_posterior), bare
             for _ in range(INSTEAD):
                 instead = max(self._expanded(instead, named=True), key=lambda one: one.log_posterior, default=instead)
                 if instead is not bare and instead.log_posterior > least:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
 from ident.diagnosis.law.learning import Designs
@@ -40,7 +41,7 @@ def _asked(fit: Problem, confirm: Problem) -> Question:
     colours = Colours(regression)
     design = make_design((fit, confirm), regression, colours, Designs((fit, confirm), regression.rows))
     search = Search(Fitter(design, colours, Bends((fit, confirm), colours)))
-    return Question(regression, colours, design, Products(design, colours), search)
+    return Question(regression, colours, design, Products(design, colours, np.arange(design.columns.shape[1])), search)
 
 
 @pytest.fixture
