@@ -65,7 +65,7 @@ class Search:
             before = state
             for index in before.members:
                 bare = self.fitter.state(before.without(index), before)
-                state = max(state, *self._expanded(bare), key=lambda one: one.log_posterior)
+                state = max((state, *self._expanded(bare)), key=lambda one: one.log_posterior)
             if state is before:
                 break
         return state
