@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -108,24 +109,30 @@ class _Answer:
         state: State,
         seed: int,
     ) -> None:
-        self.search, self.state, self.design = search, state, search.design
+        self.search, self.state, self.design, self._seed = search, state, search.design, seed
         excess = search.fitter.excess(state)
         self.slots = {index: slot_of(search, state, index, excess[index]) for index in state.members}
         self.taken = _as_variants(problems, regression, designs, self.design, state, self.slots)
-        variants = tuple(self.taken.variants.values())
+
+    @cached_property
+    def fitted(self) -> Fitted:
+        """The exact refits of the members."""
+        regression = self.taken.regression
         keys = [law.dependence.key for law in self.taken.laws.values()]
-        found = Taken(variants, state.evidence.noise)
+        found = Taken(tuple(self.taken.variants.values()), self.state.evidence.noise)
         told = told_samples(regression.rows, self.taken.problems, keys)
-        self.fitted = Fitted(self.taken.problems, self.taken.regression, found, seed, told)
+        return Fitted(self.taken.problems, regression, found, self._seed, told)
 
     def better(self) -> tuple[Search, State] | None:
         """The search and its set without members that are of no size, or are not worth their place; None: all are."""
         members = tuple(self.taken.variants)
-        sizeless = [index for place, index in enumerate(members) if not self._has_size(place)]
-        if sizeless:
-            search = self.search.without(sizeless)
-            return search, search.further(self._without(search, sizeless))
-        lost = self._lost(members)
+        lost = self._doubted(members)
+        if lost is None:
+            sizeless = [index for place, index in enumerate(members) if not self._has_size(place)]
+            if sizeless:
+                search = self.search.without(sizeless)
+                return search, search.further(self._without(search, sizeless))
+            lost = self._needless(members)
         if lost is None:
             return None
         # What is doubted once evidence is tempered, the search would take again.
@@ -137,14 +144,16 @@ class _Answer:
         left = {index: one for index, one in self.state.members.items() if index not in refuted}
         return search.fitter.state(left, self.state)
 
-    def _lost(self, members: Sequence[int]) -> int | None:
-        """A member that is hardly likely to be there, widens the held-out gap, or closes next to nothing beside others.
+    def _doubted(self, members: Sequence[int]) -> int | None:
+        """A member that is hardly likely to be there, or a law that the fitted rows do not show by themselves.
 
-        Or a law that the fitted rows do not show by themselves, which is not among the `members` taken.
+        Such a law is not among the `members` taken.
         """
         doubted = [index for index in self.state.members if self.slots[index].nothing > DOUBTED or index not in members]
-        if doubted:
-            return max(doubted, key=lambda index: self.slots[index].nothing)
+        return max(doubted, key=lambda index: self.slots[index].nothing, default=None)
+
+    def _needless(self, members: Sequence[int]) -> int | None:
+        """A member that widens the held-out gap, or closes next to nothing of it beside others."""
         closed = dict(zip(members, self.fitted.lacking, strict=True))
         widened = [index for index in members if closed[index] < -LIMITS.widening] if self._measurable() else []
         trifles = [index for place, index in enumerate(members) if not self._pays(place)] if len(members) > 1 else []

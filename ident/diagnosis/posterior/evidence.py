@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -19,8 +18,9 @@ from scipy import linalg
 from scipy.special import logsumexp
 
 from ident.diagnosis.posterior.bends import Bent
-from ident.diagnosis.posterior.hypotheses import Block, Design
-from ident.diagnosis.posterior.noise import TOLERATED, Colours, Noise, Sizes
+from ident.diagnosis.posterior.hypotheses import Block
+from ident.diagnosis.posterior.noise import TOLERATED, Noise, Sizes
+from ident.diagnosis.posterior.products import Products, among
 
 Array = NDArray[np.float64]
 
@@ -29,9 +29,6 @@ OCTAVES: Final = 1.0
 
 LARGEST: Final = 100.0
 """Scale, in units of the noise, that is tried at most."""
-
-KEPT: Final = 32
-"""Products of labels that are kept: those of all columns are large."""
 
 
 @dataclass(frozen=True)
@@ -85,45 +82,6 @@ class Table:
             return -math.inf
         row = int(np.argmax(self.logs.max(axis=1)))
         return self.total - float(self.logs.max()) + float(self.masses[row])
-
-
-class Products:
-    """Products of white columns: every noise is made of those of its labels.
-
-    Args:
-        design: of the rows.
-        colours: of their noise.
-        columns: (k,) of the design, rising; all of them, or those of a few hypotheses.
-    """
-
-    def __init__(self, design: Design, colours: Colours, columns: NDArray[np.int64]) -> None:
-        self.design, self.colours, self.columns = design, colours, columns
-        self._stacked = np.column_stack([design.baseline, design.columns[:, columns], design.target])
-        self._of = lru_cache(maxsize=KEPT)(self._made)
-
-    def at(self, place: slice) -> slice:
-        """Where columns of the design stand among these."""
-        return _among(self.columns, place)
-
-    def summed(self, sizes: Sizes) -> tuple[Array, float]:
-        """(p + k + 1, p + k + 1), the target last, and half the log of the determinant of the noise."""
-        width = self._stacked.shape[1]
-        whole, volume = np.zeros((width, width)), 0.0
-        for label, size in enumerate(sizes):
-            part, more = self._of(label, size)
-            whole += part
-            volume += more
-        return whole, volume
-
-    def with_others(self, sizes: Sizes, others: Array) -> tuple[Array, Array]:
-        """(p + k + 1, r) products of all columns and the target with others (n, r), and (r, r) of these."""
-        weighted = self.colours.weighted(sizes, others)
-        return self._stacked.T @ weighted, others.T @ weighted
-
-    def _made(self, label: int, size: int) -> tuple[Array, float]:
-        """The same of one label."""
-        white, volume = self.colours.of_label(label, size, self._stacked)
-        return white.T @ white, volume
 
 
 class Evidence:
@@ -246,7 +204,7 @@ class Target:
         places = [self.evidence.products.at(one.place) for one in used]
         columns = np.unique(np.concatenate([_numbers(place) for place in places]))
         products = self.beside(others, columns)
-        moved = [_among(columns, place) for place in places]
+        moved = [among(columns, place) for place in places]
         return self._table(used, moved, products, range(len(blocks)) if only is None else (only,))
 
     def table(self, hypothesis: int, products: Array) -> Table:
@@ -306,15 +264,9 @@ class Target:
         for place, (index, one) in zip(places, members.items(), strict=True):
             factor = self._block(index, one).factor
             part = np.zeros((len(columns), factor.shape[1]))
-            part[_among(columns, place)] = one.scale * factor
+            part[among(columns, place)] = one.scale * factor
             parts.append(part)
         return np.hstack(parts), columns
-
-
-def _among(columns: NDArray[np.int64], place: slice) -> slice:
-    """Where columns stand among some, that hold them side by side."""
-    first = int(np.searchsorted(columns, place.start))
-    return slice(first, first + place.stop - place.start)
 
 
 def _numbers(place: slice) -> NDArray[np.int64]:

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.directions import VISIBLE
 from ident.diagnosis.posterior.bends import Bends, Bent, Form
-from ident.diagnosis.posterior.evidence import Evidence, Member, Members, Products
+from ident.diagnosis.posterior.evidence import Evidence, Member, Members
 from ident.diagnosis.posterior.hypotheses import Block, Design
 from ident.diagnosis.posterior.misfit import excess_of_scatter
 from ident.diagnosis.posterior.noise import USUAL, Colours, Sizes, most_likely
+from ident.diagnosis.posterior.products import Products
 from ident.diagnosis.posterior.state import State
 
 Array = NDArray[np.float64]

@@ -10,10 +10,10 @@ import pytest
 
 from ident.diagnosis.law.learning import Designs
 from ident.diagnosis.posterior.bends import Bends
-from ident.diagnosis.posterior.evidence import Products
 from ident.diagnosis.posterior.fitting import Fitter
 from ident.diagnosis.posterior.hypotheses import Design, make_design
 from ident.diagnosis.posterior.noise import Colours
+from ident.diagnosis.posterior.products import Products
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression

@@ -1,0 +1,62 @@
+"""Products of white columns: the evidence with every noise is algebra of them."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.posterior.hypotheses import Design
+from ident.diagnosis.posterior.noise import Colours, Sizes
+
+Array = NDArray[np.float64]
+
+KEPT: Final = 32
+"""Products of labels that are kept: those of all columns are large."""
+
+
+class Products:
+    """Products of white columns: every noise is made of those of its labels.
+
+    Args:
+        design: of the rows.
+        colours: of their noise.
+        columns: (k,) of the design, rising; all of them, or those of a few hypotheses.
+    """
+
+    def __init__(self, design: Design, colours: Colours, columns: NDArray[np.int64]) -> None:
+        self.design, self.colours, self.columns = design, colours, columns
+        self._stacked = np.column_stack([design.baseline, design.columns[:, columns], design.target])
+        self._of = lru_cache(maxsize=KEPT)(self._made)
+
+    def at(self, place: slice) -> slice:
+        """Where columns of the design stand among these."""
+        return among(self.columns, place)
+
+    def summed(self, sizes: Sizes) -> tuple[Array, float]:
+        """(p + k + 1, p + k + 1), the target last, and half the log of the determinant of the noise."""
+        width = self._stacked.shape[1]
+        whole, volume = np.zeros((width, width)), 0.0
+        for label, size in enumerate(sizes):
+            part, more = self._of(label, size)
+            whole += part
+            volume += more
+        return whole, volume
+
+    def with_others(self, sizes: Sizes, others: Array) -> tuple[Array, Array]:
+        """(p + k + 1, r) products of all columns and the target with others (n, r), and (r, r) of these."""
+        weighted = self.colours.weighted(sizes, others)
+        return self._stacked.T @ weighted, others.T @ weighted
+
+    def _made(self, label: int, size: int) -> tuple[Array, float]:
+        """The same of one label."""
+        white, volume = self.colours.of_label(label, size, self._stacked)
+        return white.T @ white, volume
+
+
+def among(columns: NDArray[np.int64], place: slice) -> slice:
+    """Where columns stand among some, that hold them side by side."""
+    first = int(np.searchsorted(columns, place.start))
+    return slice(first, first + place.stop - place.start)
