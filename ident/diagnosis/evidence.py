@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.directions import Directions, White, directions
-from ident.diagnosis.linear import orthonormal
+from ident.diagnosis.linear import orthonormal, stretch_sums
 from ident.diagnosis.rows import Column
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ def gather(white: White, layout: Sequence[Column], signs: Array, excluded: Mask)
     own = 0.5 * _own(white, layout, found, amplitudes)
     competing = (ratios > 0) & ~excluded
     best = int(np.argmax(np.where(competing, ratios, -1.0)))
-    surrogates = signs @ _sums(found.basis * _without(found, amplitudes, best)[:, None], white.stretch)
+    surrogates = signs @ stretch_sums(found.basis * _without(found, amplitudes, best)[:, None], white.stretch)
     scale = _shared(found, amplitudes, best, _scatters(found, amplitudes, white.stretch))
     spread = np.maximum(found.ratios(surrogates).mean(axis=0) / np.maximum(sizes, 1), 1.0)
     beside = np.minimum([column.beside for column in layout], np.maximum(sizes - 1, 0))
@@ -103,11 +103,6 @@ def origins(layout: Sequence[Column]) -> NDArray[np.int64]:
     return np.array(of, dtype=np.int64)
 
 
-def _sums(values: Array, stretch: NDArray[np.int64]) -> Array:
-    starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
-    return np.asarray(np.add.reduceat(values, starts, axis=0))
-
-
 def _explained(found: Directions, amplitudes: Array, variant: int) -> Array:
     place = found.places[variant]
     return np.asarray(found.basis[:, place] @ amplitudes[place])
@@ -124,7 +119,7 @@ def scatter(basis: Array, residual: Array, stretch: NDArray[np.int64]) -> float:
     """
     if not basis.shape[1]:
         return 1.0
-    sums = _sums(basis * (residual - basis @ (basis.T @ residual))[:, None], stretch)
+    sums = stretch_sums(basis * (residual - basis @ (basis.T @ residual))[:, None], stretch)
     return float(max(1.0, np.sum(sums**2) / basis.shape[1]))
 
 
@@ -134,7 +129,7 @@ def _scatters(found: Directions, amplitudes: Array, stretch: NDArray[np.int64]) 
     alone = np.flatnonzero(sizes == 1)
     places = [found.places[variant].start for variant in alone.tolist()]
     basis = found.basis[:, places]
-    sums = _sums(basis * (found.residual[:, None] - basis * amplitudes[places]), stretch)
+    sums = stretch_sums(basis * (found.residual[:, None] - basis * amplitudes[places]), stretch)
     scale = np.ones(len(found.places))
     scale[alone] = np.maximum(1.0, np.sum(sums**2, axis=0))
     for variant in np.flatnonzero(sizes > 1).tolist():

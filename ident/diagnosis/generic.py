@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.linear import least_squares
+from ident.diagnosis.linear import least_squares, stretch_sums
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Rows
 from ident.diagnosis.whitening import Whitening
@@ -76,7 +76,7 @@ class SmoothFunction:
         weights = _ridge(extra[fitted], left[fitted], regression.stretch[fitted])
         predicted = extra @ weights
         confirming = rows.confirming
-        products = _sums(predicted[confirming] * left[confirming], regression.stretch[confirming])
+        products = stretch_sums(predicted[confirming] * left[confirming], regression.stretch[confirming])
         spread = float(np.sqrt(np.sum(products**2)))
         return Generic(
             before=float(np.sum(left[confirming] ** 2)),
@@ -146,8 +146,3 @@ def _ridge(extra: Array, left: Array, stretch: NDArray[np.int64]) -> Array:
 
 def _loss(extra: Array, left: Array, weights: Array) -> float:
     return float(np.sum((left - extra @ weights) ** 2))
-
-
-def _sums(values: Array, stretch: NDArray[np.int64]) -> Array:
-    starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
-    return np.asarray(np.add.reduceat(values, starts)) if starts.size else np.zeros(0)

@@ -26,6 +26,12 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
+def stretch_sums(values: Array, stretch: NDArray[np.int64]) -> Array:
+    """Sums (J,) or (J, k) of rows over stretches, whose numbers (n,) rise."""
+    starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
+    return np.asarray(np.add.reduceat(values, starts, axis=0)) if starts.size else np.zeros((0, *values.shape[1:]))
+
+
 SILENT: Final = 1e-12
 """Rms, in whatever unit, of what leaves nothing at all, as ideal records do."""
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.linear import least_squares
+from ident.diagnosis.linear import least_squares, stretch_sums
 from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Column, Rows
@@ -249,9 +249,8 @@ class _Model:
         stretch = self.regression.stretch[self.chosen]
         scaled = jacobian / scale
         scores = scaled[: len(stretch)] * residual[: len(stretch), None]
-        starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
-        sums = np.add.reduceat(scores, starts, axis=0)
-        freedom = len(starts) / max(len(starts) - 1, 1)
+        sums = stretch_sums(scores, stretch)
+        freedom = len(sums) / max(len(sums) - 1, 1)
         # Squares, so that what rows hardly split gets no negative variance by rounding.
         spread, held = sums @ inverse, scaled[len(stretch) :] @ inverse
         robust = freedom * spread.T @ spread + held.T @ held

@@ -21,11 +21,11 @@ def is_nothing(candidate: Candidate, part: Part, limits: Limits) -> bool:
     """Whether the refit has made something else of an effect, or of a size that may be zero.
 
     Something else has parameters that the effect does not have. Of linear ones any is a size, or else the first.
-    Where what comes along is sure to be there, `is_sizeless` says.
+    Beside what comes along, `is_sizeless` says.
     """
     if candidate.lowest and bool(np.any(np.abs(part.values) < candidate.lowest)):
         return True
     sizes = slice(None) if candidate.contribution is None else slice(1)
-    count = len(part.values)
-    unsure = np.abs(part.numbers) < limits.sure_of * part.scatter
-    return bool(np.all(unsure[:count][sizes]) and np.all(unsure[count:]))
+    alone = len(part.numbers) == len(part.values)
+    small = np.abs(part.values[sizes]) < limits.sure_of * part.scatter[: len(part.values)][sizes]
+    return alone and bool(np.all(small))

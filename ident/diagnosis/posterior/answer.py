@@ -130,14 +130,14 @@ class _Answer:
         if lost is None:
             sizeless = [index for place, index in enumerate(members) if not self._has_size(place)]
             if sizeless:
-                search = self.search.without(sizeless)
+                search = self.search.refuting(sizeless)
                 return search, search.further(self._without(search, sizeless))
             lost = self._needless(members)
         if lost is None:
             return None
-        # What is doubted once evidence is tempered, the search would take again.
-        search = self.search.without([lost])
-        return search, search.revised(self._without(search, [lost]))
+        # The search, which does not temper evidence, would take it again.
+        search = self.search.passing_over(lost)
+        return search, search.further(self._without(search, [lost]))
 
     def _without(self, search: Search, refuted: Collection[int]) -> State:
         """The set without some members."""

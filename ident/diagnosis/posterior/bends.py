@@ -37,7 +37,7 @@ NEAR_PLANT: Final = 1e-3
 """Change of the plant's parameters, relative, for which an exact form is held."""
 
 SAME: Final = 0.1
-"""Of coefficients, in standard deviations, that change nothing."""
+"""Of coefficients, in standard deviations by the usual noise, that change nothing."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,7 @@ class Bends:
         self._straight: dict[tuple[str, int], float] = {}
         self._kept: dict[tuple[str, int], Bent] = {}
         self._parameters: dict[tuple[str, int], Array] = {}
+        self._sloped: dict[tuple[str, int], tuple[Array, Array]] = {}
 
     def is_bent(self, hypothesis: Hypothesis, block: Block) -> bool:
         """Whether there is more to a hypothesis than its columns."""
@@ -110,23 +111,26 @@ class Bends:
         alike = kept is not None and np.array_equal(kept.held, numbers)
         moved = math.inf if kept is None else float(np.abs(kept.about - coefficients).max())
         same = kept is not None and alike and moved < SAME / math.sqrt(len(kept.missed))
-        if kept is not None and same and self._beside_the_same(key, form, NEAR_PLANT):
+        if kept is not None and same and np.allclose(self._parameters[key], form.parameters, rtol=NEAR_PLANT, atol=0.0):
             return kept
         here, expected = form.added(coefficients, numbers), form.expected_about(coefficients, numbers)
         if held is None and not len(expected[1]) and self._power(here - form.by_columns(coefficients)) < NEGLIGIBLE:
             self._straight[key] = size
             return None
-        if kept is not None and alike and moved < NEAR * size and self._beside_the_same(key, form, NEAR):
+        if kept is not None and alike and self._has_slopes_near(key, coefficients, form.parameters):
             slopes = kept.slopes
         else:
             slopes = form.slopes(coefficients, numbers, here)
+            self._sloped[key] = coefficients, form.parameters
         found = Bent(form.block.place, coefficients, numbers, slopes, here - slopes @ coefficients, expected)
         self._kept[key], self._parameters[key] = found, form.parameters
         return found
 
-    def _beside_the_same(self, key: tuple[str, int], form: Form, but: float) -> bool:
-        """Whether the last answer was for a plant of the same parameters, but for a share of them."""
-        return bool(np.allclose(self._parameters[key], form.parameters, rtol=but, atol=0.0))
+    def _has_slopes_near(self, key: tuple[str, int], coefficients: Array, parameters: Array) -> bool:
+        """Whether the last slopes were computed for nearly these coefficients and parameters of the plant."""
+        about, beside = self._sloped[key]
+        near = np.abs(about - coefficients).max() < NEAR * np.abs(coefficients).max()
+        return bool(near and np.allclose(beside, parameters, rtol=NEAR, atol=0.0))
 
     def _power(self, series: Array) -> float:
         """Sum of squares of a series (n,), in units of the least noise."""

@@ -92,7 +92,7 @@ class Evidence:
         sizes: of what is lacking.
 
     Attributes:
-        shown: (K,) power of every column beside the plant's parameters, over its own.
+        shown: (k,) power of every column beside the plant's parameters, over its own.
     """
 
     def __init__(self, products: Products, sizes: Sizes) -> None:
@@ -149,7 +149,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Target:
-    """Products of all columns and, last, a target, the baseline integrated.
+    """Products of the columns of some hypotheses, or of all, and, last, of a target; the baseline integrated.
 
     Attributes:
         evidence: of which noise.
@@ -197,13 +197,13 @@ class Target:
         # Columns that are the same but for rounding have no power apart.
         return np.maximum(powers, 0.0), own @ turn
 
-    def table_of(self, hypothesis: int, others: Members, only: int | None = None) -> Table:
-        """Log evidence of a hypothesis, or of one of its blocks alone, beside others."""
+    def table_of(self, hypothesis: int, others: Members, only: int | None = None, excess: float = 1.0) -> Table:
+        """Log evidence of a hypothesis, or of one of its blocks alone, beside others; its likelihood to 1/`excess`."""
         blocks = self.evidence.design.hypotheses[hypothesis].blocks
         used = blocks if only is None else (blocks[only],)
         places = [self.evidence.products.at(one.place) for one in used]
         columns = np.unique(np.concatenate([_numbers(place) for place in places]))
-        products = self.beside(others, columns)
+        products = self.beside(others, columns) / excess
         moved = [among(columns, place) for place in places]
         return self._table(used, moved, products, range(len(blocks)) if only is None else (only,))
 

@@ -90,12 +90,16 @@ class Fitter:
         if key not in self._kept:
             start = self._colours.usual if before is None else before.evidence.sizes
             products = self._products(members)
-            found = self._settled(State(members, self._known(members, before), Evidence(products, start)))
+            first = State(members, self._known(members, before), Evidence(products, start))
+            found = self._settled(first)
+            if not math.isfinite(found.log_posterior):
+                # Exact forms about numbers of another set may leave no room for a member that its columns do.
+                found = self._settled(replace(first, bends={}))
             for _ in range(SWEEPS):
                 noise = self._noise_beside(found)
                 if noise == found.evidence.sizes:
                     break
-                found = self._settled(replace(found, evidence=Evidence(products, noise)))
+                found = self._settled(replace(found, evidence=Evidence(products, noise), resting=frozenset()))
             self._kept[key] = found
         return self._kept[key]
 
@@ -169,14 +173,16 @@ class Fitter:
         found = {index: self._bends.bend(form, means[index], before[index]) for index, form in forms.items()}
         state = replace(state, bends={index: bent for index, bent in found.items() if bent is not None})
         for index, form in forms.items():
-            if index not in state.resting and float(np.abs(means[index]).max()) > self._telling:
+            if index not in state.resting and self._is_telling(state, blocks[index], means[index]):
                 state = self._moved(state, index, form, means[index])
         return state
 
-    @property
-    def _telling(self) -> float:
-        """Coefficient of a column of unit rms from which held numbers show: they turn a tenth of it."""
-        return TELLING / math.sqrt(len(self.design.target))
+    @staticmethod
+    def _is_telling(state: State, block: Block, mean: Array) -> bool:
+        """Whether held numbers show: they turn a tenth of a coefficient."""
+        place = state.evidence.products.at(block.place)
+        deviations = np.abs(mean) * np.sqrt(np.maximum(np.diag(state.target.products)[place], 0.0))
+        return float(deviations.max()) > TELLING
 
     def _moved(self, state: State, index: int, form: Form, mean: Array) -> State:
         """With the held numbers of a member moved to where the rows want them, if that is better."""

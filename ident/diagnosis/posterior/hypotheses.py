@@ -34,7 +34,7 @@ SAME: Final = 1e-5
 
 
 UNNAMED: Final = 3.0
-"""Log odds against a law without a name, as against a name: twenty to one."""
+"""Log odds of a name against a law without one, before the rows: twenty to one."""
 
 DECADE: Final = 10.0
 """Size of an effect over its usual one, at most."""

@@ -1,8 +1,9 @@
-"""How much less the rows say of a member than their noise would have it.
+"""Ratio of the sandwich variance to the variance by the noise, along each member of a set.
 
-Where all hypotheses are a little wrong, evidence grows with the rows as if each of them was new. The sandwich over
-stretches of rows (White 1982) is the variance of what is found whatever the noise is. Its ratio to the variance by the
-noise, along a member, is what the evidence for this is divided by (Pauli, Racugno and Ventura 2011).
+Where all hypotheses are a little wrong, the likelihood grows with the rows as if each of them was new. The sandwich
+over stretches of rows (White 1982) is the variance of what is found whatever the noise is. Likelihoods are taken to the
+power of the inverse of the ratio before they are integrated (Pauli, Racugno and Ventura 2011). Scores are not corrected
+for leverage: a member that acts in a few stretches alone has a ratio that is too small.
 """
 
 from __future__ import annotations
@@ -12,13 +13,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.linear import stretch_sums
+
 Array = NDArray[np.float64]
 
 
 def excess_of_scatter(
     white: Array, target: Array, known: tuple[Array, Array], stretch: NDArray[np.int64], places: Sequence[slice]
 ) -> list[float]:
-    """Ratios of the variances of what is found along every member, at least one.
+    """Variance of the coefficients along what is found of every member, by the sandwich over that by the noise; >= 1.
 
     Args:
         white: (n, k) rows in units of the noise, of coefficients of unit variance.
@@ -30,8 +33,7 @@ def excess_of_scatter(
     beside, wanted = known
     inverse = np.linalg.inv(np.eye(white.shape[1]) + white.T @ white + beside.T @ beside)
     found = inverse @ (white.T @ target + beside.T @ wanted)
-    starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
-    scores = np.add.reduceat(white * (target - white @ found)[:, None], starts, axis=0)
+    scores = stretch_sums(white * (target - white @ found)[:, None], stretch)
     # What is known otherwise, the priors included, is as uncertain as it says.
     otherwise = inverse @ (np.eye(len(inverse)) + beside.T @ beside) @ inverse
     scattered = scores @ inverse

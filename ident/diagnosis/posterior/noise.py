@@ -1,10 +1,11 @@
 """Noise of the rows: what differs between repeats, and what a model may lack beside it.
 
-Rows of a block have the covariance R + t² C. R is that of the mean over the repeats, by what differs between them;
-without any, that of what the baseline and the strongest candidates leave. t is what no model is expected to have right
-(`Block.tolerance`), a process that remembers, as slow as the motion or faster. Where the rows say so, more is lacking:
-q times as much as noise and tolerance are together, of the same memory. It is one q for all blocks of a step and a
-coordinate, the most likely beside the hypotheses that are taken; each next one has a price.
+Rows of a block have the covariance R + u² t² C. R is that of the mean over the repeats, by what differs between them;
+without any, that of what the baseline and the strongest candidates leave. t is what a model may have wrong at most
+(`Block.tolerance`), a process that remembers, as slow as the motion or faster; u says how much of it is there. Where
+the rows say so, more is lacking: q times as much as noise and tolerance are together, of the same memory. There is one
+pair u, q for all blocks of a step and a coordinate, the most likely beside the hypotheses that are taken; each next q
+has a price.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ LACKING: Final = (0.0, 0.0, 0.0, 1.0, 3.0, 10.0, 30.0, 100.0)
 """Of what is lacking, over noise and tolerance."""
 
 TOLERATED: Final = (0.1, 0.3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-"""Of what is tolerated, what is there: that is the most that it may be, and mostly it is less."""
+"""Share of the tolerance that is present: it is an upper bound."""
 
 USUAL: Final = 2
 """Number of the first of them with all of what is tolerated."""
@@ -96,6 +97,11 @@ class Colours:
     def usual(self) -> Sizes:
         """Nothing is lacking but what is tolerated."""
         return (USUAL,) * len(self.labels)
+
+    def levels(self, label: int) -> range:
+        """Sizes that differ: where nothing is tolerated, there is nothing less than that."""
+        tolerant = any(np.any(self._tolerated[number]) for number in self.blocks[label])
+        return range(0 if tolerant else USUAL, len(LACKING))
 
     def white(self, values: Array, sizes: Sizes) -> tuple[Array, float]:
         """All rows (n, k) in units of the noise, and half the log of its determinant."""
@@ -178,10 +184,10 @@ def most_likely(colours: Colours, columns: Array, target: Array, known: Array, s
         start: sizes to begin with.
     """
     whole = np.column_stack([columns, target])
-    parts: list[list[tuple[Array, float]]] = []
+    parts: list[dict[int, tuple[Array, float]]] = []
     for label in range(len(colours.labels)):
-        made = [colours.of_label(label, size, whole) for size in range(len(LACKING))]
-        parts.append([(white.T @ white, volume) for white, volume in made])
+        made = {size: colours.of_label(label, size, whole) for size in colours.levels(label)}
+        parts.append({size: (white.T @ white, volume) for size, (white, volume) in made.items()})
     found = list(start)
     products = known + np.sum([parts[label][size][0] for label, size in enumerate(found)], axis=0)
     logs = -sum(parts[label][size][1] + _price(size) for label, size in enumerate(found))
@@ -189,7 +195,7 @@ def most_likely(colours: Colours, columns: Array, target: Array, known: Array, s
     for _ in range(ROUNDS):
         before = tuple(found)
         for label, sizes in enumerate(parts):
-            for size, (other, volume) in enumerate(sizes):
+            for size, (other, volume) in sizes.items():
                 now, now_volume = sizes[found[label]]
                 changed = products - now + other
                 gained = now_volume - volume + _price(found[label]) - _price(size)

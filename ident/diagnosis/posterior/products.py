@@ -32,8 +32,10 @@ class Products:
         self._of = lru_cache(maxsize=KEPT)(self._made)
 
     def at(self, place: slice) -> slice:
-        """Where columns of the design stand among these."""
-        return among(self.columns, place)
+        """Where columns of the design stand among these, which must have them."""
+        found = among(self.columns, place)
+        assert self.columns[found.start] == place.start
+        return found
 
     def summed(self, sizes: Sizes) -> tuple[Array, float]:
         """(p + k + 1, p + k + 1), the target last, and half the log of the determinant of the noise."""

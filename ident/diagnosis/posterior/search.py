@@ -31,15 +31,23 @@ class Search:
     Args:
         fitter: of the sets.
         refuted: hypotheses that the records speak against.
+        passed_over: those that are not worth a place of their own; they may still be what another one is taken for.
     """
 
-    def __init__(self, fitter: Fitter, refuted: frozenset[int] = frozenset()) -> None:
+    def __init__(
+        self, fitter: Fitter, refuted: frozenset[int] = frozenset(), passed_over: frozenset[int] = frozenset()
+    ) -> None:
         self.fitter, self.design = fitter, fitter.design
         self.refuted = refuted | fitter.invisible
+        self.passed_over = passed_over
 
-    def without(self, refuted: Collection[int]) -> Search:
-        """The same search without some hypotheses more."""
-        return Search(self.fitter, self.refuted | frozenset(refuted))
+    def refuting(self, refuted: Collection[int]) -> Search:
+        """The same search, some hypotheses more refuted."""
+        return Search(self.fitter, self.refuted | frozenset(refuted), self.passed_over)
+
+    def passing_over(self, hypothesis: int) -> Search:
+        """The same search, one hypothesis more passed over."""
+        return Search(self.fitter, self.refuted, self.passed_over | {hypothesis})
 
     def run(self) -> State:
         """The best set that was found."""
@@ -84,12 +92,12 @@ class Search:
         """
         hypotheses = self.design.hypotheses
         whole, usual = self.fitter.among_all(state), self.fitter.with_nothing_lacking(state)
-        found: dict[int, Member] = {}
+        found, barred = dict[int, Member](), self.refuted | self.passed_over
         for one in (whole, usual) if usual.evidence is not whole.evidence else (whole,):
             tables = {
                 index: table
                 for index, table in one.tables().items()
-                if table.is_there and index not in self.refuted and not (named and hypotheses[index].free)
+                if table.is_there and index not in barred and not (named and hypotheses[index].free)
             }
             odds = {index: table.total - hypotheses[index].price for index, table in tables.items()}
             most = max(odds.values(), default=0.0)

@@ -70,20 +70,21 @@ class Slot:
         return Ranked(probabilities, self.names(hypotheses), alike, evidence)
 
 
-def slot_of(search: Search, state: State, index: int, excess: float = 1.0) -> Slot:
+def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
     """What may stand in the place of a member: rivals that come near by their columns are fitted exactly.
 
     Args:
         search: that found the set.
         state: the set.
         index: of the member.
-        excess: what the evidence is divided by, where rows scatter beyond their noise.
+        excess: of the scatter of the rows over their noise, along the member: likelihoods in its place are taken to the
+            power of its inverse.
     """
     hypotheses = search.design.hypotheses
     state = search.fitter.among_all(state)
     others = state.without(index)
     without = replace(state, members=others, bends={one: bend for one, bend in state.bends.items() if one != index})
-    beside, bare = without.target.beside(others), search.fitter.state(others, state).log_posterior
+    beside, bare = without.target.beside(others) / excess, search.fitter.state(others, state).log_posterior
     # Others that cannot be there without it, by their sign, are no ground to stand on.
     bare = bare if math.isfinite(bare) else search.fitter.nothing.log_posterior
     # Without it the rows may have another noise.
@@ -94,12 +95,11 @@ def slot_of(search: Search, state: State, index: int, excess: float = 1.0) -> Sl
             table = without.target.table(number, beside)
             if table.is_there:
                 logs[number] = base + table.total - hypothesis.price
-    logs[index] = state.log_posterior - bare
+    logs[index] = state.tempered(index, excess) - bare
     near = sorted((one for one in logs if one != index), key=lambda one: -logs[one])[:RIVALS]
     for rival in [one for one in near if logs[one] > logs[index] - NEAR]:
         table = without.target.table(rival, beside)
-        logs[rival] = search.fitter.state({**others, rival: table.best}, state).log_posterior - bare
-    logs = {one: (log + hypotheses[one].price) / excess - hypotheses[one].price for one, log in logs.items()}
+        logs[rival] = search.fitter.state({**others, rival: table.best}, state).tempered(rival, excess) - bare
     logs = {one: log for one, log in sorted(logs.items(), key=lambda entry: -entry[1]) if math.isfinite(log)}
     cosines = _cosines(state, index, logs)
     width = len(hypotheses[index].blocks[state.members[index].block].factor)

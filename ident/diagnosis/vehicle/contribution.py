@@ -79,6 +79,7 @@ def _term_contribution(
             if acts and source.own is None:
                 asked = parameters[: len(PARAMETER_NAMES)]
                 rows, exact = prepared(number, source, asked), replace(context, parameters=asked)
+                # Entries are rows: these functions have one column, and no structural zeros (`Formulas.exact`).
                 touched = list(rows.touched)
                 change = rows.entries(values) - exact.plain(source)[:, touched, 0].T
                 for row, column in zip(touched, context.filtered(change.T, source).T, strict=True):

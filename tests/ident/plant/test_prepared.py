@@ -32,5 +32,12 @@ def test_it_has_the_values_of_the_whole_function(first: float, second: float) ->
     np.testing.assert_array_equal(prepared.entries(last), WHOLE.entries(*FIXED, last)[list(prepared.touched)])
 
 
+def test_one_call_leaves_nothing_behind_for_the_next() -> None:
+    prepared, lasts = Prepared(WHOLE, *FIXED), [np.array([0.5, 1.0]), np.array([-2.0, 0.1]), np.array([0.5, 1.0])]
+    first, other, again = map(prepared.entries, lasts)
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
 def test_only_what_the_last_argument_has_a_part_in_is_touched() -> None:
     assert Prepared(WHOLE, *FIXED).touched == (0, 2)

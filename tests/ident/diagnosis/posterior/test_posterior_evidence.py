@@ -63,6 +63,30 @@ def test_the_evidence_of_a_hypothesis_integrates_its_scale(problems: tuple[Probl
     assert target.table_of(number, {}).total == pytest.approx(table.total)
 
 
+def test_a_set_has_the_same_posterior_by_its_own_columns_and_by_all(
+    problems: tuple[Problem, Problem], asked: Asked
+) -> None:
+    fitter = asked(*problems).search.fitter
+    state = fitter.state({index: Member(0, 1.0) for index in (0, 1)}, None)
+    assert fitter.among_all(state).log_posterior == pytest.approx(state.log_posterior)
+
+
+@pytest.mark.parametrize("excess", [2.0, 5.0])
+def test_a_tempered_likelihood_is_that_of_rows_of_so_much_more_variance(
+    problems: tuple[Problem, Problem], asked: Asked, excess: float
+) -> None:
+    """Products of white rows that are each √excess smaller; the prior and the noise cost what they did."""
+    question = asked(*problems)
+    state, number = question.search.run(), question.number("b@place")
+    assert list(state.members) == [number]
+    whole = question.search.fitter.among_all(state)
+    by_products = whole.target.table(number, whole.target.beside({}) / excess).total
+    price = state.log_posterior - state.table(number).total
+    assert state.tempered(number, excess) == pytest.approx(price + by_products)
+    assert state.tempered(number, 1.0) == pytest.approx(state.log_posterior)
+    assert state.tempered(number, excess) < state.log_posterior
+
+
 def test_slow_noise_that_no_repeat_shows_is_what_a_model_lacks(world: Callable[..., Any], asked: Asked) -> None:
     """What repeats in one coordinate and is no column is lacking there, and nowhere else."""
     made = world(5, samples=200, repeats=6)
