@@ -17,13 +17,18 @@ def is_sizeless(candidate: Candidate, part: Part, limits: Limits) -> bool:
     return bool(np.any(accompanied) and np.all(size < limits.sized * part.std))
 
 
+def is_foreign(candidate: Candidate, part: Part) -> bool:
+    """Whether the refit has made something else of an effect, of parameters that it does not have."""
+    return bool(candidate.lowest) and bool(np.any(np.abs(part.values) < candidate.lowest))
+
+
 def is_nothing(candidate: Candidate, part: Part, limits: Limits) -> bool:
     """Whether the refit has made something else of an effect, or of a size that may be zero.
 
     Something else has parameters that the effect does not have. Of linear ones any is a size, or else the first.
     Beside what comes along, `is_sizeless` says.
     """
-    if candidate.lowest and bool(np.any(np.abs(part.values) < candidate.lowest)):
+    if is_foreign(candidate, part):
         return True
     sizes = slice(None) if candidate.contribution is None else slice(1)
     alone = len(part.numbers) == len(part.values)

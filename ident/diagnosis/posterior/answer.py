@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -32,10 +32,10 @@ from ident.diagnosis.posterior.state import State
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.remainder import repeated, shares
-from ident.diagnosis.rows import make_rows
+from ident.diagnosis.rows import Column, make_rows
 from ident.diagnosis.search import Taken
 from ident.diagnosis.settings import Settings
-from ident.diagnosis.sized import is_nothing, is_sizeless
+from ident.diagnosis.sized import is_foreign, is_nothing, is_sizeless
 from ident.stages import Stage, untold
 
 Array = NDArray[np.float64]
@@ -128,10 +128,10 @@ class _Answer:
         members = tuple(self.taken.variants)
         lost = self._doubted(members)
         if lost is None:
-            sizeless = [index for place, index in enumerate(members) if not self._has_size(place)]
-            if sizeless:
-                search = self.search.refuting(sizeless)
-                return search, search.further(self._without(search, sizeless))
+            refuted = self._sizeless(members) or self._widening(members)
+            if refuted:
+                search = self.search.refuting(refuted)
+                return search, search.further(self._without(search, refuted))
             lost = self._needless(members)
         if lost is None:
             return None
@@ -152,12 +152,20 @@ class _Answer:
         doubted = [index for index in self.state.members if self.slots[index].nothing > DOUBTED or index not in members]
         return max(doubted, key=lambda index: self.slots[index].nothing, default=None)
 
-    def _needless(self, members: Sequence[int]) -> int | None:
-        """A member that widens the held-out gap, or closes next to nothing of it beside others."""
+    def _sizeless(self, members: Sequence[int]) -> list[int]:
+        return [index for place, index in enumerate(members) if not self._has_size(place)]
+
+    def _widening(self, members: Sequence[int]) -> list[int]:
+        """The member that widens the held-out gap most, if any does."""
         closed = dict(zip(members, self.fitted.lacking, strict=True))
         widened = [index for index in members if closed[index] < -LIMITS.widening] if self._measurable() else []
+        return sorted(widened, key=lambda index: closed[index])[:1]
+
+    def _needless(self, members: Sequence[int]) -> int | None:
+        """The member that closes least of the held-out gap, if that is next to nothing beside others."""
+        closed = dict(zip(members, self.fitted.lacking, strict=True))
         trifles = [index for place, index in enumerate(members) if not self._pays(place)] if len(members) > 1 else []
-        return min(widened or trifles, key=lambda index: closed[index], default=None)
+        return min(trifles, key=lambda index: closed[index], default=None)
 
     def _pays(self, place: int) -> bool:
         """Whether a member closes what its columns are exact to, or much of what a greater one leaves."""
@@ -168,9 +176,15 @@ class _Answer:
         return self.fitted.removable > LIMITS.measurable * self.fitted.whole.floor**2
 
     def _has_size(self, place: int) -> bool:
-        """Whether a size is surely not zero, and its own, and the numbers are of the effect's family."""
+        """Whether a size is surely not zero, and its own, and the numbers are of the effect's family.
+
+        Numbers that trade for each other, as a Stribeck friction and its speed, have wide deviations each: an effect of
+        the family without which most of the held-out gap stays is surely not zero.
+        """
         candidate, part = self.fitted.candidate(place), self.fitted.after.parts[place]
-        return not (is_nothing(candidate, part, LIMITS) or is_sizeless(candidate, part, LIMITS))
+        if is_nothing(candidate, part, LIMITS):
+            return not is_foreign(candidate, part) and self._measurable() and self.fitted.lacking[place] > OPEN
+        return not is_sizeless(candidate, part, LIMITS)
 
     def findings(self) -> Findings:
         """The answer, with all that reports show of it."""
@@ -264,6 +278,8 @@ def _as_variants(
         column = design.hypotheses[index].blocks[member.block].column
         if column is not None:
             variants[index] = rows.layout.index(column)
+        if column is not None and index in state.bends:
+            problems = tuple(_started(problem, column, state.bends[index].numbers) for problem in problems)
     for index in [one for one in state.members if design.hypotheses[one].free]:
         law = _law(problems, regression, designs, design, state, slots[index], index, tuple(variants.values()))
         if law is not None:
@@ -271,6 +287,16 @@ def _as_variants(
             laws[index] = law
     kept = {index: variants[index] for index in state.members if index in variants}
     return _Taken(problems, regression, kept, laws)
+
+
+def _started(problem: Problem, column: Column, numbers: Array) -> Problem:
+    """A problem in which the exact refit of a variant begins with the numbers (m,) that were found."""
+    candidate = problem.candidates[column.candidate]
+    variants = list(candidate.variants)
+    variants[column.variant] = replace(variants[column.variant], start=lambda _: numbers)
+    candidates = list(problem.candidates)
+    candidates[column.candidate] = replace(candidate, variants=tuple(variants))
+    return replace(problem, candidates=tuple(candidates))
 
 
 def _law(

@@ -48,6 +48,7 @@ class Bent:
         place: of its columns among all.
         about: (K,) the coefficients.
         held: (H,) the numbers that columns are made for.
+        numbers: (m,) all numbers of its exact form.
         slopes: (n, K) that take the place of the columns.
         missed: (n,) what these miss of it.
         expected: (m, K) and (m,) rows beside those of the records, in standard deviations: what physics expects of
@@ -57,6 +58,7 @@ class Bent:
     place: slice
     about: Array
     held: Array
+    numbers: Array
     slopes: Array
     missed: Array
     expected: tuple[Array, Array]
@@ -122,7 +124,10 @@ class Bends:
         else:
             slopes = form.slopes(coefficients, numbers, here)
             self._sloped[key] = coefficients, form.parameters
-        found = Bent(form.block.place, coefficients, numbers, slopes, here - slopes @ coefficients, expected)
+        missed = here - slopes @ coefficients
+        found = Bent(
+            form.block.place, coefficients, numbers, form.numbers(coefficients, numbers), slopes, missed, expected
+        )
         self._kept[key], self._parameters[key] = found, form.parameters
         return found
 
@@ -167,7 +172,7 @@ class Form:
 
     def added(self, coefficients: Array, held: Array) -> Array:
         """(n,) what it adds."""
-        numbers, series = self._numbers(coefficients, held), list[Array | None]()
+        numbers, series = self.numbers(coefficients, held), list[Array | None]()
         for candidate in self.candidates:
             assert candidate.contribution is not None
             series += candidate.contribution(numbers, self.parameters)
@@ -178,10 +183,15 @@ class Form:
         steps = STEP * np.maximum(np.abs(coefficients), 1.0)
         return _slopes(lambda values: self.added(values, held), coefficients, here, steps)
 
-    def held_slopes(self, bent: Bent) -> Array:
-        """(n, H) over the held numbers."""
-        here, steps = bent.missed + bent.slopes @ bent.about, STEP * np.maximum(np.abs(bent.held), STEP)
-        return _slopes(lambda values: self.added(bent.about, values), bent.held, here, steps)
+    def held_slopes(self, bent: Bent) -> tuple[Array, Array]:
+        """(n, H) over the held numbers, and (m, H) of the rows of what is expected."""
+
+        def both(held: Array) -> Array:
+            return np.concatenate([self.added(bent.about, held), self._expected(bent.about, held)])
+
+        here = np.concatenate([bent.missed + bent.slopes @ bent.about, self._expected(bent.about, bent.held)])
+        found = _slopes(both, bent.held, here, STEP * np.maximum(np.abs(bent.held), STEP))
+        return found[: len(bent.missed)], found[len(bent.missed) :]
 
     def expected_about(self, coefficients: Array, held: Array) -> tuple[Array, Array]:
         """Rows of what is expected of its numbers, over the coefficients."""
@@ -189,11 +199,6 @@ class Form:
         steps = STEP * np.maximum(np.abs(coefficients), 1.0)
         slopes = _slopes(lambda values: self._expected(values, held), coefficients, here, steps)
         return slopes, slopes @ coefficients - here
-
-    def expected_of_held(self, bent: Bent) -> Array:
-        """(m, H) the same rows over the held numbers."""
-        here, steps = self._expected(bent.about, bent.held), STEP * np.maximum(np.abs(bent.held), STEP)
-        return _slopes(lambda values: self._expected(bent.about, values), bent.held, here, steps)
 
     def held(self, coefficients: Array) -> Array:
         """(H,) numbers that the coefficients say nothing of, as the columns are made for."""
@@ -209,7 +214,8 @@ class Form:
         found[len(self.candidates[0].parameters) :] = False
         return np.asarray(found)
 
-    def _numbers(self, coefficients: Array, held: Array) -> Array:
+    def numbers(self, coefficients: Array, held: Array) -> Array:
+        """(m,) of the exact form."""
         found = self._started(coefficients)
         if held.size:
             found[self._is_held] = held
@@ -229,14 +235,17 @@ class Form:
 
     def _expected(self, coefficients: Array, held: Array) -> Array:
         expected = self.candidates[0].expected
-        return np.zeros(0) if expected is None else expected(self._numbers(coefficients, held))
+        return np.zeros(0) if expected is None else expected(self.numbers(coefficients, held))
 
 
 def _slopes(function: Callable[[Array], Array], about: Array, here: Array, steps: Array) -> Array:
-    """(n, k) by differences."""
+    """(n, k) by differences; where a number is at the end of what it may be, towards the inside."""
     found = np.empty((len(here), len(about)))
     for place, step in enumerate(steps.tolist()):
-        ahead = about.copy()
-        ahead[place] += step
-        found[:, place] = (function(ahead) - here) / step
+        for towards in (step, -step):
+            there = about.copy()
+            there[place] += towards
+            found[:, place] = (function(there) - here) / towards
+            if found[:, place].any():
+                break
     return found

@@ -50,12 +50,14 @@ class Table:
     Attributes:
         scales: (S,) tried.
         logs: (G, S) log evidence against its absence, by its numbers and scale, the prior mass of each included.
-        masses: (G,) log of that.
+        occam: (G, S) of those, what integrating the coefficients costs.
+        masses: (G,) log of the prior masses.
         blocks: (G,) numbers of the blocks.
     """
 
     scales: Array
     logs: Array
+    occam: Array
     masses: Array
     blocks: Sequence[int]
 
@@ -74,6 +76,12 @@ class Table:
         """The numbers with the largest evidence."""
         row, column = np.unravel_index(int(np.argmax(self.logs)), self.logs.shape)
         return Member(self.blocks[int(row)], float(self.scales[column]))
+
+    @property
+    def cost(self) -> float:
+        """What the log evidence is below the log likelihood ratio at the best numbers."""
+        row, column = np.unravel_index(int(np.argmax(self.logs)), self.logs.shape)
+        return float(self.logs[row, column] + self.occam[row, column] - self.masses[int(row)]) - self.total
 
     @property
     def inside(self) -> float:
@@ -197,13 +205,13 @@ class Target:
         # Columns that are the same but for rounding have no power apart.
         return np.maximum(powers, 0.0), own @ turn
 
-    def table_of(self, hypothesis: int, others: Members, only: int | None = None, excess: float = 1.0) -> Table:
-        """Log evidence of a hypothesis, or of one of its blocks alone, beside others; its likelihood to 1/`excess`."""
+    def table_of(self, hypothesis: int, others: Members, only: int | None = None) -> Table:
+        """Log evidence of a hypothesis, or of one of its blocks alone, beside others."""
         blocks = self.evidence.design.hypotheses[hypothesis].blocks
         used = blocks if only is None else (blocks[only],)
         places = [self.evidence.products.at(one.place) for one in used]
         columns = np.unique(np.concatenate([_numbers(place) for place in places]))
-        products = self.beside(others, columns) / excess
+        products = self.beside(others, columns)
         moved = [among(columns, place) for place in places]
         return self._table(used, moved, products, range(len(blocks)) if only is None else (only,))
 
@@ -217,32 +225,34 @@ class Target:
         self, blocks: Sequence[Block], places: Sequence[slice], products: Array, numbers: Sequence[int]
     ) -> Table:
         masses = np.array([self._mass(block) for block in blocks])
-        logs = np.stack([self._logs(block, place, products) for block, place in zip(blocks, places, strict=True)])
-        return Table(self.evidence.scales, logs + masses[:, None], masses, numbers)
+        made = [self._logs(block, place, products) for block, place in zip(blocks, places, strict=True)]
+        logs, occam = (np.stack(parts) for parts in zip(*made, strict=True))
+        return Table(self.evidence.scales, logs + masses[:, None], occam, masses, numbers)
 
     def _mass(self, block: Block) -> float:
         """Log of the prior mass of a block at one scale."""
         count = max(int(np.sum(self.evidence.scales <= block.largest)), 1)
         return block.weight - math.log(count) + (math.log(2) if block.least == 0 else 0.0)
 
-    def _logs(self, block: Block, place: slice, products: Array) -> Array:
-        """(S,) of one block, whose columns stand at a place of the products."""
+    def _logs(self, block: Block, place: slice, products: Array) -> tuple[Array, Array]:
+        """(S,) of one block, whose columns stand at a place of the products, and what integrating costs."""
         squares = self.evidence.scales[:, None] ** 2
+        impossible = np.full(len(squares), -math.inf), np.zeros(len(squares))
         if block.factor.shape == (1, 1):
             power, amplitude = max(float(products[place, place][0, 0]), 0.0), float(products[place.start, -1])
             nothing = power <= np.finfo(float).eps * len(self.evidence.design.target)
             if nothing or _is_refused(block, power, amplitude):
-                return np.full(len(squares), -math.inf)
+                return impossible
             powers, amplitudes = np.array([power]), np.array([amplitude])
         else:
             powers, turn = np.linalg.eigh(block.factor.T @ products[place, place] @ block.factor)
             powers, amplitudes = np.maximum(powers, 0.0), turn.T @ (block.factor.T @ products[place, -1])
             if block.least == 0 and self._is_negative(turn, powers, amplitudes):
-                return np.full(len(squares), -math.inf)
-        gains = squares / (1 + squares * powers)
-        logs = 0.5 * np.sum(gains * amplitudes**2 - np.log1p(squares * powers), axis=1)
+                return impossible
+        ratios = 0.5 * np.sum(squares / (1 + squares * powers) * amplitudes**2, axis=1)
+        occam = 0.5 * np.sum(np.log1p(squares * powers), axis=1)
         allowed = self.evidence.scales <= max(block.largest, self.evidence.scales[0])
-        return np.where(allowed, logs, -math.inf)
+        return np.where(allowed, ratios - occam, -math.inf), occam
 
     @staticmethod
     def _is_negative(turn: Array, powers: Array, amplitudes: Array) -> bool:

@@ -199,7 +199,7 @@ class Fitter:
 
     def _step(self, state: State, others: Members, form: Form, bent: Bent) -> Array:
         """(H,) of the held numbers of a member, everything else fitted beside."""
-        free, expected = form.held_slopes(bent), form.expected_of_held(bent)
+        free, expected = form.held_slopes(bent)
         columns = [self.design.baseline, *(self._columns(state, index, one) for index, one in others.items())]
         whole = np.column_stack([*columns, bent.slopes, free, self.design.target - state.missed])
         white, _ = self._colours.white(whole, state.evidence.sizes)

@@ -77,29 +77,31 @@ def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
         search: that found the set.
         state: the set.
         index: of the member.
-        excess: of the scatter of the rows over their noise, along the member: likelihoods in its place are taken to the
-            power of its inverse.
+        excess: of the scatter of the rows over their noise, along the member: likelihood ratios in its place are taken
+            to the power of its inverse.
     """
     hypotheses = search.design.hypotheses
     state = search.fitter.among_all(state)
     others = state.without(index)
     without = replace(state, members=others, bends={one: bend for one, bend in state.bends.items() if one != index})
-    beside, bare = without.target.beside(others) / excess, search.fitter.state(others, state).log_posterior
+    beside, bare = without.target.beside(others), search.fitter.state(others, state).log_posterior
     # Others that cannot be there without it, by their sign, are no ground to stand on.
     bare = bare if math.isfinite(bare) else search.fitter.nothing.log_posterior
     # Without it the rows may have another noise.
     base = without.log_posterior - bare if math.isfinite(without.log_posterior) else 0.0
-    logs: dict[int, float] = {}
+    logs, costs = dict[int, float](), dict[int, float]()
     for number, hypothesis in enumerate(hypotheses):
         if number not in others and number not in search.refuted:
             table = without.target.table(number, beside)
             if table.is_there:
-                logs[number] = base + table.total - hypothesis.price
-    logs[index] = state.tempered(index, excess) - bare
+                logs[number], costs[number] = base + table.total - hypothesis.price, table.cost
+    logs[index], costs[index] = state.log_posterior - bare, state.table(index).cost
     near = sorted((one for one in logs if one != index), key=lambda one: -logs[one])[:RIVALS]
     for rival in [one for one in near if logs[one] > logs[index] - NEAR]:
-        table = without.target.table(rival, beside)
-        logs[rival] = search.fitter.state({**others, rival: table.best}, state).tempered(rival, excess) - bare
+        fitted = search.fitter.state({**others, rival: without.target.table(rival, beside).best}, state)
+        logs[rival] = fitted.log_posterior - bare
+        costs[rival] = fitted.table(rival).cost if math.isfinite(fitted.log_posterior) else 0.0
+    logs = {one: _tempered(log, costs[one] + hypotheses[one].price, excess) for one, log in logs.items()}
     logs = {one: log for one, log in sorted(logs.items(), key=lambda entry: -entry[1]) if math.isfinite(log)}
     cosines = _cosines(state, index, logs)
     width = len(hypotheses[index].blocks[state.members[index].block].factor)
@@ -109,6 +111,11 @@ def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
         if cosine > ALIKE and size == width and one != index and not (hypotheses[one].free or hypotheses[index].free)
     ]
     return Slot(logs, {one: cosine for one, (cosine, _) in cosines.items()}, (index, *alike))
+
+
+def _tempered(log: float, cost: float, excess: float) -> float:
+    """Log odds, the likelihood ratio to the power of 1 / `excess`; what priors and free numbers cost stays."""
+    return (log + cost) / excess - cost
 
 
 def _cosines(state: State, index: int, others: Mapping[int, float]) -> dict[int, tuple[float, int]]:

@@ -64,17 +64,10 @@ class State:
         """(n,) of the target, what neither the columns nor the slopes of its members have."""
         return sum((bent.missed for bent in self.bends.values()), np.zeros(len(self.evidence.design.target)))
 
-    def table(self, hypothesis: int, excess: float = 1.0) -> Table:
-        """Evidence of a member beside the others, its likelihood to the power of 1 / `excess`.
-
-        By its slopes where it has them: those are of one block.
-        """
+    def table(self, hypothesis: int) -> Table:
+        """Evidence of a member beside the others, by its slopes where it has them: those are of one block."""
         only = self.members[hypothesis].block if hypothesis in self.bends else None
-        return self.target.table_of(hypothesis, self.without(hypothesis), only, excess)
-
-    def tempered(self, hypothesis: int, excess: float) -> float:
-        """The log posterior, the likelihood of a member to the power of 1 / `excess`; priors as they are."""
-        return self.log_posterior - self.table(hypothesis).total + self.table(hypothesis, excess).total
+        return self.target.table_of(hypothesis, self.without(hypothesis), only)
 
     def tables(self) -> dict[int, Table]:
         """Evidence of all other hypotheses beside the members, but of those that are the same as some of these.

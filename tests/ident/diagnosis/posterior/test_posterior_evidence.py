@@ -13,6 +13,7 @@ from scipy import stats
 
 from ident.diagnosis.posterior.evidence import Evidence, Member
 from ident.diagnosis.posterior.noise import LACKING, TOLERATED, USUAL
+from ident.diagnosis.posterior.slots import slot_of
 from ident.diagnosis.problem import Problem, Variant
 
 Array = NDArray[np.float64]
@@ -75,16 +76,18 @@ def test_a_set_has_the_same_posterior_by_its_own_columns_and_by_all(
 def test_a_tempered_likelihood_is_that_of_rows_of_so_much_more_variance(
     problems: tuple[Problem, Problem], asked: Asked, excess: float
 ) -> None:
-    """Products of white rows that are each √excess smaller; the prior and the noise cost what they did."""
+    """Products of white rows are so much smaller, but for what a coefficient then costs less."""
     question = asked(*problems)
     state, number = question.search.run(), question.number("b@place")
     assert list(state.members) == [number]
-    whole = question.search.fitter.among_all(state)
-    by_products = whole.target.table(number, whole.target.beside({}) / excess).total
-    price = state.log_posterior - state.table(number).total
-    assert state.tempered(number, excess) == pytest.approx(price + by_products)
-    assert state.tempered(number, 1.0) == pytest.approx(state.log_posterior)
-    assert state.tempered(number, excess) < state.log_posterior
+    whole, price = question.search.fitter.among_all(state), question.design.hypotheses[number].price
+    alone = whole.target.table(number, whole.target.beside({}))
+    diluted = whole.target.table(number, whole.target.beside({}) / excess).total - price
+    slot = slot_of(question.search, state, number, excess)
+    bare = state.log_posterior - question.search.fitter.nothing.log_posterior
+    noise = bare + price - alone.total
+    assert slot.logs[number] - noise / excess == pytest.approx(diluted, abs=0.5 * np.log(excess) + 0.1)
+    assert slot_of(question.search, state, number, 1.0).logs[number] == pytest.approx(bare)
 
 
 def test_slow_noise_that_no_repeat_shows_is_what_a_model_lacks(world: Callable[..., Any], asked: Asked) -> None:
