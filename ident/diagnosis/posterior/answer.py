@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
 from functools import cached_property
 from typing import Final
 
@@ -16,23 +15,24 @@ from ident.diagnosis.findings import LAW, Cause, Findings, ordered
 from ident.diagnosis.fitted import Fitted
 from ident.diagnosis.law.answer import Alternative, LawAnswer, alternatives, law_answer, same_names
 from ident.diagnosis.law.free import Curve
-from ident.diagnosis.law.learning import Designs, Learner
+from ident.diagnosis.law.learning import Designs
 from ident.diagnosis.law.neighbours import channel_of
 from ident.diagnosis.law.reach import told_samples
-from ident.diagnosis.law.stage import SAME, Law, with_law
+from ident.diagnosis.law.stage import Law
 from ident.diagnosis.limits import Limits
 from ident.diagnosis.orders import with_orders
 from ident.diagnosis.posterior.bends import Bends
 from ident.diagnosis.posterior.fitting import Fitter
-from ident.diagnosis.posterior.hypotheses import Design, make_design
+from ident.diagnosis.posterior.hypotheses import make_design
 from ident.diagnosis.posterior.noise import LACKING, Colours
 from ident.diagnosis.posterior.search import Search
-from ident.diagnosis.posterior.slots import Slot, slot_of
+from ident.diagnosis.posterior.slots import slot_of
 from ident.diagnosis.posterior.state import State
+from ident.diagnosis.posterior.taken import as_variants
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.remainder import repeated, shares
-from ident.diagnosis.rows import Column, make_rows
+from ident.diagnosis.rows import make_rows
 from ident.diagnosis.search import Taken
 from ident.diagnosis.settings import Settings
 from ident.diagnosis.sized import is_foreign, is_nothing, is_sizeless
@@ -81,22 +81,6 @@ def judge_by_posterior(fit: Problem, confirm: Problem, *, seed: int, stage: Stag
     return answer.findings()
 
 
-@dataclass(frozen=True)
-class _Taken:
-    """Members as variants of candidates, laws among them.
-
-    Attributes:
-        problems, regression: with a candidate for every law.
-        variants: by hypothesis.
-        laws: by hypothesis.
-    """
-
-    problems: tuple[Problem, ...]
-    regression: Regression
-    variants: Mapping[int, int]
-    laws: Mapping[int, Law]
-
-
 class _Answer:
     """What is computed of the best set."""
 
@@ -112,7 +96,7 @@ class _Answer:
         self.search, self.state, self.design, self._seed = search, state, search.design, seed
         excess = search.fitter.excess(state)
         self.slots = {index: slot_of(search, state, index, excess[index]) for index in state.members}
-        self.taken = _as_variants(problems, regression, designs, self.design, state, self.slots)
+        self.taken = as_variants(problems, regression, designs, self.design, state, self.slots)
 
     @cached_property
     def fitted(self) -> Fitted:
@@ -262,63 +246,3 @@ class _Answer:
         nearest = max(named, key=lambda one: one[1], default=None)
         near = None if nearest is None else (self.design.hypotheses[nearest[0]].key, nearest[1])
         return law_answer(law, channel_of(self.taken.problems[0], column), near)
-
-
-def _as_variants(
-    problems: tuple[Problem, ...],
-    regression: Regression,
-    designs: Designs,
-    design: Design,
-    state: State,
-    slots: Mapping[int, Slot],
-) -> _Taken:
-    """Members as variants of candidates; a law that the fitted rows do not show by themselves is none."""
-    variants, laws, rows = dict[int, int](), dict[int, Law](), regression.rows
-    for index, member in state.members.items():
-        column = design.hypotheses[index].blocks[member.block].column
-        if column is not None:
-            variants[index] = rows.layout.index(column)
-        if column is not None and index in state.bends:
-            problems = tuple(_started(problem, column, state.bends[index].numbers) for problem in problems)
-    for index in [one for one in state.members if design.hypotheses[one].free]:
-        law = _law(problems, regression, designs, design, state, slots[index], index, tuple(variants.values()))
-        if law is not None:
-            problems, regression, variants[index] = with_law(problems, regression, law)
-            laws[index] = law
-    kept = {index: variants[index] for index in state.members if index in variants}
-    return _Taken(problems, regression, kept, laws)
-
-
-def _started(problem: Problem, column: Column, numbers: Array) -> Problem:
-    """A problem in which the exact refit of a variant begins with the numbers (m,) that were found."""
-    candidate = problem.candidates[column.candidate]
-    variants = list(candidate.variants)
-    variants[column.variant] = replace(variants[column.variant], start=lambda _: numbers)
-    candidates = list(problem.candidates)
-    candidates[column.candidate] = replace(candidate, variants=tuple(variants))
-    return replace(problem, candidates=tuple(candidates))
-
-
-def _law(
-    problems: Sequence[Problem],
-    regression: Regression,
-    designs: Designs,
-    design: Design,
-    state: State,
-    slot: Slot,
-    index: int,
-    others: tuple[int, ...],
-) -> Law | None:
-    number = design.hypotheses[index].dependence
-    assert number is not None
-    knots = designs.knots(number)
-    assert knots is not None
-    learnt = Learner(regression, state.evidence.noise, others).learn(number, designs.columns(number), knots)
-    if learnt is None:
-        return None
-    free = {one: log for one, log in slot.logs.items() if design.hypotheses[one].free}
-    odds = {design.hypotheses[one].key: log for one, log in free.items()}
-    same = [design.hypotheses[one].key for one in free if slot.cosines.get(one, 0.0) > SAME]
-    key = design.hypotheses[index].key
-    alike = (key, *(one for one in same if one != key))
-    return Law(problems[0].dependences[number], learnt, odds, alike, len(problems[0].candidates))

@@ -1,0 +1,96 @@
+"""Members of a set as variants of candidates, for the exact refit; laws become candidates of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.law.learning import Designs, Learner
+from ident.diagnosis.law.stage import SAME, Law, with_law
+from ident.diagnosis.posterior.hypotheses import Design
+from ident.diagnosis.posterior.slots import Slot
+from ident.diagnosis.posterior.state import State
+from ident.diagnosis.problem import Problem
+from ident.diagnosis.regression import Regression
+from ident.diagnosis.rows import Column
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TakenMembers:
+    """Members as variants of candidates, laws among them.
+
+    Attributes:
+        problems, regression: with a candidate for every law.
+        variants: by hypothesis.
+        laws: by hypothesis.
+    """
+
+    problems: tuple[Problem, ...]
+    regression: Regression
+    variants: Mapping[int, int]
+    laws: Mapping[int, Law]
+
+
+def as_variants(
+    problems: tuple[Problem, ...],
+    regression: Regression,
+    designs: Designs,
+    design: Design,
+    state: State,
+    slots: Mapping[int, Slot],
+) -> TakenMembers:
+    """Members as variants of candidates; a law that the fitted rows do not show by themselves is none."""
+    variants, laws, rows = dict[int, int](), dict[int, Law](), regression.rows
+    for index, member in state.members.items():
+        column = design.hypotheses[index].blocks[member.block].column
+        if column is not None:
+            variants[index] = rows.layout.index(column)
+        if column is not None and index in state.bends:
+            problems = tuple(_started(problem, column, state.bends[index].numbers) for problem in problems)
+    for index in [one for one in state.members if design.hypotheses[one].free]:
+        law = _law(problems, regression, designs, design, state, slots[index], index, tuple(variants.values()))
+        if law is not None:
+            problems, regression, variants[index] = with_law(problems, regression, law)
+            laws[index] = law
+    kept = {index: variants[index] for index in state.members if index in variants}
+    return TakenMembers(problems, regression, kept, laws)
+
+
+def _started(problem: Problem, column: Column, numbers: Array) -> Problem:
+    """A problem in which the exact refit of a variant begins with the numbers (m,) that were found."""
+    candidate = problem.candidates[column.candidate]
+    variants = list(candidate.variants)
+    variants[column.variant] = replace(variants[column.variant], start=lambda _: numbers)
+    candidates = list(problem.candidates)
+    candidates[column.candidate] = replace(candidate, variants=tuple(variants))
+    return replace(problem, candidates=tuple(candidates))
+
+
+def _law(
+    problems: Sequence[Problem],
+    regression: Regression,
+    designs: Designs,
+    design: Design,
+    state: State,
+    slot: Slot,
+    index: int,
+    others: tuple[int, ...],
+) -> Law | None:
+    number = design.hypotheses[index].dependence
+    assert number is not None
+    knots = designs.knots(number)
+    assert knots is not None
+    learnt = Learner(regression, state.evidence.noise, others).learn(number, designs.columns(number), knots)
+    if learnt is None:
+        return None
+    free = {one: log for one, log in slot.logs.items() if design.hypotheses[one].free}
+    odds = {design.hypotheses[one].key: log for one, log in free.items()}
+    same = [design.hypotheses[one].key for one in free if slot.cosines.get(one, 0.0) > SAME]
+    key = design.hypotheses[index].key
+    alike = (key, *(one for one in same if one != key))
+    return Law(problems[0].dependences[number], learnt, odds, alike, len(problems[0].candidates))
