@@ -24,7 +24,7 @@ from ident.diagnosis.orders import with_orders
 from ident.diagnosis.posterior.bends import Bends
 from ident.diagnosis.posterior.fitting import Fitter
 from ident.diagnosis.posterior.hypotheses import make_design
-from ident.diagnosis.posterior.noise import LACKING, Colours
+from ident.diagnosis.posterior.noise import SIZES, Colours
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.posterior.slots import slot_of
 from ident.diagnosis.posterior.state import State
@@ -197,7 +197,7 @@ class _Answer:
 
     def _lacking(self) -> bool:
         """Whether more is lacking somewhere than noise and tolerance that are not known exactly."""
-        return any(LACKING[size] > MISTAKEN for size in self.state.evidence.sizes)
+        return any(SIZES[size] > MISTAKEN for size in self.state.evidence.sizes)
 
     def _verdict(self) -> Verdict:
         lacking = self._lacking()

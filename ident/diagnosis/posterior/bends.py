@@ -138,8 +138,8 @@ class Bends:
         return bool(near and np.allclose(beside, parameters, rtol=NEAR, atol=0.0))
 
     def _power(self, series: Array) -> float:
-        """Sum of squares of a series (n,), in units of the least noise."""
-        return float(np.sum(self.colours.white(series[:, None], self.colours.least)[0] ** 2))
+        """Sum of squares of a series (n,), in units of the noise."""
+        return float(np.sum(self.colours.white(series[:, None], self.colours.usual)[0] ** 2))
 
 
 @dataclass(frozen=True)

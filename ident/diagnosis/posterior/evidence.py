@@ -19,7 +19,7 @@ from scipy.special import logsumexp
 
 from ident.diagnosis.posterior.bends import Bent
 from ident.diagnosis.posterior.hypotheses import Block
-from ident.diagnosis.posterior.noise import TOLERATED, Noise, Sizes
+from ident.diagnosis.posterior.noise import Noise, Sizes
 from ident.diagnosis.posterior.products import Products, among
 
 Array = NDArray[np.float64]
@@ -113,7 +113,7 @@ class Evidence:
         power = np.maximum(np.diag(whole)[width:-1], np.finfo(float).tiny)
         self.shown: Array = np.diag(self._beside)[:-1] / power
         self._determinant = float(np.sum(np.log(np.diag(self._baseline[0]))))
-        smallest = TOLERATED[0] / math.sqrt(len(self.design.target))
+        smallest = 1 / math.sqrt(len(self.design.target))
         self.scales = np.geomspace(smallest, LARGEST, 1 + math.ceil(math.log2(LARGEST / smallest) / OCTAVES))
 
     @property

@@ -16,7 +16,7 @@ from ident.diagnosis.posterior.bends import Bends, Bent, Form
 from ident.diagnosis.posterior.evidence import Evidence, Member, Members
 from ident.diagnosis.posterior.hypotheses import Block, Design
 from ident.diagnosis.posterior.misfit import excess_of_scatter
-from ident.diagnosis.posterior.noise import USUAL, Colours, Sizes, most_likely
+from ident.diagnosis.posterior.noise import Colours, Sizes, most_likely
 from ident.diagnosis.posterior.products import Products
 from ident.diagnosis.posterior.state import State
 
@@ -72,7 +72,7 @@ class Fitter:
 
     def with_nothing_lacking(self, state: State) -> State:
         """The same with the noise that is beside a complete model."""
-        return replace(state, evidence=self._of_all(tuple(min(size, USUAL) for size in state.evidence.sizes)))
+        return replace(state, evidence=self._of_all(self._colours.usual))
 
     @property
     def nothing(self) -> State:

@@ -1,11 +1,10 @@
 """Noise of the rows: what differs between repeats, and what a model may lack beside it.
 
-Rows of a block have the covariance R + u² t² C. R is that of the mean over the repeats, by what differs between them;
+Rows of a block have the covariance R + t² C. R is that of the mean over the repeats, by what differs between them;
 without any, that of what the baseline and the strongest candidates leave. t is what a model may have wrong at most
-(`Block.tolerance`), a process that remembers, as slow as the motion or faster; u says how much of it is there. Where
-the rows say so, more is lacking: q times as much as noise and tolerance are together, of the same memory. There is one
-pair u, q for all blocks of a step and a coordinate, the most likely beside the hypotheses that are taken; each next q
-has a price.
+(`Block.tolerance`), a process that remembers, as slow as the motion or faster. Where the rows say so, more is lacking:
+q times as much as noise and tolerance are together, of the same memory. There is one q for all blocks of a step and a
+coordinate, the most likely beside the hypotheses that are taken; each next one has a price.
 """
 
 from __future__ import annotations
@@ -24,19 +23,16 @@ from ident.diagnosis.whitening import Predictor, predictor_of
 
 Array = NDArray[np.float64]
 Sizes = tuple[int, ...]
-"""Of what is lacking, by label: number among `LACKING` and `TOLERATED`."""
+"""Of what is lacking, by label: number among `SIZES`."""
 
-LACKING: Final = (0.0, 0.0, 0.0, 1.0, 3.0, 10.0, 30.0, 100.0)
+SIZES: Final = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)
 """Of what is lacking, over noise and tolerance."""
 
-TOLERATED: Final = (0.1, 0.3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-"""Share of the tolerance that is present: it is an upper bound."""
-
-USUAL: Final = 2
-"""Number of the first of them with all of what is tolerated."""
+USUAL: Final = 0
+"""Number of nothing among them."""
 
 PRICE: Final = 2.0
-"""Log odds against the next of them: one in seven; less than what is tolerated is as likely as all of it."""
+"""Log odds against the next of them: one in seven."""
 
 MEMORIES: Final = (0.1, 0.5, 2.0)
 """Of what a model lacks [s], a third of its power each: contacts and friction have it at every one."""
@@ -63,7 +59,6 @@ class Colours:
         self.stretch = regression.stretch
         found: dict[str, list[int]] = {}
         self._places: list[slice] = []
-        self._noise: list[Array] = []
         self._tolerated: list[Array] = []
         self._lacking: list[Array] = []
         alone = None if all(colour.count for colour in regression.repeats) else regression.whitener(())
@@ -81,27 +76,16 @@ class Colours:
             least = (ROUNDING * rms(self.rows.target[place])) ** 2 * np.eye(len(memory))
             noise = _covariance(predictor, self.rows.run[place]) + least
             self._places.append(place)
-            self._noise.append(noise)
-            self._tolerated.append(tolerated)
+            self._tolerated.append(noise + tolerated)
             self._lacking.append(float(np.mean(np.diag(noise + tolerated))) * memory)
         self.labels = tuple(found)
         self.blocks = tuple(tuple(numbers) for numbers in found.values())
         self._factors: dict[tuple[int, int], Array] = {}
 
     @property
-    def least(self) -> Sizes:
-        """Next to nothing of what is tolerated is there."""
-        return (0,) * len(self.labels)
-
-    @property
     def usual(self) -> Sizes:
         """Nothing is lacking but what is tolerated."""
         return (USUAL,) * len(self.labels)
-
-    def levels(self, label: int) -> range:
-        """Sizes that differ: where nothing is tolerated, there is nothing less than that."""
-        tolerant = any(np.any(self._tolerated[number]) for number in self.blocks[label])
-        return range(0 if tolerant else USUAL, len(LACKING))
 
     def white(self, values: Array, sizes: Sizes) -> tuple[Array, float]:
         """All rows (n, k) in units of the noise, and half the log of its determinant."""
@@ -136,8 +120,7 @@ class Colours:
     def _factor(self, number: int, size: int) -> Array:
         """(n, n) lower triangular, of the covariance of a block."""
         if (number, size) not in self._factors:
-            whole = self._noise[number] + TOLERATED[size] ** 2 * self._tolerated[number]
-            whole += LACKING[size] ** 2 * self._lacking[number]
+            whole = self._tolerated[number] + SIZES[size] ** 2 * self._lacking[number]
             whole += ROUNDING * np.trace(whole) / len(whole) * np.eye(len(whole))
             self._factors[number, size] = linalg.cholesky(whole, lower=True, check_finite=False)
         return self._factors[number, size]
@@ -164,11 +147,7 @@ class Noise:
 
 def price_of(sizes: Sizes) -> float:
     """Log odds against so much being lacking."""
-    return sum(map(_price, sizes))
-
-
-def _price(size: int) -> float:
-    return PRICE * max(size - USUAL, 0)
+    return PRICE * sum(sizes)
 
 
 def most_likely(colours: Colours, columns: Array, target: Array, known: Array, start: Sizes) -> Sizes:
@@ -184,21 +163,21 @@ def most_likely(colours: Colours, columns: Array, target: Array, known: Array, s
         start: sizes to begin with.
     """
     whole = np.column_stack([columns, target])
-    parts: list[dict[int, tuple[Array, float]]] = []
+    parts: list[list[tuple[Array, float]]] = []
     for label in range(len(colours.labels)):
-        made = {size: colours.of_label(label, size, whole) for size in colours.levels(label)}
-        parts.append({size: (white.T @ white, volume) for size, (white, volume) in made.items()})
+        made = [colours.of_label(label, size, whole) for size in range(len(SIZES))]
+        parts.append([(white.T @ white, volume) for white, volume in made])
     found = list(start)
     products = known + np.sum([parts[label][size][0] for label, size in enumerate(found)], axis=0)
-    logs = -sum(parts[label][size][1] + _price(size) for label, size in enumerate(found))
+    logs = -sum(parts[label][size][1] + PRICE * size for label, size in enumerate(found))
     best = logs + _log(products)
     for _ in range(ROUNDS):
         before = tuple(found)
         for label, sizes in enumerate(parts):
-            for size, (other, volume) in sizes.items():
+            for size, (other, volume) in enumerate(sizes):
                 now, now_volume = sizes[found[label]]
                 changed = products - now + other
-                gained = now_volume - volume + _price(found[label]) - _price(size)
+                gained = now_volume - volume + PRICE * (found[label] - size)
                 log = logs + gained + _log(changed)
                 if log > best:
                     best, products, logs, found[label] = log, changed, logs + gained, size
