@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.plant.vectorised import CHUNK, OPERATIONS, Instruction, Vectorised
+from ident.plant.vectorised import CHUNK, Inputs, Instruction, Vectorised, run, value_of
 
 Array = NDArray[np.float64]
 
@@ -28,23 +28,22 @@ class Prepared:
 
     def __init__(self, function: Vectorised, *fixed: Array) -> None:
         self._samples = next(len(argument) for argument in fixed if argument.ndim == 2)
+        self._last = len(fixed)
         columns = [np.ascontiguousarray(argument.T) for argument in fixed]
         self._parts: list[tuple[slice, _Rest]] = []
         for start in range(0, self._samples, CHUNK):
             part = slice(start, start + CHUNK)
-            inputs = [list(values[:, part] if values.ndim == 2 else values) for values in columns]
+            inputs = dict(enumerate(list(values[:, part] if values.ndim == 2 else values) for values in columns))
             self._parts.append((part, _rest(function.program, inputs)))
-        rest = self._parts[0][1]
+        rest, self._entries = self._parts[0][1], len(function.places[0])
         self.touched = tuple(sorted(targets[1] for code, _, targets, _ in rest.program if code == ca.OP_OUTPUT))
 
     def entries(self, last: Array) -> Array:
         """(len(touched), N) of the entries touched, for a last argument (n,)."""
-        result = np.empty((len(self.touched), self._samples))
+        result = np.empty((self._entries, self._samples))
         for part, rest in self._parts:
-            found = rest.run(list(last))
-            for row, entry in enumerate(self.touched):
-                result[row, part] = found[entry]
-        return result
+            run(rest.program, {self._last: list(last)}, dict(rest.known), result[:, part])
+        return result[list(self.touched)]
 
 
 @dataclass(frozen=True)
@@ -59,20 +58,8 @@ class _Rest:
     program: Sequence[Instruction]
     known: Mapping[int, Any]
 
-    def run(self, last: Sequence[Any]) -> dict[int, Any]:
-        """Entries by their number."""
-        work, found = dict(self.known), dict[int, Any]()
-        for code, sources, targets, _ in self.program:
-            if code == ca.OP_INPUT:
-                work[targets[0]] = last[sources[1]]
-            elif code == ca.OP_OUTPUT:
-                found[targets[1]] = work[sources[0]]
-            else:
-                work[targets[0]] = OPERATIONS[code](*(work[source] for source in sources))
-        return found
 
-
-def _rest(program: Sequence[Instruction], inputs: Sequence[Sequence[Any]]) -> _Rest:
+def _rest(program: Sequence[Instruction], inputs: Inputs) -> _Rest:
     """What is left of a program when everything is done that the last argument has no part in."""
     work, known = dict[int, Any](), dict[int, Any]()
     left, waiting = list[Instruction](), set[int]()
@@ -85,7 +72,7 @@ def _rest(program: Sequence[Instruction], inputs: Sequence[Sequence[Any]]) -> _R
 
     for instruction in program:
         code, sources, targets, constant = instruction
-        if code == ca.OP_INPUT and sources[0] == len(inputs):
+        if code == ca.OP_INPUT and sources[0] not in inputs:
             left.append(instruction)
             waiting.add(targets[0])
         elif code not in (ca.OP_INPUT, ca.OP_CONST) and not waiting.isdisjoint(sources):
@@ -94,12 +81,5 @@ def _rest(program: Sequence[Instruction], inputs: Sequence[Sequence[Any]]) -> _R
         elif code != ca.OP_OUTPUT:
             # Places are used again: what stood here may have waited.
             waiting.discard(targets[0])
-            work[targets[0]] = _done(instruction, work, inputs)
+            work[targets[0]] = value_of(instruction, inputs, work)
     return _Rest(left, known)
-
-
-def _done(instruction: Instruction, work: Mapping[int, Any], inputs: Sequence[Sequence[Any]]) -> Any:
-    code, sources, _, constant = instruction
-    if code == ca.OP_INPUT:
-        return inputs[sources[0]][sources[1]]
-    return constant if code == ca.OP_CONST else OPERATIONS[code](*(work[source] for source in sources))

@@ -55,6 +55,9 @@ CHUNK: Final = 8192
 Instruction = tuple[int, tuple[int, ...], tuple[int, ...], float]
 """CasADi's code of the operation, where its operands are, where its result goes, value of a constant."""
 
+Inputs = Mapping[int, Sequence[Any]]
+"""Elements of arguments, by the number of the argument."""
+
 
 class Vectorised:
     """A CasADi function of one output, ready for arrays.
@@ -102,22 +105,34 @@ class Vectorised:
         result = np.empty((len(self.places[0]), samples))
         for start in range(0, samples, CHUNK):
             part = slice(start, start + CHUNK)
-            self._run([list(values[:, part] if values.ndim == 2 else values) for values in columns], result[:, part])
+            inputs = dict(enumerate(list(values[:, part] if values.ndim == 2 else values) for values in columns))
+            run(self.program, inputs, {}, result[:, part])
         return result
 
-    def _run(self, columns: Sequence[Sequence[Any]], result: Array) -> None:
-        work: dict[int, Any] = {}
-        for code, sources, targets, constant in self.program:
-            if code == ca.OP_INPUT:
-                work[targets[0]] = columns[sources[0]][sources[1]]
-            elif code == ca.OP_CONST:
-                work[targets[0]] = constant
-            elif code == ca.OP_OUTPUT:
-                result[targets[1]] = work[sources[0]]
-            elif len(sources) == 1:
-                work[targets[0]] = OPERATIONS[code](work[sources[0]])
-            else:
-                work[targets[0]] = OPERATIONS[code](work[sources[0]], work[sources[1]])
+
+def run(program: Sequence[Instruction], inputs: Inputs, work: dict[int, Any], result: Array) -> None:
+    """Carry out instructions in their order.
+
+    Args:
+        program: the instructions.
+        inputs: elements of every argument, by its number.
+        work: what stands in places already; written.
+        result: (E, N) written, the entries that the instructions put out.
+    """
+    for instruction in program:
+        code, sources, targets, _ = instruction
+        if code == ca.OP_OUTPUT:
+            result[targets[1]] = work[sources[0]]
+        else:
+            work[targets[0]] = value_of(instruction, inputs, work)
+
+
+def value_of(instruction: Instruction, inputs: Inputs, work: Mapping[int, Any]) -> Any:
+    """What an instruction puts into its place; arguments as of `run`."""
+    code, sources, _, constant = instruction
+    if code == ca.OP_INPUT:
+        return inputs[sources[0]][sources[1]]
+    return constant if code == ca.OP_CONST else OPERATIONS[code](*(work[source] for source in sources))
 
 
 def _instruction(function: Any, index: int) -> Instruction:

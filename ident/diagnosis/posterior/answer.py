@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Final
 
@@ -94,8 +94,8 @@ class _Answer:
         seed: int,
     ) -> None:
         self.search, self.state, self.design, self._seed = search, state, search.design, seed
-        excess = search.fitter.excess(state)
-        self.slots = {index: slot_of(search, state, index, excess[index]) for index in state.members}
+        excess, whole = search.fitter.excess(state), search.fitter.among_all(state)
+        self.slots = {index: slot_of(search, whole, index, excess[index]) for index in state.members}
         self.taken = as_variants(problems, regression, designs, self.design, state, self.slots)
 
     @cached_property
@@ -109,47 +109,46 @@ class _Answer:
 
     def better(self) -> tuple[Search, State] | None:
         """The search and its set without members that are of no size, or are not worth their place; None: all are."""
-        members = tuple(self.taken.variants)
-        lost = self._doubted(members)
-        if lost is None:
-            refuted = self._sizeless(members) or self._widening(members)
-            if refuted:
-                search = self.search.refuting(refuted)
-                return search, search.further(self._without(search, refuted))
-            lost = self._needless(members)
-        if lost is None:
+        # The search, which does not temper evidence, would take again what is doubted.
+        passed_over, refuted = self._doubted(), list[int]()
+        if not passed_over:
+            refuted = self._sizeless() or self._widening()
+        if not (passed_over or refuted):
+            passed_over = self._needless()
+        lost = [*passed_over, *refuted]
+        if not lost:
             return None
-        # The search, which does not temper evidence, would take it again.
-        search = self.search.passing_over(lost)
-        return search, search.further(self._without(search, [lost]))
+        left = {index: one for index, one in self.state.members.items() if index not in lost}
+        search = self.search.without(refuted, passed_over)
+        return search, search.further(search.fitter.state(left, self.state))
 
-    def _without(self, search: Search, refuted: Collection[int]) -> State:
-        """The set without some members."""
-        left = {index: one for index, one in self.state.members.items() if index not in refuted}
-        return search.fitter.state(left, self.state)
+    def _doubted(self) -> list[int]:
+        """The member that is least likely to be there, if that is hardly.
 
-    def _doubted(self, members: Sequence[int]) -> int | None:
-        """A member that is hardly likely to be there, or a law that the fitted rows do not show by themselves.
-
-        Such a law is not among the `members` taken.
+        Or a law that the fitted rows do not show by themselves, which is not among those taken.
         """
-        doubted = [index for index in self.state.members if self.slots[index].nothing > DOUBTED or index not in members]
-        return max(doubted, key=lambda index: self.slots[index].nothing, default=None)
+        nothing = {index: slot.nothing for index, slot in self.slots.items()}
+        doubted = [index for index in nothing if nothing[index] > DOUBTED or index not in self.taken.variants]
+        return sorted(doubted, key=lambda index: -nothing[index])[:1]
 
-    def _sizeless(self, members: Sequence[int]) -> list[int]:
-        return [index for place, index in enumerate(members) if not self._has_size(place)]
+    def _sizeless(self) -> list[int]:
+        """All members that are of no size of their own."""
+        return [index for place, index in enumerate(self.taken.variants) if not self._has_size(place)]
 
-    def _widening(self, members: Sequence[int]) -> list[int]:
+    def _widening(self) -> list[int]:
         """The member that widens the held-out gap most, if any does."""
-        closed = dict(zip(members, self.fitted.lacking, strict=True))
-        widened = [index for index in members if closed[index] < -LIMITS.widening] if self._measurable() else []
-        return sorted(widened, key=lambda index: closed[index])[:1]
+        widened = [place for place, closed in enumerate(self.fitted.lacking) if closed < -LIMITS.widening]
+        return self._closing_least(widened) if self._measurable() else []
 
-    def _needless(self, members: Sequence[int]) -> int | None:
+    def _needless(self) -> list[int]:
         """The member that closes least of the held-out gap, if that is next to nothing beside others."""
-        closed = dict(zip(members, self.fitted.lacking, strict=True))
-        trifles = [index for place, index in enumerate(members) if not self._pays(place)] if len(members) > 1 else []
-        return min(trifles, key=lambda index: closed[index], default=None)
+        trifles = [place for place in range(self.fitted.count) if not self._pays(place)]
+        return self._closing_least(trifles) if self.fitted.count > 1 else []
+
+    def _closing_least(self, places: Sequence[int]) -> list[int]:
+        """That one of some members."""
+        members = tuple(self.taken.variants)
+        return [members[place] for place in sorted(places, key=self.fitted.lacking.__getitem__)[:1]]
 
     def _pays(self, place: int) -> bool:
         """Whether a member closes what its columns are exact to, or much of what a greater one leaves."""
@@ -162,8 +161,8 @@ class _Answer:
     def _has_size(self, place: int) -> bool:
         """Whether a size is surely not zero, and its own, and the numbers are of the effect's family.
 
-        Numbers that trade for each other, as a Stribeck friction and its speed, have wide deviations each: an effect of
-        the family without which most of the held-out gap stays is surely not zero.
+        Numbers that trade for each other, as a friction and the speed at which it falls off, have wide deviations each:
+        an effect of the family without which most of the held-out gap stays is surely not zero.
         """
         candidate, part = self.fitted.candidate(place), self.fitted.after.parts[place]
         if is_nothing(candidate, part, LIMITS):

@@ -53,6 +53,8 @@ class Bent:
         missed: (n,) what these miss of it.
         expected: (m, K) and (m,) rows beside those of the records, in standard deviations: what physics expects of
             numbers that come along with it.
+        beside: (p,) parameters of the plant.
+        sloped: coefficients (K,) and parameters (p,) that the slopes were computed for.
     """
 
     place: slice
@@ -62,6 +64,20 @@ class Bent:
     slopes: Array
     missed: Array
     expected: tuple[Array, Array]
+    beside: Array
+    sloped: tuple[Array, Array]
+
+    def is_of(self, coefficients: Array, parameters: Array) -> bool:
+        """Whether it is about these, but for what changes nothing."""
+        moved = float(np.abs(self.about - coefficients).max())
+        near = moved < SAME / math.sqrt(len(self.missed))
+        return near and bool(np.allclose(self.beside, parameters, rtol=NEAR_PLANT, atol=0.0))
+
+    def has_slopes_near(self, coefficients: Array, parameters: Array) -> bool:
+        """Whether its slopes were computed for nearly these."""
+        about, beside = self.sloped
+        near = np.abs(about - coefficients).max() < NEAR * np.abs(coefficients).max()
+        return bool(near and np.allclose(beside, parameters, rtol=NEAR, atol=0.0))
 
 
 class Bends:
@@ -76,8 +92,6 @@ class Bends:
         self.problems, self.colours = problems, colours
         self._straight: dict[tuple[str, int], float] = {}
         self._kept: dict[tuple[str, int], Bent] = {}
-        self._parameters: dict[tuple[str, int], Array] = {}
-        self._sloped: dict[tuple[str, int], tuple[Array, Array]] = {}
 
     def is_bent(self, hypothesis: Hypothesis, block: Block) -> bool:
         """Whether there is more to a hypothesis than its columns."""
@@ -106,36 +120,34 @@ class Bends:
         The last answer, where the coefficients are those but for `SAME`.
         """
         key, size = form.key, float(np.abs(coefficients).max())
-        kept = self._kept.get(key)
         if held is None and size <= self._straight.get(key, 0.0):
             return None
         numbers = form.held(coefficients) if held is None else held
-        alike = kept is not None and np.array_equal(kept.held, numbers)
-        moved = math.inf if kept is None else float(np.abs(kept.about - coefficients).max())
-        same = kept is not None and alike and moved < SAME / math.sqrt(len(kept.missed))
-        if kept is not None and same and np.allclose(self._parameters[key], form.parameters, rtol=NEAR_PLANT, atol=0.0):
+        kept = self._kept.get(key)
+        if kept is not None and not np.array_equal(kept.held, numbers):
+            kept = None
+        if kept is not None and kept.is_of(coefficients, form.parameters):
             return kept
         here, expected = form.added(coefficients, numbers), form.expected_about(coefficients, numbers)
         if held is None and not len(expected[1]) and self._power(here - form.by_columns(coefficients)) < NEGLIGIBLE:
             self._straight[key] = size
             return None
-        if kept is not None and alike and self._has_slopes_near(key, coefficients, form.parameters):
-            slopes = kept.slopes
+        if kept is not None and kept.has_slopes_near(coefficients, form.parameters):
+            slopes, sloped = kept.slopes, kept.sloped
         else:
-            slopes = form.slopes(coefficients, numbers, here)
-            self._sloped[key] = coefficients, form.parameters
-        missed = here - slopes @ coefficients
-        found = Bent(
-            form.block.place, coefficients, numbers, form.numbers(coefficients, numbers), slopes, missed, expected
+            slopes, sloped = form.slopes(coefficients, numbers, here), (coefficients, form.parameters)
+        self._kept[key] = Bent(
+            place=form.block.place,
+            about=coefficients,
+            held=numbers,
+            numbers=form.numbers(coefficients, numbers),
+            slopes=slopes,
+            missed=here - slopes @ coefficients,
+            expected=expected,
+            beside=form.parameters,
+            sloped=sloped,
         )
-        self._kept[key], self._parameters[key] = found, form.parameters
-        return found
-
-    def _has_slopes_near(self, key: tuple[str, int], coefficients: Array, parameters: Array) -> bool:
-        """Whether the last slopes were computed for nearly these coefficients and parameters of the plant."""
-        about, beside = self._sloped[key]
-        near = np.abs(about - coefficients).max() < NEAR * np.abs(coefficients).max()
-        return bool(near and np.allclose(beside, parameters, rtol=NEAR, atol=0.0))
+        return self._kept[key]
 
     def _power(self, series: Array) -> float:
         """Sum of squares of a series (n,), in units of the noise."""

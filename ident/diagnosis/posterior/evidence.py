@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -20,7 +21,7 @@ from scipy.special import logsumexp
 from ident.diagnosis.posterior.bends import Bent
 from ident.diagnosis.posterior.hypotheses import Block
 from ident.diagnosis.posterior.noise import Noise, Sizes
-from ident.diagnosis.posterior.products import Products, among
+from ident.diagnosis.posterior.products import Products, among, numbers_of
 
 Array = NDArray[np.float64]
 
@@ -71,25 +72,28 @@ class Table:
         """Whether it can be there at all."""
         return bool(np.isfinite(self.logs).any())
 
+    @cached_property
+    def _peak(self) -> tuple[int, int]:
+        row, column = np.unravel_index(int(np.argmax(self.logs)), self.logs.shape)
+        return int(row), int(column)
+
     @property
     def best(self) -> Member:
         """The numbers with the largest evidence."""
-        row, column = np.unravel_index(int(np.argmax(self.logs)), self.logs.shape)
-        return Member(self.blocks[int(row)], float(self.scales[column]))
-
-    @property
-    def cost(self) -> float:
-        """What the log evidence is below the log likelihood ratio at the best numbers."""
-        row, column = np.unravel_index(int(np.argmax(self.logs)), self.logs.shape)
-        return float(self.logs[row, column] + self.occam[row, column] - self.masses[int(row)]) - self.total
+        row, column = self._peak
+        return Member(self.blocks[row], float(self.scales[column]))
 
     @property
     def inside(self) -> float:
         """What integrating adds to the log likelihood at the best numbers, and what those cost."""
         if not self.is_there:
             return -math.inf
-        row = int(np.argmax(self.logs.max(axis=1)))
-        return self.total - float(self.logs.max()) + float(self.masses[row])
+        return self.total - float(self.logs[self._peak]) + float(self.masses[self._peak[0]])
+
+    @property
+    def cost(self) -> float:
+        """What the log evidence is below the log likelihood ratio at the best numbers."""
+        return float(self.occam[self._peak]) - self.inside
 
 
 class Evidence:
@@ -144,7 +148,7 @@ class Evidence:
         along, own = self.products.with_others(self.sizes, others)
         own = own - along[:width].T @ linalg.cho_solve(self._baseline, along[:width])
         along = along[width:] - self._across.T @ along[:width]
-        replaced = np.concatenate([_numbers(self.products.at(bent.place)) for bent in bends])
+        replaced = np.concatenate([numbers_of(self.products.at(bent.place)) for bent in bends])
         target = found[:, -1] - along[:, -1]
         target[replaced] = along[-1, :-1] - own[:-1, -1]
         target[-1] += own[-1, -1] - along[-1, -1]
@@ -210,7 +214,7 @@ class Target:
         blocks = self.evidence.design.hypotheses[hypothesis].blocks
         used = blocks if only is None else (blocks[only],)
         places = [self.evidence.products.at(one.place) for one in used]
-        columns = np.unique(np.concatenate([_numbers(place) for place in places]))
+        columns = np.unique(np.concatenate([numbers_of(place) for place in places]))
         products = self.beside(others, columns)
         moved = [among(columns, place) for place in places]
         return self._table(used, moved, products, range(len(blocks)) if only is None else (only,))
@@ -269,7 +273,7 @@ class Target:
     def _stacked(self, members: Members) -> tuple[Array, NDArray[np.int64]]:
         """(r, R) factors of all members beside each other, and the columns (r,) that they have."""
         places = [self._place(index, one) for index, one in members.items()]
-        columns = np.unique(np.concatenate([_numbers(place) for place in places]))
+        columns = np.unique(np.concatenate([numbers_of(place) for place in places]))
         parts = []
         for place, (index, one) in zip(places, members.items(), strict=True):
             factor = self._block(index, one).factor
@@ -277,10 +281,6 @@ class Target:
             part[among(columns, place)] = one.scale * factor
             parts.append(part)
         return np.hstack(parts), columns
-
-
-def _numbers(place: slice) -> NDArray[np.int64]:
-    return np.arange(place.start, place.stop)
 
 
 def _is_refused(block: Block, power: float, amplitude: float) -> bool:

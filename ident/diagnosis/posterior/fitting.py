@@ -17,7 +17,7 @@ from ident.diagnosis.posterior.evidence import Evidence, Member, Members
 from ident.diagnosis.posterior.hypotheses import Block, Design
 from ident.diagnosis.posterior.misfit import excess_of_scatter
 from ident.diagnosis.posterior.noise import Colours, Sizes, most_likely
-from ident.diagnosis.posterior.products import Products
+from ident.diagnosis.posterior.products import Products, numbers_of
 from ident.diagnosis.posterior.state import State
 
 Array = NDArray[np.float64]
@@ -33,9 +33,6 @@ TELLING: Final = 5.0
 
 FURTHEST: Final = 0.3
 """Share of a held number that it is moved by at once, or of one where it is zero: a phase, a share."""
-
-WHOLE: Final = 4
-"""Evidences of all hypotheses that are kept, each of another noise: they are large."""
 
 STILL: Final = 0.03
 """Part of the furthest step from which a held number stays where it is: a hundredth of it."""
@@ -54,25 +51,31 @@ class Fitter:
         self.design, self._colours, self._bends = design, colours, bends
         self._all = Products(design, colours, np.arange(design.columns.shape[1]))
         self._kept: dict[frozenset[int], State] = {}
-        self._of_all = lru_cache(maxsize=WHOLE)(partial(Evidence, self._all))
+        # The last one alone, beside that of a complete model: they are large.
+        self._of_all = lru_cache(maxsize=1)(partial(Evidence, self._all))
+
+    @cached_property
+    def _usual(self) -> Evidence:
+        """Of all hypotheses, with the noise that is beside a complete model."""
+        return Evidence(self._all, self._colours.usual)
 
     @cached_property
     def invisible(self) -> frozenset[int]:
         """Hypotheses of which the plant's parameters absorb all but nothing."""
-        evidence = self._of_all(self._colours.usual)
         return frozenset(
             index
             for index, one in enumerate(self.design.hypotheses)
-            if all(evidence.shown[block.place].max() < VISIBLE**2 for block in one.blocks)
+            if all(self._usual.shown[block.place].max() < VISIBLE**2 for block in one.blocks)
         )
 
     def among_all(self, state: State) -> State:
         """A set with the evidence of all hypotheses beside it."""
-        return replace(state, evidence=self._of_all(state.evidence.sizes))
+        sizes = state.evidence.sizes
+        return replace(state, evidence=self._usual if sizes == self._usual.sizes else self._of_all(sizes))
 
     def with_nothing_lacking(self, state: State) -> State:
         """The same with the noise that is beside a complete model."""
-        return replace(state, evidence=self._of_all(self._colours.usual))
+        return replace(state, evidence=self._usual)
 
     @property
     def nothing(self) -> State:
@@ -117,7 +120,7 @@ class Fitter:
     def _products(self, members: Members) -> Products:
         """Of the columns of some hypotheses alone."""
         blocks = [block for index in members for block in self.design.hypotheses[index].blocks]
-        columns = [np.zeros(0, dtype=np.int64), *(np.arange(one.place.start, one.place.stop) for one in blocks)]
+        columns = [np.zeros(0, dtype=np.int64), *(numbers_of(one.place) for one in blocks)]
         return Products(self.design, self._colours, np.unique(np.concatenate(columns)))
 
     def _noise_beside(self, state: State) -> Sizes:
@@ -134,16 +137,20 @@ class Fitter:
         return columns, self.design.target - state.missed, expected
 
     def excess(self, state: State) -> dict[int, float]:
-        """What the evidence for every member is divided by: how far rows scatter beyond their noise along it."""
+        """How far rows scatter beyond their noise along every member, by which its likelihoods are tempered."""
         columns, target, expected = self._rows(state)
         white, _ = self._colours.white(np.column_stack([columns, target]), state.evidence.sizes)
-        places, end = list[slice](), self.design.baseline.shape[1]
-        for index, one in state.members.items():
+        places = self._places(state.members)
+        ratios = excess_of_scatter(white[:, :-1], white[:, -1], expected, self._colours.stretch, list(places.values()))
+        return dict(zip(places, ratios, strict=True))
+
+    def _places(self, members: Members) -> dict[int, slice]:
+        """Where coefficients of members stand behind those of the baseline."""
+        found, end = dict[int, slice](), self.design.baseline.shape[1]
+        for index, one in members.items():
             width = self.design.hypotheses[index].blocks[one.block].factor.shape[1]
-            places.append(slice(end, end + width))
-            end += width
-        ratios = excess_of_scatter(white[:, :-1], white[:, -1], expected, self._colours.stretch, places)
-        return dict(zip(state.members, ratios, strict=True))
+            found[index], end = slice(end, end + width), end + width
+        return found
 
     def _settled(self, state: State) -> State:
         """With the numbers of every member chosen anew, each beside the others, and what its columns miss."""
@@ -216,16 +223,14 @@ class Fitter:
 
     def _expected_beside(self, state: State, members: Members, count: int) -> tuple[Array, Array]:
         """Rows (m, count) and (m,) of what is expected of members that stand behind the baseline."""
-        end, rows, targets = self.design.baseline.shape[1], [np.zeros((0, count))], [np.zeros(0)]
-        for index, one in members.items():
-            factor = one.scale * self.design.hypotheses[index].blocks[one.block].factor
+        rows, targets = [np.zeros((0, count))], [np.zeros(0)]
+        for index, place in self._places(members).items():
             if index in state.bends:
-                slopes, target = state.bends[index].expected
+                one, (slopes, target) = members[index], state.bends[index].expected
                 part = np.zeros((len(target), count))
-                part[:, end : end + factor.shape[1]] = slopes @ factor
+                part[:, place] = slopes @ (one.scale * self.design.hypotheses[index].blocks[one.block].factor)
                 rows.append(part)
                 targets.append(target)
-            end += factor.shape[1]
         return np.vstack(rows), np.concatenate(targets)
 
     def _columns(self, state: State, index: int, member: Member) -> Array:

@@ -77,7 +77,7 @@ class Colours:
             noise = _covariance(predictor, self.rows.run[place]) + least
             self._places.append(place)
             self._tolerated.append(noise + tolerated)
-            self._lacking.append(float(np.mean(np.diag(noise + tolerated))) * memory)
+            self._lacking.append(float(np.mean(np.diag(self._tolerated[-1]))) * memory)
         self.labels = tuple(found)
         self.blocks = tuple(tuple(numbers) for numbers in found.values())
         self._factors: dict[tuple[int, int], Array] = {}

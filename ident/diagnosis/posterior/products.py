@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,6 @@ from ident.diagnosis.posterior.hypotheses import Design
 from ident.diagnosis.posterior.noise import Colours, Sizes
 
 Array = NDArray[np.float64]
-
-KEPT: Final = 32
-"""Products of labels that are kept: those of all columns are large."""
 
 
 class Products:
@@ -29,7 +25,8 @@ class Products:
     def __init__(self, design: Design, colours: Colours, columns: NDArray[np.int64]) -> None:
         self.design, self.colours, self.columns = design, colours, columns
         self._stacked = np.column_stack([design.baseline, design.columns[:, columns], design.target])
-        self._of = lru_cache(maxsize=KEPT)(self._made)
+        # One for each label: those of all columns are large, and the next noise differs in a few labels.
+        self._of = lru_cache(maxsize=len(colours.labels))(self._made)
 
     def at(self, place: slice) -> slice:
         """Where columns of the design stand among these, which must have them."""
@@ -56,6 +53,11 @@ class Products:
         """The same of one label."""
         white, volume = self.colours.of_label(label, size, self._stacked)
         return white.T @ white, volume
+
+
+def numbers_of(place: slice) -> NDArray[np.int64]:
+    """Numbers of the columns of a place."""
+    return np.arange(place.start, place.stop)
 
 
 def among(columns: NDArray[np.int64], place: slice) -> slice:

@@ -41,13 +41,9 @@ class Search:
         self.refuted = refuted | fitter.invisible
         self.passed_over = passed_over
 
-    def refuting(self, refuted: Collection[int]) -> Search:
-        """The same search, some hypotheses more refuted."""
-        return Search(self.fitter, self.refuted | frozenset(refuted), self.passed_over)
-
-    def passing_over(self, hypothesis: int) -> Search:
-        """The same search, one hypothesis more passed over."""
-        return Search(self.fitter, self.refuted, self.passed_over | {hypothesis})
+    def without(self, refuted: Collection[int], passed_over: Collection[int]) -> Search:
+        """The same search, some hypotheses more refuted, or passed over."""
+        return Search(self.fitter, self.refuted | frozenset(refuted), self.passed_over | frozenset(passed_over))
 
     def run(self) -> State:
         """The best set that was found."""
@@ -61,10 +57,6 @@ class Search:
             if further.log_posterior <= state.log_posterior:
                 break
             state = further
-        return self.revised(state)
-
-    def revised(self, state: State) -> State:
-        """With the best hypothesis in every place, and names for laws."""
         return self._named(self._against_rivals(state))
 
     def _against_rivals(self, state: State) -> State:

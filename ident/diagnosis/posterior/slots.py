@@ -75,13 +75,12 @@ def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
 
     Args:
         search: that found the set.
-        state: the set.
+        state: the set, with the evidence of all hypotheses.
         index: of the member.
         excess: of the scatter of the rows over their noise, along the member: likelihood ratios in its place are taken
             to the power of its inverse.
     """
     hypotheses = search.design.hypotheses
-    state = search.fitter.among_all(state)
     others = state.without(index)
     without = replace(state, members=others, bends={one: bend for one, bend in state.bends.items() if one != index})
     beside, bare = without.target.beside(others), search.fitter.state(others, state).log_posterior

@@ -41,8 +41,7 @@ def contribution_of(
             if change is None:
                 found += [None] * len(source.coordinates)
                 continue
-            columns = context.filtered(change, source).T
-            found += [column if np.any(column) else None for column in columns]
+            found += _columns(change, range(len(source.coordinates)), source, context)
         return found
 
     return contribution
@@ -75,19 +74,26 @@ def _term_contribution(
     def contribution(values: Array, parameters: Array) -> list[Array | None]:
         found: list[Array | None] = []
         for number, (source, acts) in enumerate(zip(sources, acting, strict=True)):
-            columns: list[Array | None] = [None] * len(source.coordinates)
-            if acts and source.own is None:
-                asked = parameters[: len(PARAMETER_NAMES)]
-                rows, exact = prepared(number, source, asked), replace(context, parameters=asked)
-                # Entries are rows: these functions have one column, and no structural zeros (`Formulas.exact`).
-                touched = list(rows.touched)
-                change = rows.entries(values) - exact.plain(source)[:, touched, 0].T
-                for row, column in zip(touched, context.filtered(change.T, source).T, strict=True):
-                    columns[row] = column if np.any(column) else None
-            found += columns
+            if not acts or source.own is not None:
+                found += [None] * len(source.coordinates)
+                continue
+            asked = parameters[: len(PARAMETER_NAMES)]
+            rows, exact = prepared(number, source, asked), replace(context, parameters=asked)
+            # Entries are rows: these functions have one column, and no structural zeros (`Formulas.exact`).
+            touched = list(rows.touched)
+            change = rows.entries(values) - exact.plain(source)[:, touched, 0].T
+            found += _columns(change.T, touched, source, context)
         return found
 
     return contribution
+
+
+def _columns(change: Array, rows: Sequence[int], source: Source, context: Context) -> list[Array | None]:
+    """Every row of a source, filtered, of the change (M, k) of some of them; None where it is zero."""
+    found: list[Array | None] = [None] * len(source.coordinates)
+    for row, column in zip(rows, context.filtered(change, source).T, strict=True):
+        found[row] = column if np.any(column) else None
+    return found
 
 
 def _seen(source: Source, context: Context) -> list[int]:

@@ -83,11 +83,11 @@ def test_a_tempered_likelihood_is_that_of_rows_of_so_much_more_variance(
     whole, price = question.search.fitter.among_all(state), question.design.hypotheses[number].price
     alone = whole.target.table(number, whole.target.beside({}))
     diluted = whole.target.table(number, whole.target.beside({}) / excess).total - price
-    slot = slot_of(question.search, state, number, excess)
+    slot = slot_of(question.search, whole, number, excess)
     bare = state.log_posterior - question.search.fitter.nothing.log_posterior
     noise = bare + price - alone.total
     assert slot.logs[number] - noise / excess == pytest.approx(diluted, abs=0.5 * np.log(excess) + 0.1)
-    assert slot_of(question.search, state, number, 1.0).logs[number] == pytest.approx(bare)
+    assert slot_of(question.search, whole, number, 1.0).logs[number] == pytest.approx(bare)
 
 
 def test_slow_noise_that_no_repeat_shows_is_what_a_model_lacks(world: Callable[..., Any], asked: Asked) -> None:
