@@ -20,8 +20,7 @@ from hil.exam.folder import RECORDS, Core, ExamFolder, read_exam
 from hil.exam.record_bytes import record_from_bytes
 from hil.exam.workers import run_all
 from ident.diagnosis.alone import closed_alone
-from ident.diagnosis.axis.diagnose import diagnose_axis
-from ident.diagnosis.core.answer import diagnose_by_core
+from ident.diagnosis.axis.diagnose import STANDING, diagnose_axis
 from ident.diagnosis.diagnosis import faulty
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judge import Judge, judge
@@ -225,26 +224,16 @@ def described(vehicle: str, model: str) -> tuple[VehicleDescription, ExtendedMod
         return load_vehicle(files[0]), read_model(files[1])
 
 
-def diagnose_axis_case(identifier: str, fit: bytes, confirm: bytes, removed: str | None) -> tuple[str, bytes]:
+def diagnose_axis_case(
+    identifier: str, fit: bytes, confirm: bytes, removed: str | None, judged: Judge = STANDING
+) -> tuple[str, bytes]:
     """The same of a case of an axis."""
     forbid_emulator()
+    lacking = () if removed is None else (removed,)
 
     def answer() -> dict[str, Any]:
         records = axis_records(fit, confirm)
-        found = diagnose_axis(records[:1], records[1:], seed=1, lacking=() if removed is None else (removed,))
-        return found.diagnosis().as_json()
-
-    return identifier, _timed(answer)
-
-
-def diagnose_axis_by_core(identifier: str, fit: bytes, confirm: bytes, removed: str | None) -> tuple[str, bytes]:
-    """The same by the core `one`."""
-    forbid_emulator()
-
-    def answer() -> dict[str, Any]:
-        records = axis_records(fit, confirm)
-        lacking = () if removed is None else (removed,)
-        return diagnose_by_core(records[:1], records[1:], lacking=lacking).as_json()
+        return diagnose_axis(records[:1], records[1:], seed=1, lacking=lacking, judged=judged).diagnosis().as_json()
 
     return identifier, _timed(answer)
 
@@ -254,7 +243,7 @@ _FUNCTIONS: Final[Mapping[tuple[Core, bool], Callable[..., tuple[str, bytes]]]] 
         (Core.STANDING, False): diagnose_case,
         (Core.STANDING, True): diagnose_axis_case,
         (Core.ONE, False): partial(diagnose_case, judged=judge_by_posterior),
-        (Core.ONE, True): diagnose_axis_by_core,
+        (Core.ONE, True): partial(diagnose_axis_case, judged=judge_by_posterior),
     }
 )
 """Diagnosis of one case, by core and whether the exam is of axes."""

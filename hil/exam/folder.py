@@ -9,7 +9,7 @@
 | `truth/ID.json` | why a case could not be driven, encrypted as well |
 | `diagnoses/ID.json` | answers of the diagnosing side |
 | `diagnoses_without/ID.json` | the same with the true candidate left out of the library |
-| `diagnoses_one/ID.json`, `diagnoses_one_without/ID.json` | the same of the core `one` (docs/core.md) |
+| `diagnoses_one/ID.json`, `diagnoses_one_without/ID.json` | the same of the core `one` (docs/diagnosis.md) |
 | `oracle/ID.json` | what somebody would find who knows the true candidate |
 """
 

@@ -39,9 +39,17 @@ FEWEST: Final = 2.0
 """Periods over the range of the angle below which a force is no ripple."""
 
 
-def with_orders(problems: Sequence[Problem]) -> tuple[Problem, ...]:
-    """The problems with the variants of every periodic candidate at the orders that the first one shows."""
-    found = shown_orders(problems[0], range(len(problems[0].candidates)), ())
+def with_orders(
+    problems: Sequence[Problem], numbers: Iterable[int] | None = None, taken: Sequence[Variant] = ()
+) -> tuple[Problem, ...]:
+    """The problems with the variants of periodic candidates at the orders that the first one shows.
+
+    Args:
+        problems: to fit, and to confirm.
+        numbers: of the candidates that are asked for; None: all.
+        taken: causes that are known, as their columns in the problem to fit.
+    """
+    found = shown_orders(problems[0], range(len(problems[0].candidates)) if numbers is None else numbers, taken)
     return tuple(
         replace(
             problem,

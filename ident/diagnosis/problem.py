@@ -22,7 +22,9 @@ from ident.diagnosis.law.dependence import Dependence
 from ident.effects import EffectParameter
 
 Array = NDArray[np.float64]
-Contribution = Callable[[Array, Array], Sequence[Array | None]]
+Series = Sequence[Array | None]
+"""One (N,) a block, None where it is zero."""
+Contribution = Callable[[Array, Array], Series]
 """Values of the parameters (k,) and of the baseline (p,) -> what a candidate adds to the model of every block, (N,)."""
 
 
@@ -128,6 +130,9 @@ class Candidate:
         parameters: what its result is given in.
         variants: at least one; several choices of nonlinear parameters are tried, the best one counts.
         contribution: exact and nonlinear in the parameters, for the refit; None where the columns are all there is.
+        force: what it adds before any filter, for what is turned by another; None: it is not turned.
+        turned: parameters (k,), and the forces of others -> what it makes of those, beyond what they add themselves: an
+            effort is late with everything in it. None: it adds to what others add.
         drift: it is a changed value of the model, no structure that the model lacks.
         least: what the coefficients of a variant must reach, 0 for a play or a mass; if the data want one smaller,
             this is not the cause. None: anything is possible.
@@ -155,6 +160,8 @@ class Candidate:
     parameters: tuple[EffectParameter, ...]
     variants: tuple[Variant, ...]
     contribution: Contribution | None = None
+    force: Contribution | None = None
+    turned: Callable[[Array, Series], Series] | None = None
     drift: bool = False
     least: float | None = None
     negligible: tuple[float, float] = (0.0, 0.0)
@@ -175,6 +182,36 @@ class Candidate:
     def key(self) -> str:
         """`effect@where`, unique in a problem."""
         return f"{self.effect}@{self.where}"
+
+
+def forces_of(candidates: Sequence[Candidate], values: Array, baseline: Array) -> Series:
+    """Force of a candidate of some parameters (k,) beside those of the baseline (p,); it has one.
+
+    Args:
+        candidates: it in all problems, as their blocks follow each other.
+        values, baseline: of the parameters.
+    """
+    return [one for each in candidates if each.force is not None for one in each.force(values, baseline)]
+
+
+def turned_by(candidates: Sequence[Candidate], values: Array, forces: Series) -> Series:
+    """What a candidate of some parameters (k,) makes of the forces of others; arguments as above."""
+    found, first = list[Array | None](), 0
+    for candidate in candidates:
+        last = first + len(candidate.variants[0].columns)
+        assert candidate.turned is not None
+        found += candidate.turned(values, forces[first:last])
+        first = last
+    return found
+
+
+def summed(parts: Sequence[Series]) -> Series:
+    """What several add, at least one, to every block."""
+    found = []
+    for each in zip(*parts, strict=True):
+        there = [one for one in each if one is not None]
+        found.append(np.sum(there, axis=0) if there else None)
+    return found
 
 
 @dataclass(frozen=True)

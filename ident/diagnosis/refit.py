@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.linear import least_squares, stretch_sums
-from ident.diagnosis.problem import Candidate, Problem
+from ident.diagnosis.problem import Candidate, Problem, Series, forces_of, summed, turned_by
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Column, Rows
 from ident.diagnosis.whitening import Whitening
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Series = Sequence[Array | None]
 
 MOST_STEPS: Final = 15
 HALVINGS: Final = 6
@@ -75,20 +75,36 @@ class Refit:
 class _Unknown:
     """The numbers of one effect: coefficients of its columns, or its parameters where it has an exact form.
 
-    The first of them are the parameters of the candidate, the others came along.
+    The first of them are the parameters of the candidate, the others came along. `turned`: what it makes of the forces
+    of others.
     """
 
-    candidate: Candidate
+    candidates: Sequence[Candidate]
     place: slice
     exact: Callable[[Array, Array], Series] | None
     columns: tuple[Array | None, ...]
     finish: Callable[[Array], Array]
+    turned: Callable[[Array, Series], Series] | None = None
 
     def series(self, values: Array, baseline: Array) -> Series:
         """What it adds to every block, (N,)."""
         if self.exact is not None:
             return self.exact(values, baseline)
         return [None if column is None else column @ values for column in self.columns]
+
+    @property
+    def candidate(self) -> Candidate:
+        """In the first problem."""
+        return self.candidates[0]
+
+    @property
+    def has_force(self) -> bool:
+        """Whether others may turn it."""
+        return self.turned is None and self.candidate.force is not None
+
+    def forces(self, values: Array, baseline: Array) -> Series:
+        """Of every block, unfiltered."""
+        return forces_of(self.candidates, self.finish(values), baseline)
 
     def expected(self, values: Array) -> Array:
         """How far its numbers are from what is expected of them, in standard deviations (k,), from all values."""
@@ -202,7 +218,7 @@ class _Model:
         parts = []
         for unknown in self.unknowns:
             own = values[unknown.place]
-            series = unknown.series(own, values[: self.size])
+            series = self._series(unknown, own, values)
             blocks = [model if one is None else model + one for model, one in zip(blocks, series, strict=True)]
             turn = _gradient(unknown.finish, own)
             spread = turn @ covariance[unknown.place, unknown.place] @ turn.T
@@ -224,9 +240,21 @@ class _Model:
         unknown, asked = self.unknowns[number], values.tobytes()
         kept = self._kept.get(number)
         if kept is None or kept[0] != asked:
-            kept = asked, self.rows.stack(unknown.series(values[unknown.place], values[: self.size]))
+            kept = asked, self.rows.stack(self._series(unknown, values[unknown.place], values))
             self._kept[number] = kept
         return kept[1]
+
+    def _series(self, unknown: _Unknown, own: Array, values: Array) -> Series:
+        """What an effect of some numbers adds to every block, and makes of the forces of others, of those in `values`.
+
+        What turns others is not turned. Slopes of the others are those without: they lead to the same numbers.
+        """
+        baseline = values[: self.size]
+        series = unknown.series(own, baseline)
+        forces = [one.forces(values[one.place], baseline) for one in self.unknowns if one.has_force]
+        if unknown.turned is None or not forces:
+            return series
+        return summed([series, unknown.turned(own, summed(forces))])
 
     def _derivative(self, number: int, values: Array) -> Array:
         unknown = self.unknowns[number]
@@ -237,7 +265,7 @@ class _Model:
         for index, step in enumerate(_steps(own)):
             ahead = own.copy()
             ahead[index] += step
-            columns.append((self.rows.stack(unknown.series(ahead, values[: self.size])) - here) / step)
+            columns.append((self.rows.stack(self._series(unknown, ahead, values)) - here) / step)
         return np.stack(columns, axis=1)
 
     def _covariance(self, values: Array) -> Array:
@@ -270,14 +298,15 @@ def _unknown(
     columns = tuple(part for candidate in candidates for part in candidate.variants[column.variant].columns)
     if candidates[0].contribution is None or not by_form or not variant.bent:
         place = slice(first, first + len(coefficients))
-        return _Unknown(candidates[0], place, None, columns, finish), coefficients
+        return _Unknown(candidates, place, None, columns, finish), coefficients
 
     def exact(values: Array, baseline: Array) -> Series:
         forms = [candidate.contribution for candidate in candidates]
         return [one for form in forms if form is not None for one in form(values, baseline)]
 
     start = np.asarray(finish(coefficients), dtype=float)
-    return _Unknown(candidates[0], slice(first, first + len(start)), exact, columns, _same), start
+    turned = None if candidates[0].turned is None else partial(turned_by, candidates)
+    return _Unknown(candidates, slice(first, first + len(start)), exact, columns, _same, turned), start
 
 
 def _beyond(candidate: Candidate, numbers: Array) -> Array:

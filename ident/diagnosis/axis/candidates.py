@@ -129,10 +129,7 @@ def _stribeck(axis: AxisModel) -> Candidate:
 
 
 def _time_delay(axis: AxisModel) -> Candidate:
-    def contribution(values: Array, baseline: Array) -> tuple[Array | None, ...]:
-        effort = axis.effort_of(baseline)
-        return axis.alone(delayed(effort, -float(values[0]), axis.sample_time) - effort)
-
+    contribution, turned = axis.answered(lambda values, effort: delayed(effort, -float(values[0]), axis.sample_time))
     parameters = (EffectParameter("delay", "s", "of the motion behind the effort, as reported"),)
     slope = differentiate(axis.effort, axis.sample_time, SEVEN)
     variants = (Variant(axis.alone(slope[:, None])),)
@@ -143,6 +140,7 @@ def _time_delay(axis: AxisModel) -> Candidate:
         parameters,
         variants,
         contribution,
+        turned=turned,
         negligible=(shortest, shortest),
         spread=(BETWEEN_SAMPLES * axis.sample_time,),
     )
@@ -214,8 +212,8 @@ def _torque_ripple(axis: AxisModel) -> Candidate:
     turn = 2 * np.pi if axis.kind is AxisKind.ROTARY else 1.0
     angle = 2 * np.pi * axis.motion.position / turn
 
-    def contribution(values: Array, _baseline: Array) -> tuple[Array | None, ...]:
-        return axis.alone(values[0] * np.sin(values[1] * angle + values[2]))
+    def added(values: Array, _baseline: Array) -> Array:
+        return np.asarray(values[0] * np.sin(values[1] * angle + values[2]))
 
     def start(order: float) -> Callable[[Array], Array]:
         return lambda found: np.array([np.hypot(*found), order * turn / (2 * np.pi), np.arctan2(found[1], found[0])])
@@ -232,7 +230,7 @@ def _torque_ripple(axis: AxisModel) -> Candidate:
         axis.place,
         parameters,
         (Variant(axis.alone(slowest), start(2 * np.pi * fewest / turn)),),
-        contribution,
+        *axis.exactly(added),
         lowest=(0.0, fewest, 0.0),
         periodic=Periodic(f"law_angle@{axis.place}", start),
     )

@@ -74,10 +74,7 @@ def friction_warming(axis: AxisModel) -> Candidate:
 def torque_filter(axis: AxisModel) -> Candidate:
     """A drive whose effort follows what is reported as a filter of first order does."""
 
-    def contribution(values: Array, baseline: Array) -> tuple[Array | None, ...]:
-        effort = axis.effort_of(baseline)
-        return axis.alone(led(effort, float(values[0]), axis.sample_time) - effort)
-
+    contribution, turned = axis.answered(lambda values, effort: led(effort, float(values[0]), axis.sample_time))
     slope = differentiate(axis.effort, axis.sample_time, SEVEN)
     parameters = (
         EffectParameter("time", "s", "constant of the filter between the effort reported and the one that acts"),
@@ -90,6 +87,7 @@ def torque_filter(axis: AxisModel) -> Candidate:
         parameters,
         variants,
         contribution,
+        turned=turned,
         least=0.0,
         negligible=(shortest, shortest),
         price=RARER,

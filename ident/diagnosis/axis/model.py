@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.axis.motion import AxisMotion
 from ident.diagnosis.law.dependence import Partner, Variable
-from ident.diagnosis.problem import Candidate, Variant
+from ident.diagnosis.problem import Candidate, Contribution, Series, Variant
 from ident.effects import EffectParameter
 from ident.records.axis_record import AxisKind
 
 Array = NDArray[np.float64]
 Filter = Callable[[Array], Array]
+Response = Callable[[Array, Array], Array]
+Turned = Callable[[Array, Series], Series]
 
 
 class AxisEffect(enum.StrEnum):
@@ -92,6 +94,34 @@ class AxisModel:
         filtered = self.filtered(column)
         return tuple(filtered if index == self.block else None for index in range(self.blocks))
 
+    def exactly(self, added: Callable[[Array, Array], Array]) -> tuple[Contribution, Contribution]:
+        """Contribution and force of an effect that adds (N,) by the values of its parameters and of the baseline."""
+        return (
+            lambda values, baseline: self.alone(added(values, baseline)),
+            lambda values, baseline: self.unfiltered(added(values, baseline)),
+        )
+
+    def answered(self, response: Response) -> tuple[Contribution, Turned]:
+        """What an effect adds that answers to the whole effort: to that of the model, and to the forces of others.
+
+        Args:
+            response: parameters (k,), and an effort (N,) -> what becomes of that.
+        """
+
+        def contribution(values: Array, baseline: Array) -> Series:
+            effort = self.effort_of(baseline)
+            return self.alone(response(values, effort) - effort)
+
+        def turned(values: Array, forces: Series) -> Series:
+            own = forces[self.block]
+            return forces if own is None else self.alone(response(values, own) - own)
+
+        return contribution, turned
+
+    def unfiltered(self, force: Array) -> Series:
+        """A force (N,) on this axis, none on the others."""
+        return tuple(force if index == self.block else None for index in range(self.blocks))
+
     def unit(self, per: str = "") -> str:
         """Unit of the effort, over some power of position and time."""
         return f"{self.kind.effort_unit}{per.replace('q', self.kind.position_unit)}"
@@ -105,8 +135,12 @@ def linear(
     where: str | None = None,
 ) -> Candidate:
     """An effect whose columns (N,) are all there is; at the axis, or as `where` names it."""
-    variant = Variant(axis.alone(np.stack(columns, axis=1)))
-    return Candidate(effect, where or axis.place, tuple(parameters), (variant,))
+    together = np.stack(columns, axis=1)
+
+    def force(values: Array, _baseline: Array) -> Series:
+        return axis.unfiltered(together @ values)
+
+    return Candidate(effect, where or axis.place, tuple(parameters), (Variant(axis.alone(together)),), force=force)
 
 
 def shaped_by(
@@ -126,10 +160,10 @@ def shaped_by(
     the effect is, with other parameters than those of the first estimate.
     """
 
-    def contribution(values: Array, baseline: Array) -> tuple[Array | None, ...]:
-        return axis.alone(scale(baseline) * values[0] * series(*map(float, values[1:])))
+    def added(values: Array, baseline: Array) -> Array:
+        return np.asarray(scale(baseline) * values[0] * series(*map(float, values[1:])))
 
     def variant(number: float) -> Variant:
         return Variant(axis.alone(series(number)[:, None]), lambda found: np.array([*found, number, *along]))
 
-    return Candidate(effect, axis.place, parameters, tuple(map(variant, tried)), contribution, price=price)
+    return Candidate(effect, axis.place, parameters, tuple(map(variant, tried)), *axis.exactly(added), price=price)

@@ -25,7 +25,7 @@ from ident.diagnosis.axis.scale import Scale, nominal
 from ident.diagnosis.delays import HELD
 from ident.diagnosis.law.dependence import Dependence, across
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant
+from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant, forces_of, turned_by
 from ident.diagnosis.refit import Refit
 from ident.estimate.axis.identify import PARAMETER_UNITS
 from ident.estimate.axis.processing import PARAMETERS
@@ -225,4 +225,6 @@ def _across(parts: Sequence[Candidate]) -> Candidate:
         return tuple(one for each in series for one in each)
 
     exact = contribution if first.contribution is not None else None
-    return replace(first, variants=variants, contribution=exact)
+    force = None if first.force is None else partial(forces_of, parts)
+    turned = None if first.turned is None else partial(turned_by, parts)
+    return replace(first, variants=variants, contribution=exact, force=force, turned=turned)

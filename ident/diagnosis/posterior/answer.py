@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
@@ -23,7 +24,8 @@ from ident.diagnosis.limits import Limits
 from ident.diagnosis.orders import with_orders
 from ident.diagnosis.posterior.bends import Bends
 from ident.diagnosis.posterior.fitting import Fitter
-from ident.diagnosis.posterior.hypotheses import make_design
+from ident.diagnosis.posterior.hidden import with_hidden_orders
+from ident.diagnosis.posterior.hypotheses import Design, make_design
 from ident.diagnosis.posterior.noise import SIZES, Colours
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.posterior.slots import slot_of
@@ -65,38 +67,60 @@ def judge_by_posterior(fit: Problem, confirm: Problem, *, seed: int, stage: Stag
         seed: of the smooth function of what is left.
         stage: told what begins.
     """
-    fit, confirm = with_orders((fit, confirm))
-    problems = (fit, confirm)
-    regression = Regression(fit, make_rows(fit, confirm), Settings(), seed)
     stage(f"comparing {len(fit.candidates)} causes and {len(fit.dependences)} laws")
-    colours, designs = Colours(regression), Designs(problems, regression.rows)
-    design = make_design(problems, regression, colours, designs)
-    search = Search(Fitter(design, colours, Bends(problems, colours)))
+    asked = _asked(with_orders((fit, confirm)), seed)
+    search = Search(asked.fitter)
     state = search.run()
+    hidden = with_hidden_orders(asked.problems, asked.design, asked.designs, state)
+    if hidden is not None:
+        stage("again with the ripples that are left")
+        asked = _asked(hidden, seed)
+        search = Search(asked.fitter)
+        state = search.run()
     stage("numbers of the answer")
-    answer = _Answer(problems, regression, designs, search, state, seed)
+    answer = _Answer(asked, search, state)
     while (other := answer.better()) is not None:
         search, state = other
-        answer = _Answer(problems, regression, designs, search, state, seed)
+        answer = _Answer(asked, search, state)
     return answer.findings()
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What the posterior is asked.
+
+    Attributes:
+        problems: to fit and to confirm.
+        regression: their rows.
+        designs: of their laws.
+        design: of all hypotheses.
+        fitter: of sets of them.
+        seed: of the smooth function of what is left.
+    """
+
+    problems: tuple[Problem, ...]
+    regression: Regression
+    designs: Designs
+    design: Design
+    fitter: Fitter
+    seed: int
+
+
+def _asked(problems: tuple[Problem, ...], seed: int) -> _Asked:
+    regression = Regression(problems[0], make_rows(*problems), Settings(), seed)
+    colours, designs = Colours(regression), Designs(problems, regression.rows)
+    design = make_design(problems, regression, colours, designs)
+    return _Asked(problems, regression, designs, design, Fitter(design, colours, Bends(problems, colours)), seed)
 
 
 class _Answer:
     """What is computed of the best set."""
 
-    def __init__(
-        self,
-        problems: tuple[Problem, Problem],
-        regression: Regression,
-        designs: Designs,
-        search: Search,
-        state: State,
-        seed: int,
-    ) -> None:
-        self.search, self.state, self.design, self._seed = search, state, search.design, seed
+    def __init__(self, asked: _Asked, search: Search, state: State) -> None:
+        self.search, self.state, self.design, self._seed = search, state, asked.design, asked.seed
         excess, whole = search.fitter.excess(state), search.fitter.among_all(state)
         self.slots = {index: slot_of(search, whole, index, excess[index]) for index in state.members}
-        self.taken = as_variants(problems, regression, designs, self.design, state, self.slots)
+        self.taken = as_variants(asked.problems, asked.regression, asked.designs, self.design, state, self.slots)
 
     @cached_property
     def fitted(self) -> Fitted:
@@ -108,19 +132,40 @@ class _Answer:
         return Fitted(self.taken.problems, regression, found, self._seed, told)
 
     def better(self) -> tuple[Search, State] | None:
-        """The search and its set without members that are of no size, or are not worth their place; None: all are."""
+        """The search and its set without members that are no answer; None: all are.
+
+        Not worth their place, less likely there than a rival, or of no size.
+        """
         # The search, which does not temper evidence, would take again what is doubted.
-        passed_over, refuted = self._doubted(), list[int]()
-        if not passed_over:
-            refuted = self._sizeless() or self._widening()
-        if not (passed_over or refuted):
-            passed_over = self._needless()
-        lost = [*passed_over, *refuted]
-        if not lost:
-            return None
-        left = {index: one for index, one in self.state.members.items() if index not in lost}
-        search = self.search.without(refuted, passed_over)
+        if doubted := self._doubted():
+            return self._without(passed_over=doubted)
+        if (corrected := self._corrected()) is not None:
+            return corrected
+        if refuted := self._sizeless() or self._widening():
+            return self._without(refuted=refuted)
+        return self._without(needless=needless) if (needless := self._needless()) else None
+
+    def _without(self, **lost: Sequence[int]) -> tuple[Search, State]:
+        """The search and its set without members that have lost their places, by the reason."""
+        gone = frozenset(index for each in lost.values() for index in each)
+        left = {index: one for index, one in self.state.members.items() if index not in gone}
+        search = self.search.without(**lost)
         return search, search.further(search.fitter.state(left, self.state))
+
+    def _corrected(self) -> tuple[Search, State] | None:
+        """With the rival that is most ahead of a member in its place, evidence tempered; None: none is.
+
+        What has lost a place to another once does not get it back.
+        """
+        ahead = {index: slot.ahead for index, slot in self.slots.items()}
+        places = [(*one, index) for index, one in ahead.items() if one and one[1] not in self.search.passed_over]
+        if not places:
+            return None
+        _, rival, index = max(places)
+        if rival in self.search.needless:
+            return self._without(needless=[index])
+        search = self.search.without(passed_over=[index])
+        return search, search.further(self.slots[index].rivals[rival])
 
     def _doubted(self) -> list[int]:
         """The member that is least likely to be there, if that is hardly.

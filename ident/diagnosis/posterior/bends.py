@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.posterior.hypotheses import Block, Hypothesis
 from ident.diagnosis.posterior.noise import Colours
-from ident.diagnosis.problem import Candidate, Problem
+from ident.diagnosis.problem import Candidate, Problem, Series, forces_of, turned_by
 from ident.diagnosis.rows import Rows
 
 Array = NDArray[np.float64]
@@ -31,10 +31,11 @@ STEP: Final = 1e-4
 """Of a coefficient, for a slope."""
 
 NEAR: Final = 0.1
-"""Change of the coefficients, over the largest of them, or of the plant's parameters, for which slopes are held."""
+"""Change of the coefficients, over the largest of them, of the plant's parameters, or of the forces of others, for
+which slopes are held."""
 
 NEAR_PLANT: Final = 1e-3
-"""Change of the plant's parameters, relative, for which an exact form is held."""
+"""Change of the plant's parameters, or of the forces of others, relative, for which an exact form is held."""
 
 SAME: Final = 0.1
 """Of coefficients, in standard deviations by the usual noise, that change nothing."""
@@ -54,7 +55,8 @@ class Bent:
         expected: (m, K) and (m,) rows beside those of the records, in standard deviations: what physics expects of
             numbers that come along with it.
         beside: (p,) parameters of the plant.
-        sloped: coefficients (K,) and parameters (p,) that the slopes were computed for.
+        others: (n,) forces of others, that it turns.
+        sloped: coefficients (K,), parameters (p,) and forces of others (n,), that the slopes were computed for.
     """
 
     place: slice
@@ -65,18 +67,19 @@ class Bent:
     missed: Array
     expected: tuple[Array, Array]
     beside: Array
-    sloped: tuple[Array, Array]
+    others: Array
+    sloped: tuple[Array, Array, Array]
 
-    def is_of(self, coefficients: Array, parameters: Array) -> bool:
+    def is_of(self, coefficients: Array, parameters: Array, others: Array) -> bool:
         """Whether it is about these, but for what changes nothing."""
         moved = float(np.abs(self.about - coefficients).max())
-        near = moved < SAME / math.sqrt(len(self.missed))
+        near = moved < SAME / math.sqrt(len(self.missed)) and _is_near(self.others, others, NEAR_PLANT)
         return near and bool(np.allclose(self.beside, parameters, rtol=NEAR_PLANT, atol=0.0))
 
-    def has_slopes_near(self, coefficients: Array, parameters: Array) -> bool:
+    def has_slopes_near(self, coefficients: Array, parameters: Array, others: Array) -> bool:
         """Whether its slopes were computed for nearly these."""
-        about, beside = self.sloped
-        near = np.abs(about - coefficients).max() < NEAR * np.abs(coefficients).max()
+        about, beside, turned = self.sloped
+        near = np.abs(about - coefficients).max() < NEAR * np.abs(coefficients).max() and _is_near(turned, others, NEAR)
         return bool(near and np.allclose(beside, parameters, rtol=NEAR, atol=0.0))
 
 
@@ -100,11 +103,16 @@ class Bends:
         candidate = self.problems[0].candidates[hypothesis.candidate]
         return candidate.contribution is not None and candidate.variants[block.column.variant].bent
 
-    def form(self, hypothesis: Hypothesis, block: Block, parameters: Array) -> Form:
-        """A hypothesis that is bent, beside some parameters (p,) of the plant."""
+    def turns(self, hypothesis: Hypothesis) -> bool:
+        """Whether it makes something of the forces of others."""
+        candidates = self.problems[0].candidates
+        return hypothesis.candidate is not None and candidates[hypothesis.candidate].turned is not None
+
+    def form(self, hypothesis: Hypothesis, block: Block, parameters: Array, others: Series = ()) -> Form:
+        """A name, beside some parameters (p,) of the plant, and forces of others that it turns."""
         assert hypothesis.candidate is not None
         candidates = [problem.candidates[hypothesis.candidate] for problem in self.problems]
-        return Form(hypothesis.key, candidates, block, self.colours.rows, parameters)
+        return Form(hypothesis.key, candidates, block, self.colours.rows, parameters, others)
 
     def last(self, hypothesis: Hypothesis, block: Block) -> Bent | None:
         """About the numbers that were asked for last, whatever stood beside.
@@ -119,23 +127,24 @@ class Bends:
 
         The last answer, where the coefficients are those but for `SAME`.
         """
-        key, size = form.key, float(np.abs(coefficients).max())
-        if held is None and size <= self._straight.get(key, 0.0):
+        key, size, others = form.key, float(np.abs(coefficients).max()), form.rows_of_others
+        if held is None and not others.any() and size <= self._straight.get(key, 0.0):
             return None
         numbers = form.held(coefficients) if held is None else held
         kept = self._kept.get(key)
         if kept is not None and not np.array_equal(kept.held, numbers):
             kept = None
-        if kept is not None and kept.is_of(coefficients, form.parameters):
+        if kept is not None and kept.is_of(coefficients, form.parameters, others):
             return kept
         here, expected = form.added(coefficients, numbers), form.expected_about(coefficients, numbers)
         if held is None and not len(expected[1]) and self._power(here - form.by_columns(coefficients)) < NEGLIGIBLE:
-            self._straight[key] = size
+            if not others.any():
+                self._straight[key] = size
             return None
-        if kept is not None and kept.has_slopes_near(coefficients, form.parameters):
+        if kept is not None and kept.has_slopes_near(coefficients, form.parameters, others):
             slopes, sloped = kept.slopes, kept.sloped
         else:
-            slopes, sloped = form.slopes(coefficients, numbers, here), (coefficients, form.parameters)
+            slopes, sloped = form.slopes(coefficients, numbers, here), (coefficients, form.parameters, others)
         self._kept[key] = Bent(
             place=form.block.place,
             about=coefficients,
@@ -145,6 +154,7 @@ class Bends:
             missed=here - slopes @ coefficients,
             expected=expected,
             beside=form.parameters,
+            others=others,
             sloped=sloped,
         )
         return self._kept[key]
@@ -164,6 +174,7 @@ class Form:
         block: its columns.
         rows: of the problems.
         parameters: (p,) of the plant beside it.
+        others: their forces, that it turns; empty where there are none.
     """
 
     name: str
@@ -171,6 +182,7 @@ class Form:
     block: Block
     rows: Rows
     parameters: Array
+    others: Series = ()
 
     @property
     def key(self) -> tuple[str, int]:
@@ -182,13 +194,28 @@ class Form:
         assert self.block.column is not None
         return np.asarray(self.rows.columns[:, self.block.column.place] @ self._raw(coefficients))
 
+    @cached_property
+    def rows_of_others(self) -> Array:
+        """(n,) forces of others, unfiltered."""
+        return self.rows.stack(self.others) if self.others else np.zeros(len(self.rows))
+
     def added(self, coefficients: Array, held: Array) -> Array:
-        """(n,) what it adds."""
+        """(n,) what it adds, and makes of the forces of others."""
         numbers, series = self.numbers(coefficients, held), list[Array | None]()
         for candidate in self.candidates:
             assert candidate.contribution is not None
             series += candidate.contribution(numbers, self.parameters)
-        return self.rows.stack(series)
+        found = self.rows.stack(series)
+        return found + self.rows.stack(turned_by(self.candidates, numbers, self.others)) if self.others else found
+
+    @property
+    def has_force(self) -> bool:
+        """Whether others may turn it."""
+        return self.candidates[0].force is not None
+
+    def force(self, coefficients: Array, held: Array) -> Series:
+        """Of its own, unfiltered."""
+        return forces_of(self.candidates, self.numbers(coefficients, held), self.parameters)
 
     def slopes(self, coefficients: Array, held: Array, here: Array) -> Array:
         """(n, K) over the coefficients, `here` being what it adds."""
@@ -248,6 +275,10 @@ class Form:
     def _expected(self, coefficients: Array, held: Array) -> Array:
         expected = self.candidates[0].expected
         return np.zeros(0) if expected is None else expected(self.numbers(coefficients, held))
+
+
+def _is_near(one: Array, other: Array, share: float) -> bool:
+    return bool(np.abs(one - other).max() <= share * np.abs(other).max())
 
 
 def _slopes(function: Callable[[Array], Array], about: Array, here: Array, steps: Array) -> Array:

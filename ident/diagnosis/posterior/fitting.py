@@ -19,6 +19,7 @@ from ident.diagnosis.posterior.misfit import excess_of_scatter
 from ident.diagnosis.posterior.noise import Colours, Sizes, most_likely
 from ident.diagnosis.posterior.products import Products, numbers_of
 from ident.diagnosis.posterior.state import State
+from ident.diagnosis.problem import Series, summed
 
 Array = NDArray[np.float64]
 
@@ -33,9 +34,6 @@ TELLING: Final = 5.0
 
 FURTHEST: Final = 0.3
 """Share of a held number that it is moved by at once, or of one where it is zero: a phase, a share."""
-
-STILL: Final = 0.03
-"""Part of the furthest step from which a held number stays where it is: a hundredth of it."""
 
 
 class Fitter:
@@ -95,9 +93,9 @@ class Fitter:
             products = self._products(members)
             first = State(members, self._known(members, before), Evidence(products, start))
             found = self._settled(first)
-            if not math.isfinite(found.log_posterior):
-                # Exact forms about numbers of another set may leave no room for a member that its columns do.
-                found = self._settled(replace(first, bends={}))
+            if not math.isfinite(found.log_posterior) or any(bent.held.size for bent in first.bends.values()):
+                # Numbers of another set may lead elsewhere, or leave no room for a member that its columns do.
+                found = max(found, self._settled(replace(first, bends={})), key=lambda one: one.log_posterior)
             for _ in range(SWEEPS):
                 noise = self._noise_beside(found)
                 if noise == found.evidence.sizes:
@@ -175,7 +173,13 @@ class Fitter:
         if not bent_ones:
             return state
         parameters = self._parameters(state, blocks, means)
-        forms = {index: self._bends.form(hypotheses[index], blocks[index], parameters) for index in bent_ones}
+        forces = self._forces(state, blocks, means, parameters)
+        forms = {
+            index: self._bends.form(
+                hypotheses[index], blocks[index], parameters, forces if self._bends.turns(hypotheses[index]) else ()
+            )
+            for index in bent_ones
+        }
         before = {index: state.bends[index].held if index in state.bends else None for index in forms}
         found = {index: self._bends.bend(form, means[index], before[index]) for index, form in forms.items()}
         state = replace(state, bends={index: bent for index, bent in found.items() if bent is not None})
@@ -183,6 +187,22 @@ class Fitter:
             if index not in state.resting and self._is_telling(state, blocks[index], means[index]):
                 state = self._moved(state, index, form, means[index])
         return state
+
+    def _forces(
+        self, state: State, blocks: Mapping[int, Block], means: Mapping[int, Array], parameters: Array
+    ) -> Series:
+        """Of the members that turn nothing, where there are some that do; those do not turn each other.
+
+        A law has none: it is known in the rows alone.
+        """
+        hypotheses, parts = self.design.hypotheses, list[Series]()
+        if any(self._bends.turns(hypotheses[index]) for index in blocks):
+            for index, block in blocks.items():
+                if not (hypotheses[index].free or self._bends.turns(hypotheses[index])):
+                    form, bent = self._bends.form(hypotheses[index], block, parameters), state.bends.get(index)
+                    if form.has_force:
+                        parts.append(form.force(means[index], np.zeros(0) if bent is None else bent.held))
+        return summed(parts) if parts else ()
 
     @staticmethod
     def _is_telling(state: State, block: Block, mean: Array) -> bool:
@@ -197,15 +217,18 @@ class Fitter:
         rested = replace(state, resting=state.resting | {index})
         if bent is None or not bent.held.size:
             return rested
-        step = self._step(replace(state, bends={**state.bends, index: bent}), state.without(index), form, bent)
-        if np.abs(step).max() < STILL * FURTHEST * np.abs(_range(bent.held)).max():
+        step, gain = self._step(replace(state, bends={**state.bends, index: bent}), state.without(index), form, bent)
+        if gain < SETTLED:
             return rested
         moved = self._bends.bend(form, mean, bent.held + step)
         better = state if moved is None else replace(state, bends={**state.bends, index: moved})
         return better if better.log_posterior > state.log_posterior + SETTLED else rested
 
-    def _step(self, state: State, others: Members, form: Form, bent: Bent) -> Array:
-        """(H,) of the held numbers of a member, everything else fitted beside."""
+    def _step(self, state: State, others: Members, form: Form, bent: Bent) -> tuple[Array, float]:
+        """(H,) of the held numbers of a member, everything else fitted beside, and the log posterior that it promises.
+
+        At most `FURTHEST` at once; what is promised is by the whole of it.
+        """
         free, expected = form.held_slopes(bent)
         columns = [self.design.baseline, *(self._columns(state, index, one) for index, one in others.items())]
         whole = np.column_stack([*columns, bent.slopes, free, self.design.target - state.missed])
@@ -217,9 +240,12 @@ class Fitter:
         beside, wanted = self._expected_beside(state, others, len(scale))
         rows = np.vstack([white[:, :-1] * scale, own * scale, beside, np.eye(len(scale))[:width]])
         target = np.concatenate([white[:, -1], bent.expected[1], wanted, np.zeros(width)])
-        found = np.linalg.lstsq(rows, target, rcond=None)[0] * scale
+        found = np.linalg.lstsq(rows, target, rcond=None)[0]
+        wished = found[-len(size) :]
+        spread = np.linalg.pinv(rows.T @ rows, hermitian=True)[-len(size) :, -len(size) :]
+        gain = 0.5 * float(wished @ np.linalg.pinv(spread, hermitian=True) @ wished)
         most = FURTHEST * _range(bent.held)
-        return np.asarray(np.clip(found[-len(size) :], -most, most))
+        return np.clip(wished * scale[-len(size) :], -most, most), gain
 
     def _expected_beside(self, state: State, members: Members, count: int) -> tuple[Array, Array]:
         """Rows (m, count) and (m,) of what is expected of members that stand behind the baseline."""

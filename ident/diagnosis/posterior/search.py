@@ -31,19 +31,31 @@ class Search:
     Args:
         fitter: of the sets.
         refuted: hypotheses that the records speak against.
-        passed_over: those that are not worth a place of their own; they may still be what another one is taken for.
+        passed_over: those that others are more likely than; they may still be what another one is taken for.
+        needless: those that make next to no difference; what they are more likely than makes none either.
     """
 
     def __init__(
-        self, fitter: Fitter, refuted: frozenset[int] = frozenset(), passed_over: frozenset[int] = frozenset()
+        self,
+        fitter: Fitter,
+        refuted: frozenset[int] = frozenset(),
+        passed_over: frozenset[int] = frozenset(),
+        needless: frozenset[int] = frozenset(),
     ) -> None:
         self.fitter, self.design = fitter, fitter.design
         self.refuted = refuted | fitter.invisible
-        self.passed_over = passed_over
+        self.passed_over, self.needless = passed_over, needless
 
-    def without(self, refuted: Collection[int], passed_over: Collection[int]) -> Search:
-        """The same search, some hypotheses more refuted, or passed over."""
-        return Search(self.fitter, self.refuted | frozenset(refuted), self.passed_over | frozenset(passed_over))
+    def without(
+        self, *, refuted: Collection[int] = (), passed_over: Collection[int] = (), needless: Collection[int] = ()
+    ) -> Search:
+        """The same search without some hypotheses more."""
+        return Search(
+            self.fitter,
+            self.refuted | frozenset(refuted),
+            self.passed_over | frozenset(passed_over),
+            self.needless | frozenset(needless),
+        )
 
     def run(self) -> State:
         """The best set that was found."""
@@ -57,7 +69,10 @@ class Search:
             if further.log_posterior <= state.log_posterior:
                 break
             state = further
-        return self._named(self._against_rivals(state))
+        best = self._against_rivals(state)
+        named = self._named(best)
+        # Names that stand for a law were taken one after the other.
+        return best if named is best else self._against_rivals(named)
 
     def _against_rivals(self, state: State) -> State:
         """With the best hypothesis in the place of every member."""
@@ -84,7 +99,7 @@ class Search:
         """
         hypotheses = self.design.hypotheses
         whole, usual = self.fitter.among_all(state), self.fitter.with_nothing_lacking(state)
-        found, barred = dict[int, Member](), self.refuted | self.passed_over
+        found, barred = dict[int, Member](), self.refuted | self.passed_over | self.needless
         for one in (whole, usual) if usual.evidence is not whole.evidence else (whole,):
             tables = {
                 index: table

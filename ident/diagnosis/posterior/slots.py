@@ -34,11 +34,20 @@ class Slot:
         logs: log posterior odds of every hypothesis against nothing there, the greatest first.
         cosines: of what the member adds and what every other can.
         alike: hypotheses that add the same, the member first.
+        rivals: sets with another hypothesis there, of those that were fitted exactly.
     """
 
     logs: Mapping[int, float]
     cosines: Mapping[int, float]
     alike: tuple[int, ...]
+    rivals: Mapping[int, State]
+
+    @property
+    def ahead(self) -> tuple[float, int] | None:
+        """The most likely rival that was fitted exactly, and by how much more likely it is; None if none is."""
+        most = max(self.rivals, key=lambda one: self.logs.get(one, -math.inf), default=None)
+        lead = -math.inf if most is None else self.logs.get(most, -math.inf) - self.logs.get(self.alike[0], -math.inf)
+        return (lead, most) if most is not None and lead > 0 else None
 
     @cached_property
     def _whole(self) -> float:
@@ -95,13 +104,21 @@ def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
             if table.is_there:
                 logs[number], costs[number] = base + table.total - hypothesis.price, table.cost
     logs[index], costs[index] = state.log_posterior - bare, state.table(index).cost
-    near = sorted((one for one in logs if one != index), key=lambda one: -logs[one])[:RIVALS]
-    for rival in [one for one in near if logs[one] > logs[index] - NEAR]:
-        fitted = search.fitter.state({**others, rival: without.target.table(rival, beside).best}, state)
+
+    def tempered(one: int) -> float:
+        return _tempered(logs[one], costs[one] + hypotheses[one].price, excess)
+
+    near = sorted((one for one in logs if one != index), key=lambda one: -tempered(one))[:RIVALS]
+    rivals = {
+        rival: search.fitter.state({**others, rival: without.target.table(rival, beside).best}, state)
+        for rival in near
+        if tempered(rival) > tempered(index) - NEAR
+    }
+    for rival, fitted in rivals.items():
         logs[rival] = fitted.log_posterior - bare
         costs[rival] = fitted.table(rival).cost if math.isfinite(fitted.log_posterior) else 0.0
-    logs = {one: _tempered(log, costs[one] + hypotheses[one].price, excess) for one, log in logs.items()}
-    logs = {one: log for one, log in sorted(logs.items(), key=lambda entry: -entry[1]) if math.isfinite(log)}
+    odds = {one: tempered(one) for one in logs}
+    logs = {one: log for one, log in sorted(odds.items(), key=lambda entry: -entry[1]) if math.isfinite(log)}
     cosines = _cosines(state, index, logs)
     width = len(hypotheses[index].blocks[state.members[index].block].factor)
     alike = [
@@ -109,7 +126,7 @@ def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
         for one, (cosine, size) in cosines.items()
         if cosine > ALIKE and size == width and one != index and not (hypotheses[one].free or hypotheses[index].free)
     ]
-    return Slot(logs, {one: cosine for one, (cosine, _) in cosines.items()}, (index, *alike))
+    return Slot(logs, {one: cosine for one, (cosine, _) in cosines.items()}, (index, *alike), rivals)
 
 
 def _tempered(log: float, cost: float, excess: float) -> float:

@@ -2,36 +2,124 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
 
 import pytest
 
+from hil.exam.sources.machine import Machine
 from ident.diagnosis.axis.diagnose import diagnose_axis
-from ident.diagnosis.diagnosis import Verdict
-from ident.diagnosis.findings import Findings
+from ident.diagnosis.diagnosis import Diagnosis, Verdict
+from ident.diagnosis.findings import LAW
+from ident.diagnosis.names import EffectName
 from ident.diagnosis.posterior.answer import judge_by_posterior
 
-Make = Callable[..., Any]
+Say = Callable[..., Diagnosis]
+Law = Callable[[float, float, float], float]
+
+CARRIAGE = Machine(
+    mass=20.0, viscous=60.0, coulomb=8.0, noise=0.1, encoder=2e-7, rate=500.0, substeps=8, repeats=1,
+    duration=10.0, strokes=12, speeds=(0.05, 0.1, 0.15, 0.2, 0.25), travel=0.25,
+)  # fmt: skip
+"""Ten seconds between random points, at five speeds."""
 
 
-def diagnosed(machine: Any, lacking: tuple[str, ...] = ()) -> Findings:
-    records = [machine.drive(11)], [machine.drive(12)]
-    return diagnose_axis(*records, seed=1, lacking=lacking, judged=judge_by_posterior)
+@pytest.fixture
+def said() -> Say:
+    """What the posterior says of the carriage with something else about it."""
+
+    def diagnosed(*lacking: str, **changed: object) -> Diagnosis:
+        machine = replace(CARRIAGE, **changed)  # type: ignore[arg-type]
+        records = [machine.drive(21)], [machine.drive(22)]
+        return diagnose_axis(*records, seed=1, lacking=lacking, judged=judge_by_posterior).diagnosis()
+
+    return diagnosed
 
 
-def test_a_machine_that_is_the_model_lacks_nothing(machine: Make) -> None:
-    assert diagnosed(machine()).verdict is Verdict.NONE
+def ripple(_time: float, x: float, _v: float) -> float:
+    """Thirty periods a metre, 0.4 N."""
+    return 0.4 * math.sin(2 * math.pi * 30 * x)
 
 
-def test_an_asymmetry_is_named_with_its_size(machine: Make) -> None:
-    (cause,) = diagnosed(machine(asymmetry=8.0)).causes
-    assert cause.candidate.effect == "asymmetric_viscous"
-    assert cause.part.values[0] == pytest.approx(8.0, abs=max(3 * cause.part.std[0], 0.1))
+def hump(_time: float, x: float, _v: float) -> float:
+    """A load in one place of the travel, of no family."""
+    return 0.8 * math.exp(-(((x - 0.1) / 0.03) ** 2))
 
 
-def test_what_has_lost_its_name_is_a_law_of_its_variable(machine: Make) -> None:
-    findings = diagnosed(machine(asymmetry=8.0), lacking=("asymmetric_viscous", "quadratic_drag"))
-    assert findings.verdict is Verdict.LAW
-    laws = [cause.law_answer for cause in findings.causes if cause.law_answer is not None]
-    assert [str(law.variable) for law in laws] == ["rate"]
+def drag(_time: float, _x: float, v: float) -> float:
+    """Two noise units."""
+    return 12.0 * v * abs(v)
+
+
+def faint_drag(time: float, x: float, v: float) -> float:
+    """Half a noise unit."""
+    return drag(time, x, v) / 4
+
+
+def test_nothing_is_said_of_a_machine_that_is_its_model(said: Say) -> None:
+    assert said().verdict is Verdict.NONE
+
+
+@pytest.mark.parametrize(
+    ("name", "changed", "parameter", "true"),
+    [
+        (EffectName.ASYMMETRIC_VISCOUS, {"asymmetry": 2.0}, "imbalance", 2.0),
+        (EffectName.TORQUE_RIPPLE, {"law": ripple}, "amplitude", 0.4),
+        (EffectName.TIME_DELAY, {"delay": 0.0045}, "delay", 0.0045),
+        (EffectName.ELASTICITY, {"compliance": 1e-6}, "compliance", 0.36e-6),
+    ],
+)
+def test_what_is_missing_is_named_with_its_size(
+    said: Say, name: str, changed: dict[str, object], parameter: str, true: float
+) -> None:
+    answer = said(**changed)
+    (effect,) = answer.effects
+    assert effect.name == name
+    size = effect.parameters[parameter]
+    assert abs(size.value) == pytest.approx(true, abs=3 * size.std)
+    assert size.std < 0.2 * true
+    assert effect.gap_closed_held_out > 0.9 or answer.gap.closed > 0.9
+
+
+@pytest.mark.parametrize(
+    ("lacking", "changed", "variable"),
+    [
+        ((EffectName.TORQUE_RIPPLE,), {"law": ripple}, "angle"),
+        ((EffectName.ASYMMETRIC_VISCOUS, EffectName.QUADRATIC_DRAG), {"asymmetry": 8.0}, "rate"),
+    ],
+)
+def test_what_has_lost_its_name_is_a_law_of_its_variable(
+    said: Say, lacking: tuple[str, ...], changed: dict[str, object], variable: str
+) -> None:
+    answer = said(*lacking, **changed)
+    (effect,) = answer.effects
+    assert (answer.verdict, effect.name) == (Verdict.LAW, LAW)
+    assert effect.law is not None
+    assert effect.law.variable == variable
+    assert answer.gap.closed > 0.9
+
+
+def test_a_law_of_no_family_is_a_law_with_its_curve(said: Say) -> None:
+    """The curve rises where the load stands, and nowhere else."""
+    (effect,) = said(law=hump).effects
+    assert effect.name == LAW
+    assert effect.law is not None
+    x, y, std = effect.law.curve.T
+    top = int(y.argmax())
+    assert x[top] == pytest.approx(0.1, abs=0.01)
+    assert y[top] - y[0] == pytest.approx(0.8, abs=0.1 + 3 * std[top])
+
+
+@pytest.mark.parametrize(("law", "name"), [(ripple, EffectName.TORQUE_RIPPLE), (drag, EffectName.QUADRATIC_DRAG)])
+def test_an_effort_is_late_with_all_that_is_in_it(said: Say, law: Law, name: str) -> None:
+    """Two causes are both named: a delay beside which another one is not late is a filter, and no ripple shows."""
+    answer = said(law=law, delay=0.0045)
+    assert {effect.name for effect in answer.effects} == {name, EffectName.TIME_DELAY}
+
+
+def test_probabilities_and_sets_are_those_of_all_that_may_stand_there(said: Say) -> None:
+    """A drag of half a noise unit may be friction that falls with speed: both are in the set, and share."""
+    (effect,) = said(law=faint_drag).effects
+    assert EffectName.QUADRATIC_DRAG in effect.ambiguity_set
+    assert 0.2 < effect.probability < 0.99

@@ -1,1 +1,0 @@
-"""The diagnosis as one comparison: hypotheses of law and place, their evidence, and the answer that follows."""

@@ -1,0 +1,50 @@
+"""Ripples that what else is there hid: beside a delay, the spectrum of what is left is that of the delay."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ident.diagnosis.law.learning import Designs
+from ident.diagnosis.orders import with_orders
+from ident.diagnosis.posterior.hypotheses import Design
+from ident.diagnosis.posterior.state import State
+from ident.diagnosis.problem import Problem, Variant
+
+
+def with_hidden_orders(
+    problems: tuple[Problem, ...], design: Design, designs: Designs, state: State
+) -> tuple[Problem, ...] | None:
+    """The problems with the orders that are left beside a set; None where it has no law over the angle of a ripple.
+
+    Such a law may be a ripple of an order that was not tried.
+
+    Args:
+        problems: to fit and to confirm.
+        design: of their hypotheses.
+        designs: of their laws.
+        state: the set.
+    """
+    laws = {design.hypotheses[index].key for index in state.members if design.hypotheses[index].free}
+    waves = [
+        number
+        for number, one in enumerate(problems[0].candidates)
+        if one.periodic is not None and one.periodic.dependence in laws and not one.excluded
+    ]
+    if not waves:
+        return None
+    angles = {one.periodic.dependence for one in problems[0].candidates if one.periodic is not None}
+    return with_orders(problems, waves, tuple(_taken(problems[0], design, designs, state, angles)))
+
+
+def _taken(problem: Problem, design: Design, designs: Designs, state: State, angles: set[str]) -> Iterator[Variant]:
+    """Members as their columns, but for laws over the angle of a ripple."""
+    for index, member in state.members.items():
+        hypothesis = design.hypotheses[index]
+        column = hypothesis.blocks[member.block].column
+        if column is not None:
+            yield problem.candidates[column.candidate].variants[column.variant]
+        elif hypothesis.key not in angles:
+            assert hypothesis.dependence is not None
+            knots = designs.knots(hypothesis.dependence)
+            assert knots is not None
+            yield Variant(tuple(problem.dependences[hypothesis.dependence].design(knots.basis)))
