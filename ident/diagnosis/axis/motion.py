@@ -83,7 +83,7 @@ def noise_limit(
     While an axis hardly accelerates, what is measured of it is noise, and the best prediction of the effort from that
     is none: what says so looks like an elastic drive, or like a law of the acceleration. To take a noise of power N out
     of rows whose effort has E turns their variance from E + N into E: a log evidence of ln(1 + N / E) at every
-    frequency of a record, as far as it has rows, which may add up to `GAINED`. No rows are beyond the position's
+    frequency of a record, as far as it has rows, which may add up to `GAINED`. Nothing is beyond the position's
     cutoff. An effort may hold more than noise where its noise is looked for, and so may what a model leaves: the
     smaller of the two is taken.
 
@@ -104,7 +104,8 @@ def noise_limit(
     noise = inertia**2 * position * (2 * math.pi * frequency) ** 4
     gained = moving * np.cumsum(np.log1p(noise / max(min(effort, left), np.finfo(float).tiny)))
     highest = 2 * math.pi * float(frequency[np.searchsorted(gained[:-1], GAINED)])
-    limit = min(highest, cutoff, LARGEST_ROWS_CUTOFF / dt)
+    # White rows show all that is below half of their rate as well as what is below the cutoff of their filter.
+    limit = min(2 * highest / ROWS_PER_CUTOFF, cutoff, LARGEST_ROWS_CUTOFF / dt)
     if ROWS_PER_CUTOFF * limit * duration < 2 * math.pi * FEWEST_ROWS:
         raise EstimationError(
             f"{record.source}: above {limit / (2 * math.pi):.3g} Hz the acceleration of {axis.label}, differences of a "

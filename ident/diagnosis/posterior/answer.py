@@ -26,7 +26,7 @@ from ident.diagnosis.posterior.bends import Bends
 from ident.diagnosis.posterior.fitting import Fitter
 from ident.diagnosis.posterior.hidden import with_hidden_orders
 from ident.diagnosis.posterior.hypotheses import Design, make_design
-from ident.diagnosis.posterior.noise import SIZES, Colours
+from ident.diagnosis.posterior.noise import SIZES, Colours, Left
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.posterior.slots import slot_of
 from ident.diagnosis.posterior.state import State
@@ -71,10 +71,9 @@ def judge_by_posterior(fit: Problem, confirm: Problem, *, seed: int, stage: Stag
     asked = _asked(with_orders((fit, confirm)), seed)
     search = Search(asked.fitter)
     state = search.run()
-    hidden = with_hidden_orders(asked.problems, asked.design, asked.designs, state)
-    if hidden is not None:
-        stage("again with the ripples that are left")
-        asked = _asked(hidden, seed)
+    if (again := _asked_beside(asked, state)) is not None:
+        stage("again beside what is there")
+        asked = again
         search = Search(asked.fitter)
         state = search.run()
     stage("numbers of the answer")
@@ -106,9 +105,20 @@ class _Asked:
     seed: int
 
 
-def _asked(problems: tuple[Problem, ...], seed: int) -> _Asked:
+def _asked_beside(asked: _Asked, state: State) -> _Asked | None:
+    """The same asked with what was hidden by a set: the noise of rows without repeats, orders of ripples."""
+    if not state.members:
+        return None
+    hidden = with_hidden_orders(asked.problems, asked.design, asked.designs, state)
+    left = None if Colours.repeats(asked.regression) else asked.fitter.left(state)
+    if hidden is None and left is None:
+        return None
+    return _asked(asked.problems if hidden is None else hidden, asked.seed, left)
+
+
+def _asked(problems: tuple[Problem, ...], seed: int, left: Left | None = None) -> _Asked:
     regression = Regression(problems[0], make_rows(*problems), Settings(), seed)
-    colours, designs = Colours(regression), Designs(problems, regression.rows)
+    colours, designs = Colours(regression, left), Designs(problems, regression.rows)
     design = make_design(problems, regression, colours, designs)
     return _Asked(problems, regression, designs, design, Fitter(design, colours, Bends(problems, colours)), seed)
 

@@ -16,7 +16,7 @@ from ident.diagnosis.posterior.bends import Bends, Bent, Form
 from ident.diagnosis.posterior.evidence import Evidence, Member, Members
 from ident.diagnosis.posterior.hypotheses import Block, Design
 from ident.diagnosis.posterior.misfit import excess_of_scatter
-from ident.diagnosis.posterior.noise import Colours, Sizes, most_likely
+from ident.diagnosis.posterior.noise import Colours, Left, Sizes, most_likely
 from ident.diagnosis.posterior.products import Products, numbers_of
 from ident.diagnosis.posterior.state import State
 from ident.diagnosis.problem import Series, summed
@@ -133,6 +133,15 @@ class Fitter:
         columns = np.hstack([self.design.baseline, *(self._columns(state, index, one) for index, one in members)])
         expected = self._expected_beside(state, state.members, columns.shape[1])
         return columns, self.design.target - state.missed, expected
+
+    def left(self, state: State) -> Left:
+        """What a set leaves of the rows."""
+        columns, target, (beside, wanted) = self._rows(state)
+        white, _ = self._colours.white(np.column_stack([columns, target]), state.evidence.sizes)
+        width = columns.shape[1]
+        rows = np.vstack([white[:, :-1], beside, np.eye(width)])
+        found = np.linalg.lstsq(rows, np.concatenate([white[:, -1], wanted, np.zeros(width)]), rcond=None)[0]
+        return Left(target - columns @ found, width)
 
     def excess(self, state: State) -> dict[int, float]:
         """How far rows scatter beyond their noise along every member, by which its likelihoods are tempered."""

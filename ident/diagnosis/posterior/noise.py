@@ -19,7 +19,7 @@ from scipy import linalg
 from ident.diagnosis.linear import rms
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Rows
-from ident.diagnosis.whitening import Predictor, predictor_of
+from ident.diagnosis.whitening import ORDER, Predictor, Whitener, fit_whitener, predictor_of
 
 Array = NDArray[np.float64]
 Sizes = tuple[int, ...]
@@ -44,8 +44,25 @@ ROUNDS: Final = 4
 """Times that the sizes of all labels are looked at."""
 
 
+@dataclass(frozen=True)
+class Left:
+    """What a set leaves of the rows.
+
+    Attributes:
+        residual: (n,).
+        fitted: how many coefficients were.
+    """
+
+    residual: Array
+    fitted: int
+
+
 class Colours:
     """Covariances of the rows of every block.
+
+    Args:
+        regression: of the rows.
+        left: what a set leaves of them; None: nothing is known of what is there yet.
 
     Attributes:
         rows: of the problems.
@@ -54,14 +71,14 @@ class Colours:
         stretch: (n,) number of the stretch that every row belongs to, rising.
     """
 
-    def __init__(self, regression: Regression) -> None:
+    def __init__(self, regression: Regression, left: Left | None = None) -> None:
         self.rows: Rows = regression.rows
         self.stretch = regression.stretch
         found: dict[str, list[int]] = {}
         self._places: list[slice] = []
         self._tolerated: list[Array] = []
         self._lacking: list[Array] = []
-        alone = None if all(colour.count for colour in regression.repeats) else regression.whitener(())
+        alone = None if self.repeats(regression) else _of(regression, left)
         for (block, kept), place in zip(self.rows.blocks, self.rows.block_slices, strict=True):
             if place.stop == place.start:
                 continue
@@ -81,6 +98,11 @@ class Colours:
         self.labels = tuple(found)
         self.blocks = tuple(tuple(numbers) for numbers in found.values())
         self._factors: dict[tuple[int, int], Array] = {}
+
+    @staticmethod
+    def repeats(regression: Regression) -> bool:
+        """Whether what differs between repeats tells the noise of all rows."""
+        return all(colour.count for colour in regression.repeats)
 
     @property
     def usual(self) -> Sizes:
@@ -193,6 +215,13 @@ def _log(products: Array) -> float:
     factor = linalg.cholesky(inner, lower=True, check_finite=False)
     explained = linalg.solve_triangular(factor, products[:width, width], lower=True, check_finite=False)
     return -0.5 * float(products[width, width] - explained @ explained) - float(np.sum(np.log(np.diag(factor))))
+
+
+def _of(regression: Regression, left: Left | None) -> Whitener:
+    """Noise of rows without repeats: of what a set leaves, or the parameters and the strongest candidates."""
+    if left is None:
+        return regression.whitener(())
+    return fit_whitener(regression.rows, left.residual, left.fitted, ORDER, regression.repeats)
 
 
 def _remembering(distance: Array) -> Array:
