@@ -272,3 +272,16 @@ _LIBRARY: Final[tuple[Callable[[AxisModel], Candidate], ...]] = (
     presliding,
     torque_filter,
 )
+
+OF_ACCELERATIONS: Final = frozenset(
+    {
+        EffectName.PAYLOAD,
+        EffectName.TORQUE_GAIN,
+        EffectName.TIME_DELAY,
+        EffectName.TORQUE_FILTER,
+        EffectName.ELASTICITY,
+        EffectName.FRICTION_LOAD,
+        AxisEffect.INERTIA_POSITION,
+    }
+)
+"""Whose columns hold a measured acceleration, and its noise."""

@@ -23,8 +23,6 @@ ROWS_CUTOFF: Final = 0.4
 """Cutoff of the rows over that of the position filter: sign(v) then sees the velocity itself."""
 LARGEST_ROWS_CUTOFF: Final = 1.0
 """Largest cutoff of the rows times the sample time."""
-GAINED: Final = 3.0
-"""Log evidence that an acceleration without its noise may bring: odds of 20 to 1, at which a name is sure."""
 LEAST_ROWS: Final = 300
 """Rows that the shortest repeat, or a record without any, shall have."""
 MOST_ROWS: Final = 4000
@@ -73,47 +71,6 @@ class AxisMotion:
     effort: Array
     sticking: NDArray[np.bool_]
     moving: NDArray[np.bool_]
-
-
-def noise_limit(
-    record: AxisRecord, axis: AxisSignals, inertia: float, left: float, cutoff: float, moving: float
-) -> float:
-    """Frequency [rad/s] up to which the noise of the acceleration cannot be taken for an effect.
-
-    While an axis hardly accelerates, what is measured of it is noise, and the best prediction of the effort from that
-    is none: what says so looks like an elastic drive, or like a law of the acceleration. To take a noise of power N out
-    of rows whose effort has E turns their variance from E + N into E: a log evidence of ln(1 + N / E) at every
-    frequency of a record, as far as it has rows, which may add up to `GAINED`. Nothing is beyond the position's
-    cutoff. An effort may hold more than noise where its noise is looked for, and so may what a model leaves: the
-    smaller of the two is taken.
-
-    Args:
-        record: to which it belongs.
-        axis: with its noise.
-        inertia: of it [kg or kg m²].
-        left: power density of what a first estimate leaves of the effort in the rows [per Hz].
-        cutoff: of the position filter [rad/s].
-        moving: part of the record that has rows.
-
-    Raises:
-        EstimationError: too little is left of a record of its duration.
-    """
-    dt, duration = record.sample_time, len(record) * record.sample_time
-    position, effort = (_noise_power(series, dt) for series in (axis.position, axis.effort))
-    frequency = np.fft.rfftfreq(len(record), dt)
-    noise = inertia**2 * position * (2 * math.pi * frequency) ** 4
-    gained = moving * np.cumsum(np.log1p(noise / max(min(effort, left), np.finfo(float).tiny)))
-    highest = 2 * math.pi * float(frequency[np.searchsorted(gained[:-1], GAINED)])
-    # White rows show all that is below half of their rate as well as what is below the cutoff of their filter.
-    limit = min(2 * highest / ROWS_PER_CUTOFF, cutoff, LARGEST_ROWS_CUTOFF / dt)
-    if ROWS_PER_CUTOFF * limit * duration < 2 * math.pi * FEWEST_ROWS:
-        raise EstimationError(
-            f"{record.source}: above {limit / (2 * math.pi):.3g} Hz the acceleration of {axis.label}, differences of a "
-            f"position with {math.sqrt(position / (2 * dt)):.2g} {axis.kind.position_unit} of noise, is less sure than "
-            f"its effort, and {duration:.3g} s of less than that are too few independent rows.",
-            "Record longer, or measure the position more finely.",
-        )
-    return limit
 
 
 def axis_motion(record: AxisRecord, axis: AxisSignals, cutoff: float, bandwidth: float) -> AxisMotion:
@@ -198,10 +155,10 @@ def with_repeats(record: AxisRecord) -> NDArray[np.int64]:
 
 def sample_noise(effort: Array, sample_time: float) -> float:
     """Deviation of white noise that has the power of an effort (N,) in the upper half of its band."""
-    return max(math.sqrt(_noise_power(effort, sample_time) / (2 * sample_time)), np.finfo(float).tiny)
+    return max(math.sqrt(noise_power(effort, sample_time) / (2 * sample_time)), np.finfo(float).tiny)
 
 
-def _noise_power(series: Array, sample_time: float) -> float:
+def noise_power(series: Array, sample_time: float) -> float:
     """Power density of what is left of a series (N,) in the upper half of its band, per hertz."""
     length = max(16, len(series) // SPECTRUM_SEGMENTS)
     frequency, power = signal.welch(series, 1 / sample_time, nperseg=min(length, len(series)), detrend="linear")

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.axis.candidates import axis_candidates
+from ident.diagnosis.axis.candidates import OF_ACCELERATIONS, axis_candidates
 from ident.diagnosis.axis.dependences import axis_dependences
 from ident.diagnosis.axis.model import AxisModel
 from ident.diagnosis.axis.motion import AxisMotion, with_repeats
@@ -82,8 +82,12 @@ def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], lis
     models = [_model(signals, index, scale, first[index]) for index, scale in enumerate(scales)]
     baselines = _baselines(models, signals, reference)
     blocks = [_block(signals, model, columns, period) for model, columns in zip(models, baselines, strict=True)]
-    candidates = [_candidates(model, scale) for model, scale in zip(models, reference.scales, strict=True)]
-    return blocks, candidates, [one for model in models for one in axis_dependences(model)]
+    candidates, dependences = [], []
+    for model, scale, noise in zip(models, reference.scales, reference.noises, strict=True):
+        candidates.append([_paying(one, noise) for one in _candidates(model, scale)])
+        laws = axis_dependences(model)
+        dependences += [replace(one, price=noise) if one.is_noisy else one for one in laws]
+    return blocks, candidates, dependences
 
 
 def delayed_axes(found: Refit, problem: Problem, axes: Sequence[AxisSignals], scales: Sequence[Scale]) -> list[bool]:
@@ -105,6 +109,11 @@ def delayed_axes(found: Refit, problem: Problem, axes: Sequence[AxisSignals], sc
 def _candidates(model: AxisModel, scale: Scale) -> list[Candidate]:
     """Without a delay where the baseline has the lag."""
     return [one for one in axis_candidates(model) if scale.hold is None or one.effect != EffectName.TIME_DELAY]
+
+
+def _paying(candidate: Candidate, noise: float) -> Candidate:
+    """One made of accelerations costs the log evidence that their noise may be."""
+    return replace(candidate, price=candidate.price + noise) if candidate.effect in OF_ACCELERATIONS else candidate
 
 
 def _model(signals: Signals, index: int, scale: Scale, first: int) -> AxisModel:

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.axis.acceleration_noise import acceleration_noise, noise_limit
 from ident.diagnosis.axis.motion import (
     FEWEST_ROWS,
     LEAST_BAND,
@@ -18,7 +19,6 @@ from ident.diagnosis.axis.motion import (
     AxisMotion,
     axis_motion,
     effort_bandwidth,
-    noise_limit,
     repeat_duration,
     sample_noise,
 )
@@ -50,12 +50,14 @@ class Reference:
         bandwidth: of the filter that all columns and the effort pass [rad/s].
         scales: of every axis.
         strange: nominal sample times of records that confirm, of which none of the fit is [s].
+        noises: log evidence that the noise of an acceleration may be for what is made of it, of every axis.
     """
 
     cutoff: float
     bandwidth: float
     scales: tuple[Scale, ...]
     strange: tuple[float, ...] = ()
+    noises: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -150,12 +152,18 @@ def axis_reference(
     alike = [_scale(signals, index) for index in range(len(records[0].axes))]
     scales = tuple(replace(scale, holds=_holds(apart, index, scale.values)) for index, scale in enumerate(alike))
     moving = [np.mean(np.concatenate([one.motions[index].moving for one in signals])) for index in range(len(scales))]
-    limits = [
-        noise_limit(record, axis, scale.values[0], scale.noise, chosen, float(part))
+    noises = [
+        [
+            acceleration_noise(record, axis, scale.values[0], scale.noise, float(part))
+            for axis, scale, part in zip(record.axes, scales, moving, strict=True)
+        ]
         for record in everyone
-        for axis, scale, part in zip(record.axes, scales, moving, strict=True)
     ]
-    limit = min(limits)
+    limit = min(
+        noise_limit(record, axis, noise, chosen)
+        for record, own in zip(everyone, noises, strict=True)
+        for axis, noise in zip(record.axes, own, strict=True)
+    )
     bandwidth = max(
         effort_bandwidth(
             one.smoothed_columns(index) @ scale.values, repeat_duration(one.record), limit, one.record.sample_time
@@ -168,6 +176,7 @@ def axis_reference(
         bandwidth,
         scales,
         tuple(sorted({nominal(record.sample_time) for record in strange})),
+        tuple(sum(noise.within(bandwidth) for noise in own) for own in zip(*noises, strict=True)),
     )
 
 

@@ -153,7 +153,7 @@ class _Answer:
             return corrected
         if refuted := self._sizeless() or self._widening():
             return self._without(refuted=refuted)
-        return self._without(needless=needless) if (needless := self._needless()) else None
+        return self._without(refuted=needless) if (needless := self._needless()) else None
 
     def _without(self, **lost: Sequence[int]) -> tuple[Search, State]:
         """The search and its set without members that have lost their places, by the reason."""
@@ -172,8 +172,6 @@ class _Answer:
         if not places:
             return None
         _, rival, index = max(places)
-        if rival in self.search.needless:
-            return self._without(needless=[index])
         search = self.search.without(passed_over=[index])
         return search, search.further(self.slots[index].rivals[rival])
 

@@ -178,7 +178,7 @@ class _Builder:
             knots = designs.knots(number)
             blocks = () if knots is None else self._function(designs.columns(number), knots)
             if blocks:
-                found.append(Hypothesis(dependence.key, LAW, price, blocks, dependence=number))
+                found.append(Hypothesis(dependence.key, LAW, price + dependence.price, blocks, dependence=number))
         return found
 
     def _block(self, column: Column, sizes: Array, weight: float, candidate: Candidate) -> Block:

@@ -31,31 +31,19 @@ class Search:
     Args:
         fitter: of the sets.
         refuted: hypotheses that the records speak against.
-        passed_over: those that others are more likely than; they may still be what another one is taken for.
-        needless: those that make next to no difference; what they are more likely than makes none either.
+        passed_over: those that are not worth a place of their own; they may still be what another one is taken for.
     """
 
     def __init__(
-        self,
-        fitter: Fitter,
-        refuted: frozenset[int] = frozenset(),
-        passed_over: frozenset[int] = frozenset(),
-        needless: frozenset[int] = frozenset(),
+        self, fitter: Fitter, refuted: frozenset[int] = frozenset(), passed_over: frozenset[int] = frozenset()
     ) -> None:
         self.fitter, self.design = fitter, fitter.design
         self.refuted = refuted | fitter.invisible
-        self.passed_over, self.needless = passed_over, needless
+        self.passed_over = passed_over
 
-    def without(
-        self, *, refuted: Collection[int] = (), passed_over: Collection[int] = (), needless: Collection[int] = ()
-    ) -> Search:
-        """The same search without some hypotheses more."""
-        return Search(
-            self.fitter,
-            self.refuted | frozenset(refuted),
-            self.passed_over | frozenset(passed_over),
-            self.needless | frozenset(needless),
-        )
+    def without(self, *, refuted: Collection[int] = (), passed_over: Collection[int] = ()) -> Search:
+        """The same search, some hypotheses more refuted, or passed over."""
+        return Search(self.fitter, self.refuted | frozenset(refuted), self.passed_over | frozenset(passed_over))
 
     def run(self) -> State:
         """The best set that was found."""
@@ -99,7 +87,7 @@ class Search:
         """
         hypotheses = self.design.hypotheses
         whole, usual = self.fitter.among_all(state), self.fitter.with_nothing_lacking(state)
-        found, barred = dict[int, Member](), self.refuted | self.passed_over | self.needless
+        found, barred = dict[int, Member](), self.refuted | self.passed_over
         for one in (whole, usual) if usual.evidence is not whole.evidence else (whole,):
             tables = {
                 index: table

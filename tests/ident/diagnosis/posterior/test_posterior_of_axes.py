@@ -118,6 +118,25 @@ def test_an_effort_is_late_with_all_that_is_in_it(said: Say, law: Law, name: str
     assert {effect.name for effect in answer.effects} == {name, EffectName.TIME_DELAY}
 
 
+def test_beside_a_delay_a_drag_is_as_sure_as_without_one(said: Say) -> None:
+    """Without repeats the noise is what is left: of a set, not of columns that a delay has only near zero."""
+    alone, late = (
+        next(one for one in said(law=drag, delay=delay).effects if one.name == EffectName.QUADRATIC_DRAG)
+        for delay in (0.0, 0.0045)
+    )
+    alone_std, late_std = (one.parameters["coefficient"].std for one in (alone, late))
+    assert late.parameters["coefficient"].value == pytest.approx(12.0, abs=3 * late_std)
+    assert late_std < 1.5 * alone_std
+
+
+@pytest.mark.parametrize("seed", [14, 15, 17, 18, 20])
+def test_noise_of_an_acceleration_is_no_law_of_a_load(seed: int) -> None:
+    """An encoder of 10 um makes accelerations whose noise the effort does not have: its rows end where that begins."""
+    machine = Machine(rate=100.0, substeps=40, repeats=1, duration=30.0, noise=2.0, encoder=1e-5)
+    findings = diagnose_axis([machine.drive(seed)], [], seed=1, judged=judge_by_posterior)
+    assert findings.verdict is Verdict.NONE
+
+
 def test_probabilities_and_sets_are_those_of_all_that_may_stand_there(said: Say) -> None:
     """A drag of half a noise unit may be friction that falls with speed: both are in the set, and share."""
     (effect,) = said(law=faint_drag).effects

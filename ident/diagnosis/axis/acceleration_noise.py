@@ -1,0 +1,98 @@
+"""What the noise of a measured acceleration looks like: an elastic drive, a law of the load."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.axis.motion import FEWEST_ROWS, LARGEST_ROWS_CUTOFF, noise_power
+from ident.diagnosis.rows import ROWS_PER_CUTOFF
+from ident.errors import EstimationError
+from ident.records.axis_record import AxisRecord, AxisSignals
+
+Array = NDArray[np.float64]
+
+GAINED: Final = 3.0
+"""Log evidence that an acceleration without its noise may bring: odds of 20 to 1, at which a name is sure."""
+
+
+@dataclass(frozen=True)
+class AccelerationNoise:
+    """What a measured acceleration has of noise, as evidence for what would take it out of the rows.
+
+    While an axis hardly accelerates, what is measured of it is noise, and the best prediction of the effort from that
+    is none: what says so looks like an elastic drive, or like a law of the acceleration. To take a noise of power N out
+    of rows whose effort has E turns their variance from E + N into E: a log evidence of ln(1 + N / E) at every
+    frequency of a record, as far as it has rows.
+
+    Attributes:
+        frequency: (F,) rising [Hz].
+        gained: (F,) log evidence up to there.
+    """
+
+    frequency: Array
+    gained: Array
+
+    @property
+    def limit(self) -> float:
+        """Frequency [rad/s] up to which it adds up to `GAINED`."""
+        return 2 * math.pi * float(self.frequency[np.searchsorted(self.gained[:-1], GAINED)])
+
+    def within(self, bandwidth: float) -> float:
+        """Log evidence in rows of a bandwidth [rad/s]: white ones show what is below half of their rate."""
+        shown = ROWS_PER_CUTOFF / 2 * bandwidth / (2 * math.pi)
+        return float(np.interp(shown, self.frequency, self.gained))
+
+
+def acceleration_noise(
+    record: AxisRecord, axis: AxisSignals, inertia: float, left: float, moving: float
+) -> AccelerationNoise:
+    """Of one axis.
+
+    An effort may hold more than noise where its noise is looked for, and so may what a model leaves: the smaller of the
+    two is taken.
+
+    Args:
+        record: to which it belongs.
+        axis: with its noise.
+        inertia: of it [kg or kg m²].
+        left: power density of what a first estimate leaves of the effort in the rows [per Hz].
+        moving: part of the record that has rows.
+    """
+    dt = record.sample_time
+    position, effort = (noise_power(series, dt) for series in (axis.position, axis.effort))
+    frequency = np.fft.rfftfreq(len(record), dt)
+    noise = inertia**2 * position * (2 * math.pi * frequency) ** 4
+    gained = moving * np.cumsum(np.log1p(noise / max(min(effort, left), np.finfo(float).tiny)))
+    return AccelerationNoise(np.asarray(frequency, dtype=np.float64), gained)
+
+
+def noise_limit(record: AxisRecord, axis: AxisSignals, noise: AccelerationNoise, cutoff: float) -> float:
+    """Bandwidth [rad/s] of rows in which the noise of the acceleration brings no more than `GAINED` below it.
+
+    No rows are beyond the position's cutoff.
+
+    Args:
+        record: to which it belongs.
+        axis: one of its axes.
+        noise: of that.
+        cutoff: of the position filter [rad/s].
+
+    Raises:
+        EstimationError: too little is left of a record of its duration.
+    """
+    dt, duration = record.sample_time, len(record) * record.sample_time
+    limit = min(noise.limit, cutoff, LARGEST_ROWS_CUTOFF / dt)
+    if ROWS_PER_CUTOFF * limit * duration < 2 * math.pi * FEWEST_ROWS:
+        scatter = math.sqrt(noise_power(axis.position, dt) / (2 * dt))
+        raise EstimationError(
+            f"{record.source}: above {limit / (2 * math.pi):.3g} Hz the acceleration of {axis.label}, differences of a "
+            f"position with {scatter:.2g} {axis.kind.position_unit} of noise, is less sure than "
+            f"its effort, and {duration:.3g} s of less than that are too few independent rows.",
+            "Record longer, or measure the position more finely.",
+        )
+    return limit
