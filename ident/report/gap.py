@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,7 +77,8 @@ class Row:
         name, where: what and where.
         probability: that the name is right.
         numbers: parameters with standard deviations.
-        evidence, predictive: log Bayes factors of all records and of the confirming rows.
+        evidence: log Bayes factor of all records.
+        predictive: that of the confirming rows, in words: not all that judge ask for it.
         closed: share of the held-out gap.
         rivals: what these records do not tell apart from it.
         biased: parameters that shift by more than BIASED standard deviations when it is left out.
@@ -87,7 +89,7 @@ class Row:
     probability: float
     numbers: str
     evidence: float
-    predictive: float
+    predictive: str
     closed: float
     rivals: str
     biased: str
@@ -184,7 +186,7 @@ def _row(cause: Cause, content: GapReport) -> Row:
         probability=cause.probability,
         numbers=", ".join(f"{p.name} {digits.with_std(v, s)} {digits.unit_text(p.unit)}" for p, v, s in values),
         evidence=cause.log_evidence,
-        predictive=cause.log_predictive,
+        predictive="–" if math.isnan(cause.log_predictive) else f"{cause.log_predictive:.1f}",
         closed=cause.closed,
         rivals=", ".join(rivals) or "–",
         biased=", ".join(f"{symbol} by {shift:+.1f} std" for symbol, shift in biased) or "–",

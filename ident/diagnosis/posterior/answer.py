@@ -4,39 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logsumexp
 
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import LAW, Cause, Findings, ordered
 from ident.diagnosis.fitted import Fitted
 from ident.diagnosis.law.answer import Alternative, LawAnswer, alternatives, law_answer, same_names
 from ident.diagnosis.law.free import Curve
-from ident.diagnosis.law.learning import Designs
 from ident.diagnosis.law.neighbours import channel_of
 from ident.diagnosis.law.reach import told_samples
 from ident.diagnosis.law.stage import Law
 from ident.diagnosis.limits import Limits
 from ident.diagnosis.orders import with_orders
-from ident.diagnosis.posterior.bends import Bends
-from ident.diagnosis.posterior.fitting import Fitter
-from ident.diagnosis.posterior.hidden import with_hidden_orders
-from ident.diagnosis.posterior.hypotheses import Design, make_design
-from ident.diagnosis.posterior.noise import SIZES, Colours, Left
+from ident.diagnosis.posterior.asked import Asked, asked_beside, asked_of
+from ident.diagnosis.posterior.noise import SIZES
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.posterior.slots import slot_of
 from ident.diagnosis.posterior.state import State
 from ident.diagnosis.posterior.taken import as_variants
 from ident.diagnosis.problem import Problem
-from ident.diagnosis.regression import Regression
 from ident.diagnosis.remainder import repeated, shares
-from ident.diagnosis.rows import make_rows
 from ident.diagnosis.search import Taken
-from ident.diagnosis.settings import Settings
 from ident.diagnosis.sized import is_foreign, is_nothing, is_sizeless
 from ident.stages import Stage, untold
 
@@ -68,13 +61,12 @@ def judge_by_posterior(fit: Problem, confirm: Problem, *, seed: int, stage: Stag
         stage: told what begins.
     """
     stage(f"comparing {len(fit.candidates)} causes and {len(fit.dependences)} laws")
-    asked = _asked(with_orders((fit, confirm)), seed)
+    asked = asked_of(with_orders((fit, confirm)), seed)
     search = Search(asked.fitter)
     state = search.run()
-    if (again := _asked_beside(asked, state)) is not None:
+    if (again := asked_beside(asked, state)) is not None:
         stage("again beside what is there")
-        asked = again
-        search = Search(asked.fitter)
+        asked, search = again, Search(again.fitter)
         state = search.run()
     stage("numbers of the answer")
     answer = _Answer(asked, search, state)
@@ -84,49 +76,10 @@ def judge_by_posterior(fit: Problem, confirm: Problem, *, seed: int, stage: Stag
     return answer.findings()
 
 
-@dataclass(frozen=True)
-class _Asked:
-    """What the posterior is asked.
-
-    Attributes:
-        problems: to fit and to confirm.
-        regression: their rows.
-        designs: of their laws.
-        design: of all hypotheses.
-        fitter: of sets of them.
-        seed: of the smooth function of what is left.
-    """
-
-    problems: tuple[Problem, ...]
-    regression: Regression
-    designs: Designs
-    design: Design
-    fitter: Fitter
-    seed: int
-
-
-def _asked_beside(asked: _Asked, state: State) -> _Asked | None:
-    """The same asked with what was hidden by a set: the noise of rows without repeats, orders of ripples."""
-    if not state.members:
-        return None
-    hidden = with_hidden_orders(asked.problems, asked.design, asked.designs, state)
-    left = None if Colours.repeats(asked.regression) else asked.fitter.left(state)
-    if hidden is None and left is None:
-        return None
-    return _asked(asked.problems if hidden is None else hidden, asked.seed, left)
-
-
-def _asked(problems: tuple[Problem, ...], seed: int, left: Left | None = None) -> _Asked:
-    regression = Regression(problems[0], make_rows(*problems), Settings(), seed)
-    colours, designs = Colours(regression, left), Designs(problems, regression.rows)
-    design = make_design(problems, regression, colours, designs)
-    return _Asked(problems, regression, designs, design, Fitter(design, colours, Bends(problems, colours)), seed)
-
-
 class _Answer:
     """What is computed of the best set."""
 
-    def __init__(self, asked: _Asked, search: Search, state: State) -> None:
+    def __init__(self, asked: Asked, search: Search, state: State) -> None:
         self.search, self.state, self.design, self._seed = search, state, asked.design, asked.seed
         excess, whole = search.fitter.excess(state), search.fitter.among_all(state)
         self.slots = {index: slot_of(search, whole, index, excess[index]) for index in state.members}
@@ -231,7 +184,7 @@ class _Answer:
         return Findings(
             verdict=verdict,
             causes=causes,
-            doubtful={},
+            doubtful=self._doubtful(),
             events=(),
             gap=fitted.settled if verdict is Verdict.NONE else fitted.exactly,
             where=shares(regression.rows, fitted.floors, fitted.judged()),
@@ -246,6 +199,18 @@ class _Answer:
             problem=self.taken.problems[0],
             held_out=fitted.held_out(),
         )
+
+    def _doubtful(self) -> dict[str, float]:
+        """Probability of everything beside the set, or in its place if that is empty, the greatest first."""
+        hypotheses = self.design.hypotheses
+        tables = self.search.fitter.among_all(self.state).tables()
+        odds = {
+            index: table.total - hypotheses[index].price
+            for index, table in tables.items()
+            if table.is_there and index not in self.search.refuted
+        }
+        whole = float(logsumexp([0.0, *odds.values()]))
+        return {hypotheses[one].key: math.exp(odds[one] - whole) for one in sorted(odds, key=lambda one: -odds[one])}
 
     def _lacking(self) -> bool:
         """Whether more is lacking somewhere than noise and tolerance that are not known exactly."""

@@ -1,0 +1,63 @@
+"""What the posterior is asked, and asked again with what a set that was found hid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ident.diagnosis.law.learning import Designs
+from ident.diagnosis.posterior.bends import Bends
+from ident.diagnosis.posterior.fitting import Fitter
+from ident.diagnosis.posterior.hidden import with_hidden_orders
+from ident.diagnosis.posterior.hypotheses import Design, make_design
+from ident.diagnosis.posterior.noise import Colours, Left
+from ident.diagnosis.posterior.state import State
+from ident.diagnosis.problem import Problem
+from ident.diagnosis.regression import Regression
+from ident.diagnosis.rows import make_rows
+from ident.diagnosis.settings import Settings
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the posterior is asked.
+
+    Attributes:
+        problems: to fit and to confirm.
+        regression: their rows.
+        designs: of their laws.
+        design: of all hypotheses.
+        fitter: of sets of them.
+        seed: of the smooth function of what is left.
+    """
+
+    problems: tuple[Problem, ...]
+    regression: Regression
+    designs: Designs
+    design: Design
+    fitter: Fitter
+    seed: int
+
+
+def asked_beside(asked: Asked, state: State) -> Asked | None:
+    """The same asked with what was hidden by a set: the noise of rows without repeats, orders of ripples."""
+    if not state.members:
+        return None
+    hidden = with_hidden_orders(asked.problems, asked.design, asked.designs, state)
+    left = None if Colours.repeats(asked.regression) else asked.fitter.left(state)
+    if hidden is None and left is None:
+        return None
+    return asked_of(asked.problems if hidden is None else hidden, asked.seed, left)
+
+
+def asked_of(problems: tuple[Problem, ...], seed: int, left: Left | None = None) -> Asked:
+    """Everything that may be there, and what fits it.
+
+    Args:
+        problems: to fit and to confirm.
+        seed: of the smooth function of what is left.
+        left: what a set leaves of their rows.
+    """
+    regression = Regression(problems[0], make_rows(*problems), Settings(), seed)
+    colours, designs = Colours(regression, left), Designs(problems, regression.rows)
+    design = make_design(problems, regression, colours, designs)
+    return Asked(problems, regression, designs, design, Fitter(design, colours, Bends(problems, colours)), seed)
