@@ -20,7 +20,7 @@ from hil.exam.folder import RECORDS, Core, ExamFolder, read_exam
 from hil.exam.record_bytes import record_from_bytes
 from hil.exam.workers import run_all
 from ident.diagnosis.alone import closed_alone
-from ident.diagnosis.axis.diagnose import diagnose_axis
+from ident.diagnosis.axis.diagnose import STANDING, diagnose_axis
 from ident.diagnosis.diagnosis import faulty
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.judge import Judge, judge
@@ -225,7 +225,7 @@ def described(vehicle: str, model: str) -> tuple[VehicleDescription, ExtendedMod
 
 
 def diagnose_axis_case(
-    identifier: str, fit: bytes, confirm: bytes, removed: str | None, judged: Judge = judge_by_posterior
+    identifier: str, fit: bytes, confirm: bytes, removed: str | None, judged: Judge = STANDING
 ) -> tuple[str, bytes]:
     """The same of a case of an axis."""
     forbid_emulator()
@@ -241,7 +241,7 @@ def diagnose_axis_case(
 _FUNCTIONS: Final[Mapping[tuple[Core, bool], Callable[..., tuple[str, bytes]]]] = MappingProxyType(
     {
         (Core.STANDING, False): diagnose_case,
-        (Core.STANDING, True): partial(diagnose_axis_case, judged=judge),
+        (Core.STANDING, True): diagnose_axis_case,
         (Core.ONE, False): partial(diagnose_case, judged=judge_by_posterior),
         (Core.ONE, True): partial(diagnose_axis_case, judged=judge_by_posterior),
     }
