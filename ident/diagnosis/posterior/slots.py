@@ -15,12 +15,16 @@ from scipy.special import logsumexp
 from ident.diagnosis.posterior.hypotheses import Hypothesis
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.posterior.state import State
-from ident.diagnosis.probability import ALIKE, Ranked
+from ident.diagnosis.probability import Ranked
+from ident.diagnosis.regression import SAME
 
 Array = NDArray[np.float64]
 
 NEAR: Final = 6.0
-"""Log posterior below a member's from which a rival is fitted exactly as well: one in four hundred."""
+"""Log posterior below a member's up to which a rival is fitted exactly as well: one in four hundred."""
+
+BETWEEN: Final = 0.2
+"""The same as a part of a member's: what columns may lack whose numbers lie between those that they were made for."""
 
 RIVALS: Final = 4
 """That are fitted exactly."""
@@ -112,7 +116,7 @@ def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
     rivals = {
         rival: search.fitter.state({**others, rival: without.target.table(rival, beside).best}, state)
         for rival in near
-        if tempered(rival) > tempered(index) - NEAR
+        if tempered(rival) > tempered(index) - max(NEAR, BETWEEN * tempered(index))
     }
     for rival, fitted in rivals.items():
         logs[rival] = fitted.log_posterior - bare
@@ -124,7 +128,7 @@ def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
     alike = [
         one
         for one, (cosine, size) in cosines.items()
-        if cosine > ALIKE and size == width and one != index and not (hypotheses[one].free or hypotheses[index].free)
+        if cosine > SAME and size == width and one != index and not (hypotheses[one].free or hypotheses[index].free)
     ]
     return Slot(logs, {one: cosine for one, (cosine, _) in cosines.items()}, (index, *alike), rivals)
 

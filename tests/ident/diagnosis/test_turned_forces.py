@@ -1,0 +1,100 @@
+"""An effect that turns the forces of others: an effort is late with everything in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ident.diagnosis.posterior.answer import judge_by_posterior
+from ident.diagnosis.problem import Candidate, Problem, Series, forces_of, turned_by
+from ident.diagnosis.refit import Refit, refit
+from ident.diagnosis.regression import Regression
+from ident.diagnosis.rows import make_rows
+from ident.diagnosis.settings import Settings
+
+Array = NDArray[np.float64]
+
+TURNING, TURNED = 0.5, 0.3
+
+
+def scaled(series: Series, size: float) -> list[Array | None]:
+    return [None if one is None else size * one for one in series]
+
+
+def columns_of(candidate: Candidate) -> list[Array | None]:
+    """Of the only column of its first variant."""
+    return [None if one is None else one[:, 0] for one in candidate.variants[0].columns]
+
+
+def with_gain(problem: Problem) -> Problem:
+    """`a` adds its column and makes all forces as much greater; `c` has a force. Both are in the target."""
+    a, c = (problem.candidate(f"{name}@place") for name in ("a", "c"))
+    own, force = columns_of(a), columns_of(c)
+    a = replace(
+        a,
+        contribution=lambda values, _: scaled(own, float(values[0])),
+        turned=lambda values, forces: scaled(forces, float(values[0])),
+    )
+    c = replace(c, force=lambda values, _: scaled(force, float(values[0])))
+    blocks = tuple(
+        replace(block, target=block.target + TURNING * one + (1 + TURNING) * TURNED * other)
+        for block, one, other in zip(problem.blocks, own, force, strict=True)
+        if one is not None and other is not None
+    )
+    changed = {"a": a, "c": c}
+    candidates = tuple(changed.get(one.effect, one) for one in problem.candidates)
+    return replace(problem, blocks=blocks, candidates=candidates)
+
+
+@pytest.fixture
+def problems(world: type[Any]) -> tuple[Problem, Problem]:
+    drawn = world(seed=17, samples=1600)
+    return with_gain(drawn.problem(0)), with_gain(drawn.problem(1))
+
+
+def refitted(problems: Sequence[Problem]) -> Refit:
+    regression = Regression(problems[0], make_rows(*problems), Settings(), 1)
+    keys = [problems[0].candidates[column.candidate].key for column in regression.rows.layout]
+    variants = [keys.index(key) for key in ("a@place", "c@place")]
+    everything = np.ones(len(regression.rows), dtype=bool)
+    return refit(problems, regression, variants, regression.whitener(variants), everything)
+
+
+def test_sizes_beside_what_turns_them_are_their_own(problems: tuple[Problem, Problem]) -> None:
+    for part, true in zip(refitted(problems).parts, (TURNING, TURNED), strict=True):
+        assert part.values[0] == pytest.approx(true, abs=3 * part.std[0])
+        assert part.std[0] < 0.03
+
+
+def test_without_being_turned_a_size_is_what_became_of_it(problems: tuple[Problem, Problem]) -> None:
+    adding = [
+        replace(problem, candidates=tuple(replace(one, turned=None) for one in problem.candidates))
+        for problem in problems
+    ]
+    _, part = refitted(adding).parts
+    assert part.values[0] == pytest.approx((1 + TURNING) * TURNED, abs=3 * part.std[0])
+
+
+def test_the_posterior_finds_both_with_their_sizes(problems: tuple[Problem, Problem]) -> None:
+    found = {str(cause.candidate.effect): cause.part for cause in judge_by_posterior(*problems, seed=1).causes}
+    assert set(found) == {"a", "c"}
+    for name, true in (("a", TURNING), ("c", TURNED)):
+        assert found[name].values[0] == pytest.approx(true, abs=3 * found[name].std[0])
+
+
+def test_forces_and_what_is_made_of_them_follow_the_blocks_of_both_problems(
+    problems: tuple[Problem, Problem],
+) -> None:
+    late, ripple = ([problem.candidate(key) for problem in problems] for key in ("a@place", "c@place"))
+    forces = forces_of(ripple, np.array([2.0]), np.zeros(3))
+    turned = turned_by(late, np.array([3.0]), forces)
+    assert len(forces) == len(turned) == sum(len(problem.blocks) for problem in problems)
+    for force, one in zip(forces, turned, strict=True):
+        assert force is not None
+        assert one is not None
+        np.testing.assert_allclose(one, 3.0 * force)
