@@ -26,6 +26,8 @@ Series = Sequence[Array | None]
 """One (N,) a block, None where it is zero."""
 Contribution = Callable[[Array, Array], Series]
 """Values of the parameters (k,) and of the baseline (p,) -> what a candidate adds to the model of every block, (N,)."""
+Turned = Callable[[Array, Series], Series]
+"""Values of the parameters (k,) and forces of others -> what a candidate makes of those."""
 
 
 class Channel(enum.StrEnum):
@@ -149,6 +151,7 @@ class Candidate:
         curve: whose friction over the speed it changes, if it is a friction.
         periodic: of a wave over an angle; its variants are then those of the orders that the records show.
         price: log evidence that the choice of its variants costs beyond that of its coefficients.
+        noise: log evidence that the noise of what its columns are made of may be for it.
         learnt: its columns are a function that was learnt on fitted rows and tried on the confirming ones, uncertain
             where the fitted ones are few; they need not confirm it again as if it were known exactly.
         usual: its size in practice; inf where nothing is known of it.
@@ -161,7 +164,7 @@ class Candidate:
     variants: tuple[Variant, ...]
     contribution: Contribution | None = None
     force: Contribution | None = None
-    turned: Callable[[Array, Series], Series] | None = None
+    turned: Turned | None = None
     drift: bool = False
     least: float | None = None
     negligible: tuple[float, float] = (0.0, 0.0)
@@ -175,6 +178,7 @@ class Candidate:
     along: str = ""
     periodic: Periodic | None = None
     price: float = 0.0
+    noise: float = 0.0
     learnt: bool = False
     usual: float = math.inf
 
@@ -184,14 +188,21 @@ class Candidate:
         return f"{self.effect}@{self.where}"
 
 
-def forces_of(candidates: Sequence[Candidate], values: Array, baseline: Array) -> Series:
-    """Force of a candidate of some parameters (k,) beside those of the baseline (p,); it has one.
+def contributions_of(candidates: Sequence[Candidate], values: Array, baseline: Array) -> Series:
+    """What a candidate of some parameters (k,) adds beside those of the baseline (p,); it has an exact form.
 
     Args:
         candidates: it in all problems, as their blocks follow each other.
         values, baseline: of the parameters.
     """
-    return [one for each in candidates if each.force is not None for one in each.force(values, baseline)]
+    forms = [each.contribution for each in candidates if each.contribution is not None]
+    return [one for form in forms for one in form(values, baseline)]
+
+
+def forces_of(candidates: Sequence[Candidate], values: Array, baseline: Array) -> Series:
+    """The same of its force; it has one."""
+    forms = [each.force for each in candidates if each.force is not None]
+    return [one for form in forms for one in form(values, baseline)]
 
 
 def turned_by(candidates: Sequence[Candidate], values: Array, forces: Series) -> Series:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.linear import least_squares, stretch_sums
-from ident.diagnosis.problem import Candidate, Problem, Series, forces_of, summed, turned_by
+from ident.diagnosis.problem import Candidate, Problem, Series, Turned, contributions_of, forces_of, summed, turned_by
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Column, Rows
 from ident.diagnosis.whitening import Whitening
@@ -84,7 +84,7 @@ class _Unknown:
     exact: Callable[[Array, Array], Series] | None
     columns: tuple[Array | None, ...]
     finish: Callable[[Array], Array]
-    turned: Callable[[Array, Series], Series] | None = None
+    turned: Turned | None = None
 
     def series(self, values: Array, baseline: Array) -> Series:
         """What it adds to every block, (N,)."""
@@ -247,16 +247,39 @@ class _Model:
     def _series(self, unknown: _Unknown, own: Array, values: Array) -> Series:
         """What an effect of some numbers adds to every block, and makes of the forces of others, of those in `values`.
 
-        What turns others is not turned. Slopes of the others are those without: they lead to the same numbers.
+        What turns others is not turned.
         """
         baseline = values[: self.size]
         series = unknown.series(own, baseline)
-        forces = [one.forces(values[one.place], baseline) for one in self.unknowns if one.has_force]
-        if unknown.turned is None or not forces:
+        if unknown.turned is None:
             return series
-        return summed([series, unknown.turned(own, summed(forces))])
+        forces = [one.forces(values[one.place], baseline) for one in self.unknowns if one.has_force]
+        return summed([series, unknown.turned(own, summed(forces))]) if forces else series
 
     def _derivative(self, number: int, values: Array) -> Array:
+        own = self._own_derivative(number, values)
+        turning = [one for one in self.unknowns if one.turned is not None]
+        return own + self._turned_derivative(number, values, turning) if turning else own
+
+    def _turned_derivative(self, number: int, values: Array, turning: Sequence[_Unknown]) -> Array:
+        """Derivative of what others make of the force of one effect."""
+        unknown, baseline = self.unknowns[number], values[: self.size]
+        own, columns = values[unknown.place], []
+        if not unknown.has_force:
+            return np.zeros((len(self.rows), len(own)))
+        here = unknown.forces(own, baseline)
+        for index, step in enumerate(_steps(own)):
+            ahead = own.copy()
+            ahead[index] += step
+            change = [
+                None if one is None or other is None else (one - other) / step
+                for one, other in zip(unknown.forces(ahead, baseline), here, strict=True)
+            ]
+            turned = [one.turned(values[one.place], change) for one in turning if one.turned is not None]
+            columns.append(self.rows.stack(summed(turned)))
+        return np.stack(columns, axis=1)
+
+    def _own_derivative(self, number: int, values: Array) -> Array:
         unknown = self.unknowns[number]
         own = values[unknown.place]
         if unknown.exact is None:
@@ -300,12 +323,9 @@ def _unknown(
         place = slice(first, first + len(coefficients))
         return _Unknown(candidates, place, None, columns, finish), coefficients
 
-    def exact(values: Array, baseline: Array) -> Series:
-        forms = [candidate.contribution for candidate in candidates]
-        return [one for form in forms if form is not None for one in form(values, baseline)]
-
     start = np.asarray(finish(coefficients), dtype=float)
     turned = None if candidates[0].turned is None else partial(turned_by, candidates)
+    exact = partial(contributions_of, candidates)
     return _Unknown(candidates, slice(first, first + len(start)), exact, columns, _same, turned), start
 
 

@@ -195,7 +195,8 @@ def _backlash(axis: AxisModel) -> Candidate:
     )
     gaps = [gap for share in BACKLASH_GAPS if (gap := share * axis.reach) > axis.nearest]
     variants = tuple(variant(gap) for gap in gaps or [2 * axis.nearest])
-    return Candidate(EffectName.BACKLASH, axis.place, parameters, variants, least=LEAST_SHARE, part=GRID)
+    _, force = axis.exactly(lambda values, _baseline: values[1] * missing(float(values[0])))
+    return Candidate(EffectName.BACKLASH, axis.place, parameters, variants, force=force, least=LEAST_SHARE, part=GRID)
 
 
 def in_gap(position: Array, gap: float) -> Array:
@@ -280,6 +281,7 @@ OF_ACCELERATIONS: Final = frozenset(
         EffectName.TIME_DELAY,
         EffectName.TORQUE_FILTER,
         EffectName.ELASTICITY,
+        EffectName.BACKLASH,
         EffectName.FRICTION_LOAD,
         AxisEffect.INERTIA_POSITION,
     }

@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.axis.motion import AxisMotion
 from ident.diagnosis.law.dependence import Partner, Variable
-from ident.diagnosis.problem import Candidate, Contribution, Series, Variant
+from ident.diagnosis.problem import Candidate, Contribution, Series, Turned, Variant
 from ident.effects import EffectParameter
 from ident.records.axis_record import AxisKind
 
 Array = NDArray[np.float64]
 Filter = Callable[[Array], Array]
 Response = Callable[[Array, Array], Array]
-Turned = Callable[[Array, Series], Series]
 
 
 class AxisEffect(enum.StrEnum):
@@ -114,7 +113,7 @@ class AxisModel:
 
         def turned(values: Array, forces: Series) -> Series:
             own = forces[self.block]
-            return forces if own is None else self.alone(response(values, own) - own)
+            return (None,) * self.blocks if own is None else self.alone(response(values, own) - own)
 
         return contribution, turned
 

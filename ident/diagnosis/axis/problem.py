@@ -25,7 +25,7 @@ from ident.diagnosis.axis.scale import Scale, nominal
 from ident.diagnosis.delays import HELD
 from ident.diagnosis.law.dependence import Dependence, across
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant, forces_of, turned_by
+from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant, contributions_of, forces_of, turned_by
 from ident.diagnosis.refit import Refit
 from ident.estimate.axis.identify import PARAMETER_UNITS
 from ident.estimate.axis.processing import PARAMETERS
@@ -84,9 +84,9 @@ def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], lis
     blocks = [_block(signals, model, columns, period) for model, columns in zip(models, baselines, strict=True)]
     candidates, dependences = [], []
     for model, scale, noise in zip(models, reference.scales, reference.noises, strict=True):
-        candidates.append([_paying(one, noise) for one in _candidates(model, scale)])
-        laws = axis_dependences(model)
-        dependences += [replace(one, price=noise) if one.is_noisy else one for one in laws]
+        own = _candidates(model, scale)
+        candidates.append([replace(one, noise=noise) if one.effect in OF_ACCELERATIONS else one for one in own])
+        dependences += [replace(one, noise=noise) if one.is_noisy else one for one in axis_dependences(model)]
     return blocks, candidates, dependences
 
 
@@ -109,11 +109,6 @@ def delayed_axes(found: Refit, problem: Problem, axes: Sequence[AxisSignals], sc
 def _candidates(model: AxisModel, scale: Scale) -> list[Candidate]:
     """Without a delay where the baseline has the lag."""
     return [one for one in axis_candidates(model) if scale.hold is None or one.effect != EffectName.TIME_DELAY]
-
-
-def _paying(candidate: Candidate, noise: float) -> Candidate:
-    """One made of accelerations costs the log evidence that their noise may be."""
-    return replace(candidate, price=candidate.price + noise) if candidate.effect in OF_ACCELERATIONS else candidate
 
 
 def _model(signals: Signals, index: int, scale: Scale, first: int) -> AxisModel:
@@ -229,11 +224,7 @@ def _across(parts: Sequence[Candidate]) -> Candidate:
         for each in zip(*(part.variants for part in parts), strict=True)
     )
 
-    def contribution(values: Array, baseline: Array) -> tuple[Array | None, ...]:
-        series = (part.contribution(values, baseline) for part in parts if part.contribution is not None)
-        return tuple(one for each in series for one in each)
-
-    exact = contribution if first.contribution is not None else None
+    exact = None if first.contribution is None else partial(contributions_of, parts)
     force = None if first.force is None else partial(forces_of, parts)
     turned = None if first.turned is None else partial(turned_by, parts)
     return replace(first, variants=variants, contribution=exact, force=force, turned=turned)

@@ -63,7 +63,7 @@ class Dependence:
         design: columns of every block for some functions of the variable.
         of: which motion, where that is not the place's own or comes around: another axis, a sum with it, a turn.
         period: of the variable where it comes around, else 0.
-        price: log evidence that a law of it must bring beyond that of others.
+        noise: log evidence that the noise of what it is made of may be for a law of it.
     """
 
     where: str
@@ -75,7 +75,7 @@ class Dependence:
     design: Design
     of: str = ""
     period: float = 0.0
-    price: float = 0.0
+    noise: float = 0.0
 
     @property
     def effect(self) -> str:

@@ -97,22 +97,22 @@ class _Answer:
     def better(self) -> tuple[Search, State] | None:
         """The search and its set without members that are no answer; None: all are.
 
-        Not worth their place, less likely there than a rival, or of no size.
+        Less likely there than nothing or than a rival, of no size, widening the held-out gap, or making no difference.
         """
         # The search, which does not temper evidence, would take again what is doubted.
         if doubted := self._doubted():
-            return self._without(passed_over=doubted)
+            return self._without(doubted, passed_over=doubted)
         if (corrected := self._corrected()) is not None:
             return corrected
-        if refuted := self._sizeless() or self._widening():
-            return self._without(refuted=refuted)
-        return self._without(refuted=needless) if (needless := self._needless()) else None
+        refuted = self._sizeless() or self._widening() or self._needless()
+        return self._without(refuted, refuted=refuted) if refuted else None
 
-    def _without(self, **lost: Sequence[int]) -> tuple[Search, State]:
-        """The search and its set without members that have lost their places, by the reason."""
-        gone = frozenset(index for each in lost.values() for index in each)
-        left = {index: one for index, one in self.state.members.items() if index not in gone}
-        search = self.search.without(**lost)
+    def _without(
+        self, lost: Sequence[int], *, refuted: Sequence[int] = (), passed_over: Sequence[int] = ()
+    ) -> tuple[Search, State]:
+        """The search and its set without members that have lost their places."""
+        left = {index: one for index, one in self.state.members.items() if index not in lost}
+        search = self.search.without(refuted=refuted, passed_over=passed_over)
         return search, search.further(search.fitter.state(left, self.state))
 
     def _corrected(self) -> tuple[Search, State] | None:
@@ -120,8 +120,8 @@ class _Answer:
 
         What has lost a place to another once does not get it back.
         """
-        ahead = {index: slot.ahead for index, slot in self.slots.items()}
-        places = [(*one, index) for index, one in ahead.items() if one and one[1] not in self.search.passed_over]
+        ahead = {index: slot.ahead(self.search.passed_over) for index, slot in self.slots.items()}
+        places = [(*one, index) for index, one in ahead.items() if one is not None]
         if not places:
             return None
         _, rival, index = max(places)
@@ -201,13 +201,17 @@ class _Answer:
         )
 
     def _doubtful(self) -> dict[str, float]:
-        """Probability of everything beside the set, or in its place if that is empty, the greatest first."""
+        """Probability of everything beside the set, or in its place if that is empty, the greatest first.
+
+        But of what was in the set and lost its place: that was by tempered evidence.
+        """
+        lost = self.search.refuted | self.search.passed_over
         hypotheses = self.design.hypotheses
         tables = self.search.fitter.among_all(self.state).tables()
         odds = {
             index: table.total - hypotheses[index].price
             for index, table in tables.items()
-            if table.is_there and index not in self.search.refuted
+            if table.is_there and index not in lost
         }
         whole = float(logsumexp([0.0, *odds.values()]))
         return {hypotheses[one].key: math.exp(odds[one] - whole) for one in sorted(odds, key=lambda one: -odds[one])}

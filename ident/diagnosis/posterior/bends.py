@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.posterior.hypotheses import Block, Hypothesis
 from ident.diagnosis.posterior.noise import Colours
-from ident.diagnosis.problem import Candidate, Problem, Series, forces_of, turned_by
+from ident.diagnosis.problem import Candidate, Problem, Series, contributions_of, forces_of, turned_by
 from ident.diagnosis.rows import Rows
 
 Array = NDArray[np.float64]
@@ -201,11 +201,8 @@ class Form:
 
     def added(self, coefficients: Array, held: Array) -> Array:
         """(n,) what it adds, and makes of the forces of others."""
-        numbers, series = self.numbers(coefficients, held), list[Array | None]()
-        for candidate in self.candidates:
-            assert candidate.contribution is not None
-            series += candidate.contribution(numbers, self.parameters)
-        found = self.rows.stack(series)
+        numbers = self.numbers(coefficients, held)
+        found = self.rows.stack(contributions_of(self.candidates, numbers, self.parameters))
         return found + self.rows.stack(turned_by(self.candidates, numbers, self.others)) if self.others else found
 
     @property

@@ -141,7 +141,9 @@ class Fitter:
         width = columns.shape[1]
         rows = np.vstack([white[:, :-1], beside, np.eye(width)])
         found = np.linalg.lstsq(rows, np.concatenate([white[:, -1], wanted, np.zeros(width)]), rcond=None)[0]
-        return Left(target - columns @ found, width)
+        # Coefficients that are known beforehand as well as the rows say are no free ones.
+        known = float(np.trace(np.linalg.inv(rows.T @ rows)))
+        return Left(target - columns @ found, width - known)
 
     def excess(self, state: State) -> dict[int, float]:
         """How far rows scatter beyond their noise along every member, by which its likelihoods are tempered."""

@@ -16,7 +16,7 @@ def with_hidden_orders(
 ) -> tuple[Problem, ...] | None:
     """The problems with the orders that are left beside a set; None where it has no law over the angle of a ripple.
 
-    Such a law may be a ripple of an order that was not tried.
+    Such a law may be a ripple of an order that was not tried, where no ripple is named.
 
     Args:
         problems: to fit and to confirm.
@@ -24,11 +24,12 @@ def with_hidden_orders(
         designs: of their laws.
         state: the set.
     """
-    laws = {design.hypotheses[index].key for index in state.members if design.hypotheses[index].free}
+    members = [design.hypotheses[index] for index in state.members]
+    laws, named = {one.key for one in members if one.free}, {one.candidate for one in members}
     waves = [
         number
         for number, one in enumerate(problems[0].candidates)
-        if one.periodic is not None and one.periodic.dependence in laws and not one.excluded
+        if one.periodic is not None and one.periodic.dependence in laws and number not in named and not one.excluded
     ]
     if not waves:
         return None

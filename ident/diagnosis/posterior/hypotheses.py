@@ -167,7 +167,7 @@ class _Builder:
             if blocks and not candidate.excluded:
                 # What its choice costs beyond that of the variants, whose shares of the prior are their weights.
                 choice = max(candidate.price + weight, 0.0)
-                price = kinds + math.log(places[str(candidate.effect)]) + choice
+                price = kinds + math.log(places[str(candidate.effect)]) + choice + candidate.noise
                 found.append(Hypothesis(candidate.key, str(candidate.effect), price, blocks, candidate=number))
         return found
 
@@ -178,7 +178,7 @@ class _Builder:
             knots = designs.knots(number)
             blocks = () if knots is None else self._function(designs.columns(number), knots)
             if blocks:
-                found.append(Hypothesis(dependence.key, LAW, price + dependence.price, blocks, dependence=number))
+                found.append(Hypothesis(dependence.key, LAW, price + dependence.noise, blocks, dependence=number))
         return found
 
     def _block(self, column: Column, sizes: Array, weight: float, candidate: Candidate) -> Block:

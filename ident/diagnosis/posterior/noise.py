@@ -1,10 +1,11 @@
 """Noise of the rows: what differs between repeats, and what a model may lack beside it.
 
 Rows of a block have the covariance R + t² C. R is that of the mean over the repeats, by what differs between them;
-without any, that of what the baseline and the strongest candidates leave. t is what a model may have wrong at most
-(`Block.tolerance`), a process that remembers, as slow as the motion or faster. Where the rows say so, more is lacking:
-q times as much as noise and tolerance are together, of the same memory. There is one q for all blocks of a step and a
-coordinate, the most likely beside the hypotheses that are taken; each next one has a price.
+without any, that of what the baseline and the strongest candidates leave, or a set that was found (`Left`). t is what a
+model may have wrong at most (`Block.tolerance`), a process that remembers, as slow as the motion or faster. Where the
+rows say so, more is lacking: q times as much as noise and tolerance are together, of the same memory. There is one q
+for all blocks of a step and a coordinate, the most likely beside the hypotheses that are taken; each next one has a
+price.
 """
 
 from __future__ import annotations
@@ -50,11 +51,11 @@ class Left:
 
     Attributes:
         residual: (n,).
-        fitted: how many coefficients were.
+        fitted: how many coefficients were, what is known of them beforehand taken off.
     """
 
     residual: Array
-    fitted: int
+    fitted: float
 
 
 class Colours:

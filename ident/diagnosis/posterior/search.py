@@ -30,8 +30,8 @@ class Search:
 
     Args:
         fitter: of the sets.
-        refuted: hypotheses that the records speak against.
-        passed_over: those that are not worth a place of their own; they may still be what another one is taken for.
+        refuted: hypotheses that the records speak against, or that make no difference held out.
+        passed_over: those that nothing, or another one, is more likely than; another may still be taken for them.
     """
 
     def __init__(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -46,10 +46,10 @@ class Slot:
     alike: tuple[int, ...]
     rivals: Mapping[int, State]
 
-    @property
-    def ahead(self) -> tuple[float, int] | None:
-        """The most likely rival that was fitted exactly, and by how much more likely it is; None if none is."""
-        most = max(self.rivals, key=lambda one: self.logs.get(one, -math.inf), default=None)
+    def ahead(self, barred: Collection[int]) -> tuple[float, int] | None:
+        """By how much the most likely rival is more likely, of those fitted exactly and not barred; None if none is."""
+        rivals = [one for one in self.rivals if one not in barred]
+        most = max(rivals, key=lambda one: self.logs.get(one, -math.inf), default=None)
         lead = -math.inf if most is None else self.logs.get(most, -math.inf) - self.logs.get(self.alike[0], -math.inf)
         return (lead, most) if most is not None and lead > 0 else None
 

@@ -77,9 +77,9 @@ def test_what_is_missing_is_named_with_its_size(
     (effect,) = answer.effects
     assert effect.name == name
     size = effect.parameters[parameter]
-    assert abs(size.value) == pytest.approx(true, abs=3 * size.std)
+    assert size.value == pytest.approx(true, abs=3 * size.std)
     assert size.std < 0.2 * true
-    assert effect.gap_closed_held_out > 0.9 or answer.gap.closed > 0.9
+    assert answer.gap.closed > 0.9
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_beside_a_delay_a_drag_is_as_sure_as_without_one(said: Say) -> None:
 
 @pytest.mark.parametrize("seed", [14, 15, 17, 18, 20])
 def test_noise_of_an_acceleration_is_no_law_of_a_load(seed: int) -> None:
-    """An encoder of 10 um makes accelerations whose noise the effort does not have: its rows end where that begins."""
+    """An encoder of 10 um makes accelerations whose noise the effort does not have: what is made of it pays."""
     machine = Machine(rate=100.0, substeps=40, repeats=1, duration=30.0, noise=2.0, encoder=1e-5)
     findings = diagnose_axis([machine.drive(seed)], [], seed=1, judged=judge_by_posterior)
     assert findings.verdict is Verdict.NONE
@@ -140,5 +140,5 @@ def test_noise_of_an_acceleration_is_no_law_of_a_load(seed: int) -> None:
 def test_probabilities_and_sets_are_those_of_all_that_may_stand_there(said: Say) -> None:
     """A drag of half a noise unit may be friction that falls with speed: both are in the set, and share."""
     (effect,) = said(law=faint_drag).effects
-    assert EffectName.QUADRATIC_DRAG in effect.ambiguity_set
+    assert {EffectName.QUADRATIC_DRAG, EffectName.STRIBECK} <= set(effect.ambiguity_set)
     assert 0.2 < effect.probability < 0.99
