@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.axis.motion import FEWEST_ROWS, LARGEST_ROWS_CUTOFF, noise_power
+from ident.diagnosis.axis.motion import FEWEST_ROWS, LARGEST_ROWS_CUTOFF, noise_power, sample_noise
 from ident.diagnosis.rows import ROWS_PER_CUTOFF
 from ident.errors import EstimationError
 from ident.records.axis_record import AxisRecord, AxisSignals
@@ -88,11 +88,10 @@ def noise_limit(record: AxisRecord, axis: AxisSignals, noise: AccelerationNoise,
     dt, duration = record.sample_time, len(record) * record.sample_time
     limit = min(noise.limit, cutoff, LARGEST_ROWS_CUTOFF / dt)
     if ROWS_PER_CUTOFF * limit * duration < 2 * math.pi * FEWEST_ROWS:
-        scatter = math.sqrt(noise_power(axis.position, dt) / (2 * dt))
         raise EstimationError(
             f"{record.source}: above {limit / (2 * math.pi):.3g} Hz the acceleration of {axis.label}, differences of a "
-            f"position with {scatter:.2g} {axis.kind.position_unit} of noise, is less sure than "
-            f"its effort, and {duration:.3g} s of less than that are too few independent rows.",
+            f"position with {sample_noise(axis.position, dt):.2g} {axis.kind.position_unit} of noise, is less sure "
+            f"than its effort, and {duration:.3g} s of less than that are too few independent rows.",
             "Record longer, or measure the position more finely.",
         )
     return limit

@@ -153,9 +153,9 @@ def with_repeats(record: AxisRecord) -> NDArray[np.int64]:
     return np.asarray(period, dtype=np.int64)
 
 
-def sample_noise(effort: Array, sample_time: float) -> float:
-    """Deviation of white noise that has the power of an effort (N,) in the upper half of its band."""
-    return max(math.sqrt(noise_power(effort, sample_time) / (2 * sample_time)), np.finfo(float).tiny)
+def sample_noise(series: Array, sample_time: float) -> float:
+    """Deviation of white noise that has the power of a series (N,) in the upper half of its band."""
+    return max(math.sqrt(noise_power(series, sample_time) / (2 * sample_time)), np.finfo(float).tiny)
 
 
 def noise_power(series: Array, sample_time: float) -> float:
