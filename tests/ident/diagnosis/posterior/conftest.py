@@ -8,17 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from ident.diagnosis.law.learning import Designs
-from ident.diagnosis.posterior.bends import Bends
-from ident.diagnosis.posterior.fitting import Fitter
-from ident.diagnosis.posterior.hypotheses import Design, make_design
+from ident.diagnosis.posterior.asked import asked_of
+from ident.diagnosis.posterior.hypotheses import Design
 from ident.diagnosis.posterior.noise import Colours
 from ident.diagnosis.posterior.products import Products
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
-from ident.diagnosis.rows import make_rows
-from ident.diagnosis.settings import Settings
 
 
 @dataclass(frozen=True)
@@ -37,11 +33,9 @@ class Question:
 
 
 def _asked(fit: Problem, confirm: Problem) -> Question:
-    regression = Regression(fit, make_rows(fit, confirm), Settings(), 1)
-    colours = Colours(regression)
-    design = make_design((fit, confirm), regression, colours, Designs((fit, confirm), regression.rows))
-    search = Search(Fitter(design, colours, Bends((fit, confirm), colours)))
-    return Question(regression, colours, design, Products(design, colours, np.arange(design.columns.shape[1])), search)
+    made = asked_of((fit, confirm), 1)
+    colours, every = Colours(made.regression), np.arange(made.design.columns.shape[1])
+    return Question(made.regression, colours, made.design, Products(made.design, colours, every), Search(made.fitter))
 
 
 @pytest.fixture
