@@ -98,7 +98,12 @@ class Fitted:
     @cached_property
     def settled(self) -> Gap:
         """The same where there are no effects, beside what the fit leaves open of the baseline."""
-        if self.found.variants or self._is_given:
+        return self.exactly if self._is_given else self.beside_what_is_known
+
+    @cached_property
+    def beside_what_is_known(self) -> Gap:
+        """The same, values of a model that is judged within what is known of them."""
+        if self.found.variants:
             return self.exactly
         models = self._settled(self._held_out_refit(()))
         return held_out_gap(self.rows, self.floors, self._drifting(models), models, self.told)

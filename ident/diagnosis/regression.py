@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.directions import Directions, White, directions
 from ident.diagnosis.evidence import Evidence, gather
 from ident.diagnosis.linear import least_squares, unit_of
-from ident.diagnosis.problem import Problem
+from ident.diagnosis.problem import Problem, Series
 from ident.diagnosis.rows import Rows
 from ident.diagnosis.settings import Settings
 from ident.diagnosis.whitening import ORDER, Colour, Whitener, Whitening, colours_of_repeats, fit_whitener
@@ -171,9 +171,14 @@ class Regression:
     @cached_property
     def repeats(self) -> Sequence[Colour]:
         """Colour of what differs between repeats, of measurement and motion: without model, and what is irregular."""
+        return self.repeats_without([None] * len(self.rows.blocks))
+
+    def repeats_without(self, series: Series) -> Sequence[Colour]:
+        """The same without what differs between the repeats of some series (N,), one a block."""
         parameters = self._level(self.rows.baseline)
         residuals = [block.regular - block.baseline @ parameters for block, _ in self.rows.blocks]
-        return colours_of_repeats(self.rows, residuals)
+        left = [one if known is None else one - known for one, known in zip(residuals, series, strict=True)]
+        return colours_of_repeats(self.rows, left)
 
     @cached_property
     def _scale(self) -> Array:

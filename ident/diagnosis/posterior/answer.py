@@ -99,7 +99,7 @@ class _Answer:
 
         Less likely there than nothing or than a rival, of no size, widening the held-out gap, or making no difference.
         """
-        # The search, which does not temper evidence, would take again what is doubted.
+        # The search, in whose other places something else stood, would take again what is doubted.
         if doubted := self._doubted():
             return self._without(doubted, passed_over=doubted)
         if (corrected := self._corrected()) is not None:
@@ -221,12 +221,21 @@ class _Answer:
         return any(SIZES[size] > MISTAKEN for size in self.state.evidence.sizes)
 
     def _verdict(self) -> Verdict:
-        lacking = self._lacking()
+        gap = self.fitted.beside_what_is_known
+        # Of rows without repeats the noise is what the fitted ones leave: the confirming ones may say more.
+        lacking = self._lacking() or gap.after > math.hypot(1.0, MISTAKEN) * gap.floor
         if not self.taken.variants:
-            return Verdict.UNKNOWN if lacking else Verdict.NONE
-        if lacking and self.fitted.exactly.closed < 1 - OPEN:
+            return Verdict.UNKNOWN if lacking or self._nameless() else Verdict.NONE
+        if lacking and gap.closed < 1 - OPEN:
             return Verdict.UNKNOWN
         return Verdict.LAW if self.taken.laws else Verdict.EFFECT
+
+    def _nameless(self) -> bool:
+        """Whether something that the records refuted is likelier than nothing: what came along with it is there."""
+        tables = self.search.fitter.among_all(self.state).tables()
+        refuted = self.search.refuted - self.search.fitter.invisible
+        odds = [tables[one].total - self.design.hypotheses[one].price for one in refuted if one in tables]
+        return max(odds, default=-math.inf) > 0
 
     def _invisible(self) -> tuple[str, ...]:
         shown = {

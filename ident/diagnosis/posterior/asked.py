@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ident.diagnosis.law.learning import Designs
 from ident.diagnosis.posterior.bends import Bends
+from ident.diagnosis.posterior.differing import with_known_differences
 from ident.diagnosis.posterior.fitting import Fitter
 from ident.diagnosis.posterior.hidden import with_hidden_orders
 from ident.diagnosis.posterior.hypotheses import Design, make_design
@@ -39,14 +40,21 @@ class Asked:
 
 
 def asked_beside(asked: Asked, state: State) -> Asked | None:
-    """The same asked with what was hidden by a set: the noise of rows without repeats, orders of ripples."""
+    """The same asked with what was hidden by a set: noise that is less without it, orders of ripples."""
     if not state.members:
         return None
-    hidden = with_hidden_orders(asked.problems, asked.design, asked.designs, state)
-    left = None if Colours.repeats(asked.regression) else asked.fitter.left(state)
-    if hidden is None and left is None:
+    repeats = Colours.repeats(asked.regression)
+    left = None if repeats else asked.fitter.left(state)
+    known = (
+        with_known_differences(asked.problems, asked.regression, asked.design, asked.designs, state)
+        if repeats
+        else None
+    )
+    problems = asked.problems if known is None else known
+    hidden = with_hidden_orders(problems, asked.design, asked.designs, state)
+    if hidden is None and left is None and known is None:
         return None
-    return asked_of(asked.problems if hidden is None else hidden, asked.seed, left)
+    return asked_of(problems if hidden is None else hidden, asked.seed, left)
 
 
 def asked_of(problems: tuple[Problem, ...], seed: int, left: Left | None = None) -> Asked:

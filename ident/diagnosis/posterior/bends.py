@@ -242,12 +242,14 @@ class Form:
 
     @cached_property
     def _is_held(self) -> NDArray[np.bool_]:
-        """(M,) which numbers the coefficients say nothing of; nothing that comes along with the parameters is held."""
+        """(M,) which numbers the coefficients say nothing of; nor those that come along with what does not show."""
         ones = np.ones(len(self.block.sizes))
         here, parts = self._started(ones), range(len(ones))
         moved = [self._started(ones + np.eye(len(ones))[part]) != here for part in parts]
         found = ~np.logical_or.reduce(moved)
-        found[len(self.candidates[0].parameters) :] = False
+        if not self.block.kept.all():
+            # What comes along with columns that show nothing shows nothing.
+            found[len(self.candidates[0].parameters) :] = False
         return np.asarray(found)
 
     def numbers(self, coefficients: Array, held: Array) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -217,7 +217,10 @@ class Target:
         columns = np.unique(np.concatenate([numbers_of(place) for place in places]))
         products = self.beside(others, columns)
         moved = [among(columns, place) for place in places]
-        return self._table(used, moved, products, range(len(blocks)) if only is None else (only,))
+        if only is None:
+            return self._table(used, moved, products, range(len(blocks)))
+        # What is expected of it stands in its products already.
+        return self._table([replace(one, expected=None) for one in used], moved, products, (only,))
 
     def table(self, hypothesis: int, products: Array) -> Table:
         """The same, by the products of all columns beside the others."""
@@ -241,13 +244,14 @@ class Target:
     def _logs(self, block: Block, place: slice, products: Array) -> tuple[Array, Array]:
         """(S,) of one block, whose columns stand at a place of the products, and what integrating costs."""
         squares = self.evidence.scales[:, None] ** 2
-        impossible = np.full(len(squares), -math.inf), np.zeros(len(squares))
+        impossible, beyond = (np.full(len(squares), -math.inf), np.zeros(len(squares))), 0.0
         if block.factor.shape == (1, 1):
             power, amplitude = max(float(products[place, place][0, 0]), 0.0), float(products[place.start, -1])
             nothing = power <= np.finfo(float).eps * len(self.evidence.design.target)
             if nothing or _is_refused(block, power, amplitude):
                 return impossible
-            powers, amplitudes = np.array([power]), np.array([amplitude])
+            slope, expected, beyond = block.expected_of(amplitude)
+            powers, amplitudes = np.array([power + slope**2]), np.array([amplitude + slope * expected])
         else:
             powers, turn = np.linalg.eigh(block.factor.T @ products[place, place] @ block.factor)
             powers, amplitudes = np.maximum(powers, 0.0), turn.T @ (block.factor.T @ products[place, -1])
@@ -256,7 +260,7 @@ class Target:
         ratios = 0.5 * np.sum(squares / (1 + squares * powers) * amplitudes**2, axis=1)
         occam = 0.5 * np.sum(np.log1p(squares * powers), axis=1)
         allowed = self.evidence.scales <= max(block.largest, self.evidence.scales[0])
-        return np.where(allowed, ratios - occam, -math.inf), occam
+        return np.where(allowed, ratios - occam - beyond, -math.inf), occam
 
     @staticmethod
     def _is_negative(turn: Array, powers: Array, amplitudes: Array) -> bool:

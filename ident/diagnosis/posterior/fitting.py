@@ -15,7 +15,7 @@ from ident.diagnosis.directions import VISIBLE
 from ident.diagnosis.posterior.bends import Bends, Bent, Form
 from ident.diagnosis.posterior.evidence import Evidence, Member, Members
 from ident.diagnosis.posterior.hypotheses import Block, Design
-from ident.diagnosis.posterior.misfit import excess_of_scatter
+from ident.diagnosis.posterior.misfit import excess_of_scatter, tempered
 from ident.diagnosis.posterior.noise import Colours, Left, Sizes, most_likely
 from ident.diagnosis.posterior.products import Products, numbers_of
 from ident.diagnosis.posterior.state import State
@@ -92,17 +92,25 @@ class Fitter:
             start = self._colours.usual if before is None else before.evidence.sizes
             products = self._products(members)
             first = State(members, self._known(members, before), Evidence(products, start))
-            found = self._settled(first)
-            if not math.isfinite(found.log_posterior) or any(bent.held.size for bent in first.bends.values()):
-                # Numbers of another set may lead elsewhere, or leave no room for a member that its columns do.
-                found = max(found, self._settled(replace(first, bends={})), key=lambda one: one.log_posterior)
+            found = self._from_both(first, any(bent.held.size for bent in first.bends.values()))
             for _ in range(SWEEPS):
                 noise = self._noise_beside(found)
                 if noise == found.evidence.sizes:
                     break
-                found = self._settled(replace(found, evidence=Evidence(products, noise), resting=frozenset()))
+                anew = replace(found, evidence=Evidence(products, noise), resting=frozenset())
+                found = self._from_both(anew, False)
             self._kept[key] = found
         return self._kept[key]
+
+    def _from_both(self, state: State, surely: bool) -> State:
+        """Settled from the exact forms that it has, and from columns, surely or where there is no room for a member.
+
+        Numbers of another set, or beside another noise, may lead elsewhere, or leave no room where columns do.
+        """
+        found = self._settled(state)
+        if surely or not math.isfinite(found.log_posterior):
+            found = max(found, self._settled(replace(state, bends={})), key=lambda one: one.log_posterior)
+        return found
 
     def _known(self, members: Members, before: State | None) -> dict[int, Bent]:
         """Exact forms to begin with: of the set before, or those that were made last."""
@@ -152,6 +160,11 @@ class Fitter:
         places = self._places(state.members)
         ratios = excess_of_scatter(white[:, :-1], white[:, -1], expected, self._colours.stretch, list(places.values()))
         return dict(zip(places, ratios, strict=True))
+
+    def odds(self, state: State, index: int, bare: State) -> float:
+        """Log odds of a member against nothing in its place, evidence tempered; `bare` is the set without it."""
+        cost = state.table(index).cost + self.design.hypotheses[index].price
+        return tempered(state.log_posterior - bare.log_posterior, cost, self.excess(state)[index])
 
     def _places(self, members: Members) -> dict[int, slice]:
         """Where coefficients of members stand behind those of the baseline."""

@@ -55,6 +55,8 @@ class Block:
         kept: (k,) which of the columns of the variant are anything.
         sizes: (K,) that its columns were divided by.
         largest: scale that it may have: of a size that people meet, and a decade more.
+        expected: (m,) and (m,) of a single coefficient that is positive: slopes of what physics expects of its numbers,
+            in standard deviations, and how far they are from that at zero; None: nothing is expected.
     """
 
     place: slice
@@ -64,6 +66,7 @@ class Block:
     kept: NDArray[np.bool_]
     sizes: Array
     largest: float = math.inf
+    expected: tuple[Array, Array] | None = None
 
     @property
     def least(self) -> float:
@@ -74,6 +77,17 @@ class Block:
     def negligible(self) -> tuple[float, float]:
         """Sizes of a single coefficient up to which it means nothing, negative and positive."""
         return (0.0, 0.0) if self.column is None else self.column.negligible
+
+    def expected_of(self, amplitude: float) -> tuple[float, float, float]:
+        """Slope and target of one row of what is expected of a coefficient of this sign, and half of what is left.
+
+        A negative one has none: what physics says of it is the same for every size.
+        """
+        if self.expected is None:
+            return 0.0, 0.0, 0.0
+        slopes, missed = self.expected
+        length = float(np.linalg.norm(slopes)) if amplitude > 0 else 0.0
+        return length, float(-slopes @ missed) / length if length else 0.0, 0.5 * float(missed @ missed)
 
 
 @dataclass(frozen=True)
@@ -188,7 +202,8 @@ class _Builder:
         # The size that a coefficient of one is: a ripple's is told at the motor, its column at the wheel.
         unit = 1.0 if start is None else abs(float(start(np.eye(column.width)[0])[0]))
         largest = DECADE * candidate.usual / unit * sizes[0] if kept[0] and unit else math.inf
-        return Block(place, np.eye(int(kept.sum())), weight, column, kept, sizes[kept], largest)
+        expected = _expected(candidate, column.variant, sizes) if len(sizes) == 1 else None
+        return Block(place, np.eye(int(kept.sum())), weight, column, kept, sizes[kept], largest, expected)
 
     def _function(self, columns: Array, knots: Knots) -> tuple[Block, ...]:
         """A function at every length, in the directions that they have in common."""
@@ -215,3 +230,15 @@ class _Builder:
         self.columns.append(columns)
         self._end += columns.shape[1]
         return slice(self._end - columns.shape[1], self._end)
+
+
+def _expected(candidate: Candidate, variant: int, sizes: Array) -> tuple[Array, Array] | None:
+    """What physics expects of the numbers of an effect of one column, by its coefficient: straight from zero on."""
+    if candidate.expected is None:
+        return None
+    start = candidate.variants[variant].start
+    here, there = (
+        candidate.expected(found if start is None else np.array(start(found), dtype=float))
+        for found in (np.zeros(1), 1 / sizes)
+    )
+    return there - here, here

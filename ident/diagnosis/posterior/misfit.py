@@ -18,6 +18,11 @@ from ident.diagnosis.linear import stretch_sums
 Array = NDArray[np.float64]
 
 
+def tempered(log: float, cost: float, excess: float) -> float:
+    """Log odds, the likelihood ratio to the power of 1 / `excess`; what priors and free numbers cost stays."""
+    return (log + cost) / excess - cost
+
+
 def excess_of_scatter(
     white: Array, target: Array, known: tuple[Array, Array], stretch: NDArray[np.int64], places: Sequence[slice]
 ) -> list[float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from ident.diagnosis.posterior.evidence import Member
@@ -23,6 +23,10 @@ SURVIVORS: Final = 5
 
 MARGIN: Final = 4.0
 """Log posterior below the best one's from which a hypothesis is not fitted exactly."""
+
+
+Promises = Mapping[int, tuple[float, Member]]
+"""Log odds of a hypothesis by its columns, and its numbers, by number of the hypothesis."""
 
 
 class Search:
@@ -51,16 +55,38 @@ class Search:
 
     def further(self, state: State) -> State:
         """The best set that was found, beginning with another."""
-        while len(state.members) < MOST:
-            further = max(self._expanded(state), key=lambda one: one.log_posterior, default=state)
-            further = self._pruned(further)
-            if further.log_posterior <= state.log_posterior:
-                break
-            state = further
-        best = self._against_rivals(state)
+        best = self._against_rivals(self._grown(state))
         named = self._named(best)
         # Names that stand for a law were taken one after the other.
         return best if named is best else self._against_rivals(named)
+
+    def _grown(self, state: State) -> State:
+        """With further members, each of which tempered evidence makes likelier than nothing."""
+        while len(state.members) < MOST:
+            further = self._pruned(self._believed(state))
+            if further.log_posterior <= state.log_posterior:
+                break
+            state = further
+        return state
+
+    def _believed(self, state: State, *, named: bool = False) -> State:
+        """The best set with one member more that is likelier than nothing, evidence tempered; or the same, without any.
+
+        What noise that is not quite as it is taken to be makes likely would crowd out what is there.
+
+        Args:
+            state: the set.
+            named: only what has a name.
+        """
+        promises, doubted = self._promises(state, named), set[int]()
+        while True:
+            best = max(self._expanded(state, promises, doubted), key=lambda one: one.log_posterior, default=state)
+            if best.log_posterior <= state.log_posterior:
+                return state
+            (index,) = best.members.keys() - state.members.keys()
+            if self.fitter.odds(best, index, state) > 0:
+                return best
+            doubted.add(index)
 
     def _against_rivals(self, state: State) -> State:
         """With the best hypothesis in the place of every member."""
@@ -68,39 +94,40 @@ class Search:
             before = state
             for index in before.members:
                 bare = self.fitter.state(before.without(index), before)
-                state = max((state, *self._expanded(bare)), key=lambda one: one.log_posterior)
+                state = max((state, self._believed(bare)), key=lambda one: one.log_posterior)
             if state is before:
                 break
         return state
 
-    def _expanded(self, state: State, *, named: bool = False) -> Sequence[State]:
-        """Sets with one member more, of those that promise most; or of those alone that have a name."""
-        return [
-            self.fitter.state({**state.members, index: one}, state)
-            for index, one in self._promising(state, named).items()
-        ]
+    def _expanded(self, state: State, promises: Sequence[Promises], doubted: Collection[int]) -> Sequence[State]:
+        """Sets with one member more, of those that promise most of what is not doubted."""
+        found = dict[int, Member]()
+        for one in promises:
+            left = {index: promise for index, promise in one.items() if index not in doubted}
+            most = max((odds for odds, _ in left.values()), default=0.0)
+            best = [
+                index for index in sorted(left, key=lambda index: -left[index][0]) if left[index][0] > most - MARGIN
+            ]
+            for index in best[:SURVIVORS]:
+                if left[index][0] > -MARGIN:
+                    found.setdefault(index, left[index][1])
+        return [self.fitter.state({**state.members, index: one}, state) for index, one in found.items()]
 
-    def _promising(self, state: State, named: bool) -> dict[int, Member]:
-        """Hypotheses by the noise that is left, and by that of which nothing is lacking.
+    def _promises(self, state: State, named: bool) -> Sequence[Promises]:
+        """Of all hypotheses, or of names, by the noise that is left, and by that of which nothing is lacking.
 
         What a model lacks may be as large as what is looked for, and hide it.
         """
-        hypotheses = self.design.hypotheses
+        hypotheses, barred = self.design.hypotheses, self.refuted | self.passed_over
         whole, usual = self.fitter.among_all(state), self.fitter.with_nothing_lacking(state)
-        found, barred = dict[int, Member](), self.refuted | self.passed_over
-        for one in (whole, usual) if usual.evidence is not whole.evidence else (whole,):
-            tables = {
-                index: table
+        return [
+            {
+                index: (table.total - hypotheses[index].price, table.best)
                 for index, table in one.tables().items()
                 if table.is_there and index not in barred and not (named and hypotheses[index].free)
             }
-            odds = {index: table.total - hypotheses[index].price for index, table in tables.items()}
-            most = max(odds.values(), default=0.0)
-            best = [index for index in sorted(odds, key=lambda index: -odds[index]) if odds[index] > most - MARGIN]
-            for index in best[:SURVIVORS]:
-                if odds[index] > -MARGIN:
-                    found.setdefault(index, tables[index].best)
-        return found
+            for one in ((whole, usual) if usual.evidence is not whole.evidence else (whole,))
+        ]
 
     def _pruned(self, state: State) -> State:
         """Without members that the others make needless."""
@@ -117,9 +144,12 @@ class Search:
         for index in [one for one in state.members if self.design.hypotheses[one].free]:
             bare = self.fitter.state(state.without(index), state)
             least, instead = max(state.log_posterior, bare.log_posterior), bare
-            for _ in range(INSTEAD):
-                instead = max(self._expanded(instead, named=True), key=lambda one: one.log_posterior, default=instead)
-                if instead is not bare and instead.log_posterior > least:
+            while len(instead.members) < min(len(bare.members) + INSTEAD, MOST):
+                further = self._believed(instead, named=True)
+                if further is instead:
+                    break
+                instead = further
+                if instead.log_posterior > least:
                     state = instead
                     break
         return state

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from ident.diagnosis.posterior.hypotheses import Hypothesis
+from ident.diagnosis.posterior.misfit import tempered
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.posterior.state import State
 from ident.diagnosis.probability import Ranked
@@ -90,52 +91,79 @@ def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
         search: that found the set.
         state: the set, with the evidence of all hypotheses.
         index: of the member.
-        excess: of the scatter of the rows over their noise, along the member: likelihood ratios in its place are taken
-            to the power of its inverse.
+        excess: of the scatter of the rows over their noise, along the member.
     """
-    hypotheses = search.design.hypotheses
-    others = state.without(index)
-    without = replace(state, members=others, bends={one: bend for one, bend in state.bends.items() if one != index})
-    beside, bare = without.target.beside(others), search.fitter.state(others, state).log_posterior
-    # Others that cannot be there without it, by their sign, are no ground to stand on.
-    bare = bare if math.isfinite(bare) else search.fitter.nothing.log_posterior
-    # Without it the rows may have another noise.
-    base = without.log_posterior - bare if math.isfinite(without.log_posterior) else 0.0
-    logs, costs = dict[int, float](), dict[int, float]()
-    for number, hypothesis in enumerate(hypotheses):
-        if number not in others and number not in search.refuted:
-            table = without.target.table(number, beside)
-            if table.is_there:
-                logs[number], costs[number] = base + table.total - hypothesis.price, table.cost
-    logs[index], costs[index] = state.log_posterior - bare, state.table(index).cost
-
-    def tempered(one: int) -> float:
-        return _tempered(logs[one], costs[one] + hypotheses[one].price, excess)
-
-    near = sorted((one for one in logs if one != index), key=lambda one: -tempered(one))[:RIVALS]
-    rivals = {
-        rival: search.fitter.state({**others, rival: without.target.table(rival, beside).best}, state)
-        for rival in near
-        if tempered(rival) > tempered(index) - max(NEAR, BETWEEN * tempered(index))
-    }
-    for rival, fitted in rivals.items():
-        logs[rival] = fitted.log_posterior - bare
-        costs[rival] = fitted.table(rival).cost if math.isfinite(fitted.log_posterior) else 0.0
-    odds = {one: tempered(one) for one in logs}
+    place = _Place(search, state, index, excess)
+    place.fit_rivals()
+    odds = {one: place.odds(one) for one in place.logs}
     logs = {one: log for one, log in sorted(odds.items(), key=lambda entry: -entry[1]) if math.isfinite(log)}
-    cosines = _cosines(state, index, logs)
+    cosines, hypotheses = _cosines(state, index, logs), search.design.hypotheses
     width = len(hypotheses[index].blocks[state.members[index].block].factor)
     alike = [
         one
         for one, (cosine, size) in cosines.items()
         if cosine > SAME and size == width and one != index and not (hypotheses[one].free or hypotheses[index].free)
     ]
-    return Slot(logs, {one: cosine for one, (cosine, _) in cosines.items()}, (index, *alike), rivals)
+    return Slot(logs, {one: cosine for one, (cosine, _) in cosines.items()}, (index, *alike), place.rivals)
 
 
-def _tempered(log: float, cost: float, excess: float) -> float:
-    """Log odds, the likelihood ratio to the power of 1 / `excess`; what priors and free numbers cost stays."""
-    return (log + cost) / excess - cost
+class _Place:
+    """Odds in the place of a member, by columns, or of rivals that were fitted exactly; arguments of `slot_of`.
+
+    Attributes:
+        logs: log posterior odds of every hypothesis against nothing, evidence not tempered.
+        rivals: sets with another hypothesis there, fitted exactly.
+    """
+
+    def __init__(self, search: Search, state: State, index: int, excess: float) -> None:
+        self._search, self._state, self._index = search, state, index
+        self._others = others = state.without(index)
+        bends = {one: bend for one, bend in state.bends.items() if one != index}
+        without = replace(state, members=others, bends=bends)
+        self._target, self._beside = without.target, without.target.beside(others)
+        bare = search.fitter.state(others, state).log_posterior
+        # Others that cannot be there without it, by their sign, are no ground to stand on.
+        self._bare = bare if math.isfinite(bare) else search.fitter.nothing.log_posterior
+        # Without it the rows may have another noise.
+        base = without.log_posterior - self._bare if math.isfinite(without.log_posterior) else 0.0
+        self.logs, self._costs, self.rivals = dict[int, float](), dict[int, float](), dict[int, State]()
+        for number, hypothesis in enumerate(search.design.hypotheses):
+            if number not in others and number not in search.refuted:
+                table = self._target.table(number, self._beside)
+                if table.is_there:
+                    self.logs[number] = base + table.total - hypothesis.price
+                    self._costs[number] = table.cost + hypothesis.price
+        self._excess, self._own = excess, dict[int, float]()
+        self._keep(index, state, excess)
+
+    def odds(self, one: int) -> float:
+        """Log odds, evidence tempered: of rivals alike, but of what is none by the scatter of its own rows by that."""
+        compared, alone = (
+            tempered(self.logs[one], self._costs[one], excess)
+            for excess in (self._excess, self._own.get(one, self._excess))
+        )
+        return compared if alone > 0 else min(alone, compared)
+
+    def fit_rivals(self) -> None:
+        """Fit those near the member, and whatever is the likeliest."""
+        least = self.odds(self._index) - max(NEAR, BETWEEN * self.odds(self._index))
+        others = sorted((one for one in self.logs if one != self._index), key=lambda one: -self.odds(one))
+        for rival in [one for one in others[:RIVALS] if self.odds(one) > least]:
+            self._fit(rival)
+        while (first := max(self.logs, key=self.odds)) != self._index and first not in self.rivals:
+            self._fit(first)
+
+    def _fit(self, rival: int) -> None:
+        best = self._target.table(rival, self._beside).best
+        fitted = self.rivals[rival] = self._search.fitter.state({**self._others, rival: best}, self._state)
+        if math.isfinite(fitted.log_posterior):
+            self._keep(rival, fitted, self._search.fitter.excess(fitted)[rival])
+        else:
+            self.logs[rival] = -math.inf
+
+    def _keep(self, one: int, fitted: State, excess: float) -> None:
+        self.logs[one], self._own[one] = fitted.log_posterior - self._bare, excess
+        self._costs[one] = fitted.table(one).cost + self._search.design.hypotheses[one].price
 
 
 def _cosines(state: State, index: int, others: Mapping[int, float]) -> dict[int, tuple[float, int]]:

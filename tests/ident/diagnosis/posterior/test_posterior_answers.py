@@ -12,7 +12,7 @@ import pytest
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import Findings
 from ident.diagnosis.posterior.answer import judge_by_posterior
-from ident.diagnosis.problem import Problem, Variant
+from ident.diagnosis.problem import Nominal, Problem, Variant
 from ident.effects import EffectParameter
 
 World = Callable[..., Any]
@@ -147,3 +147,67 @@ def test_what_the_baseline_absorbs_is_said_to_be_invisible(world: World) -> None
     findings = judge_by_posterior(absorbed(made.problem(0)), absorbed(made.problem(1)), seed=1)
     assert findings.invisible == ("a",)
     assert named(findings) == ["b"]
+
+
+def test_what_comes_along_with_a_cause_of_no_size_is_something_unknown(world: World) -> None:
+    """As wheels drag that stand askew; and no candidate stands for that alone."""
+
+    def dragging(problem: Problem) -> Problem:
+        askew, drag, *others = problem.candidates
+        both = zip(askew.variants[0].columns, drag.variants[0].columns, strict=True)
+        columns = tuple(np.hstack([one, other]) for one, other in both if one is not None and other is not None)
+        wide = Variant(columns, beside=1, itself=False)
+        return replace(problem, candidates=(replace(askew, variants=(*askew.variants, wide)), *others))
+
+    for own, verdict in ((0.2, Verdict.EFFECT), (0.0, Verdict.UNKNOWN)):
+        made = world(22, true={"a": own, "b": 0.4})
+        findings = judge_by_posterior(dragging(made.problem(0)), dragging(made.problem(1)), seed=1)
+        assert findings.verdict is verdict
+        assert named(findings) == ["a"] * (own > 0)
+
+
+@pytest.mark.parametrize(("shift", "verdict"), [(0.8, Verdict.EFFECT), (1.5, Verdict.UNKNOWN)])
+def test_a_gap_that_only_the_confirming_record_shows_is_something_unknown(
+    world: World, shift: float, verdict: Verdict
+) -> None:
+    """Without repeats, of a parameter that is another one in each record: half as much again as the noise, or less."""
+    made = world(31, true={"c": 0.3}, repeats=1, samples=3200)
+    confirm = made.problem(1)
+    moved = tuple(replace(block, target=block.target + shift * block.baseline[:, 0]) for block in confirm.blocks)
+    findings = judge_by_posterior(made.problem(0), replace(confirm, blocks=moved), seed=1)
+    assert named(findings) == ["c"]
+    assert findings.verdict is verdict
+
+
+@pytest.mark.parametrize(("deviation", "verdict"), [(1.5, Verdict.NONE), (1e-3, Verdict.UNKNOWN)])
+def test_a_parameter_within_what_is_known_of_it_is_no_gap(world: World, deviation: float, verdict: Verdict) -> None:
+    made = world(33, repeats=1, samples=3200)
+    nominal = Nominal(np.array([2.8, -2.0, 0.5]), np.array([deviation, 1e-3, 1e-3]))
+    findings = judge_by_posterior(*(replace(made.problem(part), nominal=nominal) for part in (0, 1)), seed=1)
+    assert findings.verdict is verdict
+    assert named(findings) == []
+
+
+def test_noise_in_a_handful_of_rows_is_nothing_unknown(world: World) -> None:
+    found = [judged(world(400 + seed, samples=40)).verdict for seed in range(40)]
+    assert sum(verdict is not Verdict.NONE for verdict in found) <= 2
+
+
+def test_what_is_known_to_come_and_go_stays_known_beside_a_cause(world: World) -> None:
+    """Sliding that was found in every repeat is part of a cause as well: taken off once more it would be noise."""
+    made, generator = world(34, true={}), np.random.default_rng(5)
+    slid = [[generator.normal(size=len(block.target)) for block in made.problem(part).blocks] for part in (0, 1)]
+
+    def sliding(part: int, share: float) -> Problem:
+        problem = made.problem(part)
+        blocks = tuple(
+            replace(block, target=block.target + share * one, irregular=one)
+            for block, one in zip(problem.blocks, slid[part], strict=True)
+        )
+        first = replace(problem.candidates[0], variants=(Variant(tuple(one[:, None] for one in slid[part])),))
+        return replace(problem, blocks=blocks, candidates=(first, *problem.candidates[1:]))
+
+    findings = judge_by_posterior(sliding(0, 1.0), sliding(1, 1.0), seed=1)
+    assert named(findings) == ["a"]
+    assert findings.causes[0].part.values[0] == pytest.approx(1.0, abs=0.1)
+    assert findings.causes[0].part.std[0] < 0.1

@@ -64,6 +64,39 @@ def test_the_evidence_of_a_hypothesis_integrates_its_scale(problems: tuple[Probl
     assert target.table_of(number, {}).total == pytest.approx(table.total)
 
 
+def test_what_physics_expects_of_a_size_weighs_as_a_row_does(problems: tuple[Problem, Problem], asked: Asked) -> None:
+    """Against the integral over the size, by quadrature."""
+
+    def expected(numbers: Array) -> Array:
+        return np.asarray((numbers - 0.3) / 0.05)
+
+    told = [
+        replace(
+            one, candidates=tuple(replace(c, expected=expected if c.effect == "b" else None) for c in one.candidates)
+        )
+        for one in problems
+    ]
+    free, known = asked(*problems), asked(*told)
+    number = free.number("b@place")
+    tables = [Evidence(one.products, one.colours.usual).target_beside(()) for one in (known, free)]
+    found, rows = (one.table(number, one.beside({})) for one in tables)
+    scale = float(found.scales[len(found.scales) // 2])
+    block = free.design.hypotheses[number].blocks[0]
+    target = Evidence(free.products, free.colours.usual).target_beside(())
+    place = free.products.at(block.place)
+    power, amplitude = float(target.products[place, place][0, 0]), float(target.products[place.start, -1])
+    sizes = np.linspace(-5, 5, 200_001) * float(block.sizes[0])
+
+    def integral(more: Array) -> float:
+        logs = amplitude * sizes - 0.5 * power * sizes**2 - 0.5 * (sizes / scale) ** 2 + more
+        return float(np.logaddexp.reduce(logs))
+
+    beyond = (sizes / block.sizes[0] - 0.3) / 0.05
+    expected = integral(-0.5 * beyond**2) - integral(0 * sizes)
+    middle = len(found.scales) // 2
+    assert found.logs[0, middle] - rows.logs[0, middle] == pytest.approx(expected, abs=1e-3)
+
+
 def test_a_set_has_the_same_posterior_by_its_own_columns_and_by_all(
     problems: tuple[Problem, Problem], asked: Asked
 ) -> None:

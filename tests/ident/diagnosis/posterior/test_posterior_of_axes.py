@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from hil.exam.sources.machine import Machine
@@ -142,3 +143,42 @@ def test_probabilities_and_sets_are_those_of_all_that_may_stand_there(said: Say)
     (effect,) = said(law=faint_drag).effects
     assert {EffectName.QUADRATIC_DRAG, EffectName.STRIBECK} <= set(effect.ambiguity_set)
     assert 0.2 < effect.probability < 0.99
+
+
+@pytest.mark.parametrize(("compliance", "closed"), [(2e-6, 0.9), (5e-6, None)])
+def test_a_second_mass_near_the_band_of_the_rows_is_a_spring(compliance: float, closed: float | None) -> None:
+    """At 32 Hz and 20 Hz, beyond rows of 18 Hz: columns of a stiff spring, and of one of another damping, miss it."""
+    machine = Machine(compliance=compliance)
+    findings = diagnose_axis([machine.drive(11)], [machine.drive(12)], seed=1, judged=judge_by_posterior)
+    assert [str(cause.candidate.effect) for cause in findings.causes] == [EffectName.ELASTICITY]
+    if closed is None:
+        # So near, the rows of the record that confirms are further away with it than without, and it is no answer.
+        assert findings.verdict is Verdict.UNKNOWN
+    else:
+        assert findings.gap.closed > closed
+
+
+def warming(time: float, _x: float, v: float) -> float:
+    """Dry friction that falls by 3.2 N with 6 s."""
+    return -3.2 * (1 - math.exp(-time / 6)) * ((v > 0) - (v < 0))
+
+
+def test_what_warms_up_is_no_noise_though_repeats_differ_by_it() -> None:
+    machine = Machine(law=warming)
+    records = [machine.drive(11)], [machine.drive(12)]
+    (cause,) = diagnose_axis(*records, seed=1, judged=judge_by_posterior).causes
+    assert cause.candidate.effect == "friction_warming"
+    assert cause.part.std[0] < 0.15
+    assert cause.part.values[0] == pytest.approx(-3.2, abs=2 * cause.part.std[0])
+    findings = diagnose_axis(*records, seed=1, lacking=("friction_warming",), judged=judge_by_posterior)
+    (cause,) = findings.causes
+    assert cause.law_answer is not None
+    assert (cause.law_answer.variable, cause.law_answer.partner) == ("time", "direction")
+    time, friction, std = cause.law_answer.curve.T
+    # Means over the repeats do not tell what it does from one to the next one.
+    left = friction - friction.mean()
+    expected = -3.2 * (1 - np.exp(-time / 6))
+    left = left - (expected - expected.mean())
+    assert np.all(np.abs(left) < 2.5 * std)
+    assert np.all(std < 0.5)
+    assert np.sqrt(np.mean(left**2)) < 0.1 * np.ptp(expected)
