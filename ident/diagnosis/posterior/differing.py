@@ -37,7 +37,10 @@ def with_known_differences(
         designs: of their laws.
         state: the set.
     """
-    added = summed(list(_parts(problems, design, designs, state)))
+    parts = list(_parts(problems, design, designs, state))
+    if not parts:
+        return None
+    added = summed(parts)
     shares = [
         after.covariance[0] / before.covariance[0]
         for before, after in zip(regression.repeats, regression.repeats_without(added), strict=True)

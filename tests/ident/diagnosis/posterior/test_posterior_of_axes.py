@@ -158,6 +158,14 @@ def test_a_second_mass_near_the_band_of_the_rows_is_a_spring(compliance: float, 
         assert findings.gap.closed > closed
 
 
+def test_a_delay_by_itself_is_named_where_records_repeat() -> None:
+    """It adds nothing of its own that repeats could differ by."""
+    machine = Machine(delay=0.002)
+    (cause,) = diagnose_axis([machine.drive(11)], [machine.drive(12)], seed=1, judged=judge_by_posterior).causes
+    assert cause.candidate.effect == EffectName.TIME_DELAY
+    assert cause.part.values[0] == pytest.approx(0.002, rel=0.02)
+
+
 def warming(time: float, _x: float, v: float) -> float:
     """Dry friction that falls by 3.2 N with 6 s."""
     return -3.2 * (1 - math.exp(-time / 6)) * ((v > 0) - (v < 0))
