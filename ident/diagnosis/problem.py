@@ -108,6 +108,10 @@ class Variant:
     beside: int = 0
     itself: bool = True
 
+    def numbers(self, coefficients: Array) -> Array:
+        """(m,) of the exact form, by coefficients (k,) of the columns."""
+        return coefficients if self.start is None else np.array(self.start(coefficients), dtype=float)
+
 
 @dataclass(frozen=True)
 class Periodic:

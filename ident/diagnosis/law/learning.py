@@ -256,9 +256,14 @@ class Designs:
         if index not in self._columns:
             knots = self.knots(index)
             assert knots is not None
-            series = [column for part in self._parts(index) for column in part.design(knots.basis)]
-            self._columns[index] = self._rows.stack(series, len(knots.places))
+            self._columns[index] = self._rows.stack(self.series(index), len(knots.places))
         return self._columns[index]
+
+    def series(self, index: int) -> list[Array | None]:
+        """The same of every block, all samples (N, K)."""
+        knots = self.knots(index)
+        assert knots is not None
+        return [column for part in self._parts(index) for column in part.design(knots.basis)]
 
     def _parts(self, index: int) -> list[Dependence]:
         return [problem.dependences[index] for problem in self._problems]

@@ -205,16 +205,17 @@ class _Answer:
 
         But of what was in the set and lost its place: that was by tempered evidence.
         """
-        lost = self.search.refuted | self.search.passed_over
-        hypotheses = self.design.hypotheses
-        tables = self.search.fitter.among_all(self.state).tables()
-        odds = {
-            index: table.total - hypotheses[index].price
-            for index, table in tables.items()
-            if table.is_there and index not in lost
-        }
+        lost, hypotheses = self.search.refuted | self.search.passed_over, self.design.hypotheses
+        odds = {index: log for index, log in self._odds_beside.items() if index not in lost}
         whole = float(logsumexp([0.0, *odds.values()]))
         return {hypotheses[one].key: math.exp(odds[one] - whole) for one in sorted(odds, key=lambda one: -odds[one])}
+
+    @cached_property
+    def _odds_beside(self) -> dict[int, float]:
+        """Log odds of everything that can be there beside the set, evidence not tempered."""
+        tables = self.search.fitter.among_all(self.state).tables()
+        hypotheses = self.design.hypotheses
+        return {index: one.total - hypotheses[index].price for index, one in tables.items() if one.is_there}
 
     def _lacking(self) -> bool:
         """Whether more is lacking somewhere than noise and tolerance that are not known exactly."""
@@ -232,10 +233,8 @@ class _Answer:
 
     def _nameless(self) -> bool:
         """Whether something that the records refuted is likelier than nothing: what came along with it is there."""
-        tables = self.search.fitter.among_all(self.state).tables()
         refuted = self.search.refuted - self.search.fitter.invisible
-        odds = [tables[one].total - self.design.hypotheses[one].price for one in refuted if one in tables]
-        return max(odds, default=-math.inf) > 0
+        return any(log > 0 for index, log in self._odds_beside.items() if index in refuted)
 
     def _invisible(self) -> tuple[str, ...]:
         shown = {

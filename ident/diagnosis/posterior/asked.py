@@ -43,18 +43,13 @@ def asked_beside(asked: Asked, state: State) -> Asked | None:
     """The same asked with what was hidden by a set: noise that is less without it, orders of ripples."""
     if not state.members:
         return None
-    repeats = Colours.repeats(asked.regression)
-    left = None if repeats else asked.fitter.left(state)
-    known = (
-        with_known_differences(asked.problems, asked.regression, asked.design, asked.designs, state)
-        if repeats
-        else None
-    )
-    problems = asked.problems if known is None else known
-    hidden = with_hidden_orders(problems, asked.design, asked.designs, state)
-    if hidden is None and left is None and known is None:
-        return None
-    return asked_of(problems if hidden is None else hidden, asked.seed, left)
+    problems, left = asked.problems, None
+    if Colours.repeats(asked.regression):
+        problems = with_known_differences(problems, asked.regression, asked.design, asked.designs, state)
+    else:
+        left = asked.fitter.left(state)
+    problems = with_hidden_orders(problems, asked.design, asked.designs, state) or problems
+    return None if problems is asked.problems and left is None else asked_of(problems, asked.seed, left)
 
 
 def asked_of(problems: tuple[Problem, ...], seed: int, left: Left | None = None) -> Asked:

@@ -261,8 +261,7 @@ class Form:
 
     def _started(self, coefficients: Array) -> Array:
         assert self.block.column is not None
-        raw, start = self._raw(coefficients), self.candidates[0].variants[self.block.column.variant].start
-        return raw if start is None else np.array(start(raw), dtype=float)
+        return self.candidates[0].variants[self.block.column.variant].numbers(self._raw(coefficients))
 
     def _raw(self, coefficients: Array) -> Array:
         """Coefficients of all columns of the variant, as the rows have them."""

@@ -27,8 +27,8 @@ LESS: Final = 0.1
 
 def with_known_differences(
     problems: tuple[Problem, ...], regression: Regression, design: Design, designs: Designs, state: State
-) -> tuple[Problem, ...] | None:
-    """The problems, what a set differs by between repeats known; None where the noise is hardly less without it.
+) -> tuple[Problem, ...]:
+    """The problems, what a set differs by between repeats known; as they are where the noise is hardly less without it.
 
     Args:
         problems: to fit and to confirm.
@@ -39,7 +39,7 @@ def with_known_differences(
     """
     parts = list(_parts(problems, design, designs, state))
     if not parts:
-        return None
+        return problems
     added = summed(parts)
     shares = [
         after.covariance[0] / before.covariance[0]
@@ -47,7 +47,7 @@ def with_known_differences(
         if before.count and before.covariance[0] > 0
     ]
     if min(shares, default=1.0) > 1 - LESS or max(shares, default=1.0) > 1 + LESS:
-        return None
+        return problems
     waiting = iter(added)
     return tuple(
         replace(problem, blocks=tuple(_known(block, next(waiting)) for block in problem.blocks)) for problem in problems
@@ -69,9 +69,7 @@ def _parts(problems: tuple[Problem, ...], design: Design, designs: Designs, stat
             continue
         block, bent = hypothesis.blocks[member.block], state.bends.get(index)
         if hypothesis.dependence is not None:
-            knots = designs.knots(hypothesis.dependence)
-            assert knots is not None
-            made = [each.dependences[hypothesis.dependence].design(knots.basis) for each in problems]
+            columns = designs.series(hypothesis.dependence)
             rows = design.columns[:, block.place] @ means[index]
             numbers = least_squares(designs.columns(hypothesis.dependence), rows)
         else:
@@ -81,7 +79,7 @@ def _parts(problems: tuple[Problem, ...], design: Design, designs: Designs, stat
             if bent is not None:
                 yield contributions_of(candidates, bent.numbers, bent.beside)
                 continue
-            made = [each.variants[block.column.variant].columns for each in candidates]
+            columns = [one for each in candidates for one in each.variants[block.column.variant].columns]
             numbers = np.zeros(block.column.width)
             numbers[block.kept] = means[index] / block.sizes
-        yield [None if one is None else one @ numbers for columns in made for one in columns]
+        yield [None if one is None else one @ numbers for one in columns]

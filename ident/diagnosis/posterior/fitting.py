@@ -163,8 +163,7 @@ class Fitter:
 
     def odds(self, state: State, index: int, bare: State) -> float:
         """Log odds of a member against nothing in its place, evidence tempered; `bare` is the set without it."""
-        cost = state.table(index).cost + self.design.hypotheses[index].price
-        return tempered(state.log_posterior - bare.log_posterior, cost, self.excess(state)[index])
+        return tempered(state.log_posterior - bare.log_posterior, state.cost(index), self.excess(state)[index])
 
     def _places(self, members: Members) -> dict[int, slice]:
         """Where coefficients of members stand behind those of the baseline."""

@@ -46,6 +46,4 @@ def _taken(problem: Problem, design: Design, designs: Designs, state: State, ang
             yield problem.candidates[column.candidate].variants[column.variant]
         elif hypothesis.key not in angles:
             assert hypothesis.dependence is not None
-            knots = designs.knots(hypothesis.dependence)
-            assert knots is not None
-            yield Variant(tuple(problem.dependences[hypothesis.dependence].design(knots.basis)))
+            yield Variant(tuple(designs.series(hypothesis.dependence)[: len(problem.blocks)]))

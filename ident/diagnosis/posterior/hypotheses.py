@@ -20,7 +20,7 @@ from ident.diagnosis.findings import LAW
 from ident.diagnosis.law.learning import LENGTHS, Designs
 from ident.diagnosis.law.spline import Knots
 from ident.diagnosis.posterior.noise import Colours
-from ident.diagnosis.problem import Candidate, Problem
+from ident.diagnosis.problem import Candidate, Problem, Variant
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Column
 
@@ -198,11 +198,11 @@ class _Builder:
     def _block(self, column: Column, sizes: Array, weight: float, candidate: Candidate) -> Block:
         kept = sizes > LEAST * sizes.max()
         place = self._appended(self.regression.rows.columns[:, column.place][:, kept] / sizes[kept])
-        start = candidate.variants[column.variant].start
+        variant = candidate.variants[column.variant]
         # The size that a coefficient of one is: a ripple's is told at the motor, its column at the wheel.
-        unit = 1.0 if start is None else abs(float(start(np.eye(column.width)[0])[0]))
+        unit = abs(float(variant.numbers(np.eye(column.width)[0])[0]))
         largest = DECADE * candidate.usual / unit * sizes[0] if kept[0] and unit else math.inf
-        expected = _expected(candidate, column.variant, sizes) if len(sizes) == 1 else None
+        expected = _expected(candidate, variant, sizes) if len(sizes) == 1 else None
         return Block(place, np.eye(int(kept.sum())), weight, column, kept, sizes[kept], largest, expected)
 
     def _function(self, columns: Array, knots: Knots) -> tuple[Block, ...]:
@@ -232,13 +232,9 @@ class _Builder:
         return slice(self._end - columns.shape[1], self._end)
 
 
-def _expected(candidate: Candidate, variant: int, sizes: Array) -> tuple[Array, Array] | None:
+def _expected(candidate: Candidate, variant: Variant, sizes: Array) -> tuple[Array, Array] | None:
     """What physics expects of the numbers of an effect of one column, by its coefficient: straight from zero on."""
     if candidate.expected is None:
         return None
-    start = candidate.variants[variant].start
-    here, there = (
-        candidate.expected(found if start is None else np.array(start(found), dtype=float))
-        for found in (np.zeros(1), 1 / sizes)
-    )
+    here, there = (candidate.expected(variant.numbers(found)) for found in (np.zeros(1), 1 / sizes))
     return there - here, here

@@ -103,14 +103,11 @@ class Search:
         """Sets with one member more, of those that promise most of what is not doubted."""
         found = dict[int, Member]()
         for one in promises:
-            left = {index: promise for index, promise in one.items() if index not in doubted}
-            most = max((odds for odds, _ in left.values()), default=0.0)
-            best = [
-                index for index in sorted(left, key=lambda index: -left[index][0]) if left[index][0] > most - MARGIN
-            ]
-            for index in best[:SURVIVORS]:
-                if left[index][0] > -MARGIN:
-                    found.setdefault(index, left[index][1])
+            ordered = sorted((index for index in one if index not in doubted), key=lambda index: -one[index][0])
+            for index in ordered[:SURVIVORS]:
+                odds, member = one[index]
+                if odds > max(one[ordered[0]][0], 0.0) - MARGIN:
+                    found.setdefault(index, member)
         return [self.fitter.state({**state.members, index: one}, state) for index, one in found.items()]
 
     def _promises(self, state: State, named: bool) -> Sequence[Promises]:

@@ -138,10 +138,8 @@ class _Place:
 
     def odds(self, one: int) -> float:
         """Log odds, evidence tempered: of rivals alike, but of what is none by the scatter of its own rows by that."""
-        compared, alone = (
-            tempered(self.logs[one], self._costs[one], excess)
-            for excess in (self._excess, self._own.get(one, self._excess))
-        )
+        compared = tempered(self.logs[one], self._costs[one], self._excess)
+        alone = tempered(self.logs[one], self._costs[one], self._own.get(one, self._excess))
         return compared if alone > 0 else min(alone, compared)
 
     def fit_rivals(self) -> None:
@@ -162,8 +160,8 @@ class _Place:
             self.logs[rival] = -math.inf
 
     def _keep(self, one: int, fitted: State, excess: float) -> None:
-        self.logs[one], self._own[one] = fitted.log_posterior - self._bare, excess
-        self._costs[one] = fitted.table(one).cost + self._search.design.hypotheses[one].price
+        self.logs[one], self._costs[one] = fitted.log_posterior - self._bare, fitted.cost(one)
+        self._own[one] = excess
 
 
 def _cosines(state: State, index: int, others: Mapping[int, float]) -> dict[int, tuple[float, int]]:

@@ -69,6 +69,10 @@ class State:
         only = self.members[hypothesis].block if hypothesis in self.bends else None
         return self.target.table_of(hypothesis, self.without(hypothesis), only)
 
+    def cost(self, hypothesis: int) -> float:
+        """What integrating the numbers of a member costs, and its choice."""
+        return self.table(hypothesis).cost + self.evidence.design.hypotheses[hypothesis].price
+
     def tables(self) -> dict[int, Table]:
         """Evidence of all other hypotheses beside the members, but of those that are the same as some of these.
 
