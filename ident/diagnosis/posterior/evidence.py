@@ -19,6 +19,7 @@ from scipy import linalg
 from scipy.special import logsumexp
 
 from ident.diagnosis.posterior.bends import Bent
+from ident.diagnosis.posterior.gram import Beside, Gram
 from ident.diagnosis.posterior.hypotheses import Block
 from ident.diagnosis.posterior.noise import Noise, Sizes
 from ident.diagnosis.posterior.products import Products, among, numbers_of
@@ -127,14 +128,8 @@ class Evidence:
 
     def target_beside(self, bends: Collection[Bent]) -> Target:
         """The rows, some members by their slopes instead of their columns, with what is expected of those."""
-        found = self._bent(bends) if bends else self._beside
-        for bent in bends:
-            place, (slopes, target) = self.products.at(bent.place), bent.expected
-            found[place, place] += slopes.T @ slopes
-            found[place, -1] += slopes.T @ target
-            found[-1, place] += slopes.T @ target
-            found[-1, -1] += target @ target
-        return Target(self, found, -0.5 * float(found[-1, -1]) - self._volume - self._determinant)
+        found = self._bent(bends) if bends else Gram.of_all(self._beside)
+        return Target(self, found, -0.5 * float(found.target[-1]) - self._volume - self._determinant)
 
     def parameters(self, added: Array) -> Array:
         """(p,) of the plant beside what some members add (n,), in their units; those that are known as they are."""
@@ -142,21 +137,28 @@ class Evidence:
         own = linalg.cho_solve(self._baseline, along[: len(self._across), 0])
         return np.asarray(self.design.known + np.where(self.design.free, self.design.spread * own, 0.0))
 
-    def _bent(self, bends: Collection[Bent]) -> Array:
-        width, found = len(self._across), self._beside.copy()
+    def _bent(self, bends: Collection[Bent]) -> Gram:
+        width = len(self._across)
         others = np.column_stack([*(bent.slopes for bent in bends), sum(bent.missed for bent in bends)])
         along, own = self.products.with_others(self.sizes, others)
         own = own - along[:width].T @ linalg.cho_solve(self._baseline, along[:width])
-        along = along[width:] - self._across.T @ along[:width]
+        rows = (along[width:] - self._across.T @ along[:width]).T
         replaced = np.concatenate([numbers_of(self.products.at(bent.place)) for bent in bends])
-        target = found[:, -1] - along[:, -1]
-        target[replaced] = along[-1, :-1] - own[:-1, -1]
-        target[-1] += own[-1, -1] - along[-1, -1]
-        found[replaced] = along[:, :-1].T
-        found[:, replaced] = along[:, :-1]
-        found[np.ix_(replaced, replaced)] = own[:-1, :-1]
-        found[:, -1] = found[-1] = target
-        return np.asarray(found)
+        # The target is what it was without what slopes miss.
+        target = self._beside[-1] - rows[-1]
+        target[replaced] = rows[:-1, -1] - own[:-1, -1]
+        target[-1] += own[-1, -1] - rows[-1, -1]
+        rows[:-1, replaced], rows[-1] = own[:-1, :-1], target
+        rows[:-1, -1] = target[replaced]
+        end = 0
+        for bent in bends:
+            place, (slopes, expected) = self.products.at(bent.place), bent.expected
+            start, end = end, end + place.stop - place.start
+            rows[start:end, place] += slopes.T @ slopes
+            rows[start:end, -1] += slopes.T @ expected
+            rows[-1, place] += slopes.T @ expected
+            rows[-1, -1] += expected @ expected
+        return Gram(self._beside, np.append(replaced, len(self._beside) - 1), rows)
 
 
 @dataclass(frozen=True)
@@ -165,24 +167,21 @@ class Target:
 
     Attributes:
         evidence: of which noise.
-        products: (K + 1, K + 1).
+        products: of them.
         nothing: log likelihood without any hypothesis.
     """
 
     evidence: Evidence
-    products: Array
+    products: Gram
     nothing: float
 
-    def beside(self, members: Members, columns: NDArray[np.int64] | None = None) -> Array:
-        """The products of columns, of all or of some, and of the target, members integrated."""
-        chosen = np.arange(len(self.products)) if columns is None else np.append(columns, len(self.products) - 1)
-        found = self.products if columns is None else self.products[np.ix_(chosen, chosen)]
+    def beside(self, members: Members) -> Beside:
+        """The products of columns and of the target, members integrated."""
         if not members:
-            return found
+            return Beside(self.products, np.zeros((len(self.products), 0)), np.zeros(0))
         own, rows = self._stacked(members)
         powers, directions = self._directions(own, rows)
-        across = self.products[np.ix_(chosen, rows)] @ directions
-        return np.asarray(found - (across / (1 + powers)) @ across.T)
+        return Beside(self.products, self.products.columns(rows) @ directions, powers)
 
     def log_likelihood(self, members: Members) -> float:
         """With members of these numbers, against none."""
@@ -190,7 +189,7 @@ class Target:
             return 0.0
         own, rows = self._stacked(members)
         powers, directions = self._directions(own, rows)
-        amplitudes = directions.T @ self.products[rows, -1]
+        amplitudes = directions.T @ self.products.target[rows]
         return 0.5 * float(np.sum(amplitudes**2 / (1 + powers) - np.log1p(powers)))
 
     def means(self, members: Members) -> dict[int, Array]:
@@ -200,39 +199,31 @@ class Target:
         own, rows = self._stacked(members)
         powers, directions = self._directions(own, rows)
         mean = np.zeros(len(self.products) - 1)
-        mean[rows] = directions @ (directions.T @ self.products[rows, -1] / (1 + powers))
+        mean[rows] = directions @ (directions.T @ self.products.target[rows] / (1 + powers))
         return {index: mean[self._place(index, one)] for index, one in members.items()}
 
     def _directions(self, own: Array, rows: NDArray[np.int64]) -> tuple[Array, Array]:
         """Powers (R,) of independent combinations of unit variance, and these (r, R), by factors of members (r, R)."""
-        powers, turn = np.linalg.eigh(own.T @ self.products[np.ix_(rows, rows)] @ own)
+        powers, turn = np.linalg.eigh(own.T @ self.products.among(rows) @ own)
         # Columns that are the same but for rounding have no power apart.
         return np.maximum(powers, 0.0), own @ turn
 
     def table_of(self, hypothesis: int, others: Members, only: int | None = None) -> Table:
         """Log evidence of a hypothesis, or of one of its blocks alone, beside others."""
-        blocks = self.evidence.design.hypotheses[hypothesis].blocks
-        used = blocks if only is None else (blocks[only],)
-        places = [self.evidence.products.at(one.place) for one in used]
-        columns = np.unique(np.concatenate([numbers_of(place) for place in places]))
-        products = self.beside(others, columns)
-        moved = [among(columns, place) for place in places]
         if only is None:
-            return self._table(used, moved, products, range(len(blocks)))
+            return self.table(hypothesis, self.beside(others))
         # What is expected of it stands in its products already.
-        return self._table([replace(one, expected=None) for one in used], moved, products, (only,))
+        block = replace(self.evidence.design.hypotheses[hypothesis].blocks[only], expected=None)
+        return self._table([block], self.beside(others), (only,))
 
-    def table(self, hypothesis: int, products: Array) -> Table:
+    def table(self, hypothesis: int, products: Beside) -> Table:
         """The same, by the products of all columns beside the others."""
         blocks = self.evidence.design.hypotheses[hypothesis].blocks
-        places = [self.evidence.products.at(block.place) for block in blocks]
-        return self._table(blocks, places, products, range(len(blocks)))
+        return self._table(blocks, products, range(len(blocks)))
 
-    def _table(
-        self, blocks: Sequence[Block], places: Sequence[slice], products: Array, numbers: Sequence[int]
-    ) -> Table:
+    def _table(self, blocks: Sequence[Block], products: Beside, numbers: Sequence[int]) -> Table:
         masses = np.array([self._mass(block) for block in blocks])
-        made = [self._logs(block, place, products) for block, place in zip(blocks, places, strict=True)]
+        made = [self._logs(block, self.evidence.products.at(block.place), products) for block in blocks]
         logs, occam = (np.stack(parts) for parts in zip(*made, strict=True))
         return Table(self.evidence.scales, logs + masses[:, None], occam, masses, numbers)
 
@@ -241,20 +232,21 @@ class Target:
         count = max(int(np.sum(self.evidence.scales <= block.largest)), 1)
         return block.weight - math.log(count) + (math.log(2) if block.least == 0 else 0.0)
 
-    def _logs(self, block: Block, place: slice, products: Array) -> tuple[Array, Array]:
+    def _logs(self, block: Block, place: slice, products: Beside) -> tuple[Array, Array]:
         """(S,) of one block, whose columns stand at a place of the products, and what integrating costs."""
         squares = self.evidence.scales[:, None] ** 2
         impossible, beyond = (np.full(len(squares), -math.inf), np.zeros(len(squares))), 0.0
+        inner, along = products.of(place, place), products.with_target(place)
         if block.factor.shape == (1, 1):
-            power, amplitude = max(float(products[place, place][0, 0]), 0.0), float(products[place.start, -1])
+            power, amplitude = max(float(inner[0, 0]), 0.0), float(along[0])
             nothing = power <= np.finfo(float).eps * len(self.evidence.design.target)
             if nothing or _is_refused(block, power, amplitude):
                 return impossible
             slope, expected, beyond = block.expected_of(amplitude)
             powers, amplitudes = np.array([power + slope**2]), np.array([amplitude + slope * expected])
         else:
-            powers, turn = np.linalg.eigh(block.factor.T @ products[place, place] @ block.factor)
-            powers, amplitudes = np.maximum(powers, 0.0), turn.T @ (block.factor.T @ products[place, -1])
+            powers, turn = np.linalg.eigh(block.factor.T @ inner @ block.factor)
+            powers, amplitudes = np.maximum(powers, 0.0), turn.T @ (block.factor.T @ along)
             if block.least == 0 and self._is_negative(turn, powers, amplitudes):
                 return impossible
         ratios = 0.5 * np.sum(squares / (1 + squares * powers) * amplitudes**2, axis=1)

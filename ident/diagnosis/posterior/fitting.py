@@ -231,7 +231,7 @@ class Fitter:
     def _is_telling(state: State, block: Block, mean: Array) -> bool:
         """Whether held numbers show: they turn a tenth of a coefficient."""
         place = state.evidence.products.at(block.place)
-        deviations = np.abs(mean) * np.sqrt(np.maximum(np.diag(state.target.products)[place], 0.0))
+        deviations = np.abs(mean) * np.sqrt(np.maximum(state.target.products.diagonal[place], 0.0))
         return float(deviations.max()) > TELLING
 
     def _moved(self, state: State, index: int, form: Form, mean: Array) -> State:

@@ -106,6 +106,12 @@ class Colours:
         return all(colour.count for colour in regression.repeats)
 
     @property
+    def rows_of_labels(self) -> tuple[NDArray[np.int64], ...]:
+        """Numbers of the rows of every label."""
+        places = [[self._places[number] for number in numbers] for numbers in self.blocks]
+        return tuple(np.concatenate([np.arange(one.start, one.stop) for one in own]) for own in places)
+
+    @property
     def usual(self) -> Sizes:
         """Nothing is lacking but what is tolerated."""
         return (USUAL,) * len(self.labels)

@@ -25,6 +25,7 @@ class Products:
     def __init__(self, design: Design, colours: Colours, columns: NDArray[np.int64]) -> None:
         self.design, self.colours, self.columns = design, colours, columns
         self._stacked = np.column_stack([design.baseline, design.columns[:, columns], design.target])
+        self._acting = tuple(np.flatnonzero(self._stacked[rows].any(axis=0)) for rows in colours.rows_of_labels)
         # One for each label: those of all columns are large, and the next noise differs in a few labels.
         self._of = lru_cache(maxsize=len(colours.labels))(self._made)
 
@@ -40,7 +41,7 @@ class Products:
         whole, volume = np.zeros((width, width)), 0.0
         for label, size in enumerate(sizes):
             part, more = self._of(label, size)
-            whole += part
+            whole[np.ix_(self._acting[label], self._acting[label])] += part
             volume += more
         return whole, volume
 
@@ -50,8 +51,8 @@ class Products:
         return self._stacked.T @ weighted, others.T @ weighted
 
     def _made(self, label: int, size: int) -> tuple[Array, float]:
-        """The same of one label."""
-        white, volume = self.colours.of_label(label, size, self._stacked)
+        """The same of one label, of the columns that act in its rows: a cause is at one place, and in some steps."""
+        white, volume = self.colours.of_label(label, size, self._stacked[:, self._acting[label]])
         return white.T @ white, volume
 
 

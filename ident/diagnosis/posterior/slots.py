@@ -170,12 +170,12 @@ def _cosines(state: State, index: int, others: Mapping[int, float]) -> dict[int,
     hypotheses = state.evidence.design.hypotheses
     own = hypotheses[index].blocks[state.members[index].block]
     mean = state.target.means(state.members)[index]
-    power = float(mean @ products[own.place, own.place] @ mean)
+    power = float(mean @ products.of(own.place, own.place) @ mean)
     found = {}
     for other in others:
         best = 0.0, 0
         for block in hypotheses[other].blocks:
-            inner, across = products[block.place, block.place], products[block.place, own.place] @ mean
+            inner, across = products.of(block.place, block.place), products.of(block.place, own.place) @ mean
             turned = block.factor.T @ inner @ block.factor
             along = block.factor.T @ across
             made = float(along @ np.linalg.pinv(turned, rcond=1e-9, hermitian=True) @ along)

@@ -79,7 +79,7 @@ class State:
         For a set with the evidence of all.
         """
         beside, hypotheses = self.target.beside(self.members), self.evidence.design.hypotheses
-        left = np.diag(beside) / np.maximum(np.diag(self.target.products), np.finfo(float).tiny)
+        left = beside.diagonal / np.maximum(self.target.products.diagonal, np.finfo(float).tiny)
         return {
             index: self.target.table(index, beside)
             for index, one in enumerate(hypotheses)

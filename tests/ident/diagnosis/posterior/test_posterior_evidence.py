@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from ident.diagnosis.posterior.evidence import Evidence, Member
+from ident.diagnosis.posterior.gram import Beside, Gram
 from ident.diagnosis.posterior.noise import SIZES
 from ident.diagnosis.posterior.slots import slot_of
 from ident.diagnosis.problem import Problem, Variant
@@ -84,7 +85,7 @@ def test_what_physics_expects_of_a_size_weighs_as_a_row_does(problems: tuple[Pro
     block = free.design.hypotheses[number].blocks[0]
     target = Evidence(free.products, free.colours.usual).target_beside(())
     place = free.products.at(block.place)
-    power, amplitude = float(target.products[place, place][0, 0]), float(target.products[place.start, -1])
+    power, amplitude = float(target.products.of(place, place)[0, 0]), float(target.products.target[place.start])
     sizes = np.linspace(-5, 5, 200_001) * float(block.sizes[0])
 
     def integral(more: Array) -> float:
@@ -105,6 +106,10 @@ def test_a_set_has_the_same_posterior_by_its_own_columns_and_by_all(
     assert fitter.among_all(state).log_posterior == pytest.approx(state.log_posterior)
 
 
+def diluted_by(excess: float, products: Beside) -> Beside:
+    return replace(products, gram=Gram.of_all(products.gram.among(np.arange(len(products.gram))) / excess))
+
+
 @pytest.mark.parametrize("excess", [2.0, 5.0])
 def test_a_tempered_likelihood_is_that_of_rows_of_so_much_more_variance(
     problems: tuple[Problem, Problem], asked: Asked, excess: float
@@ -115,7 +120,7 @@ def test_a_tempered_likelihood_is_that_of_rows_of_so_much_more_variance(
     assert list(state.members) == [number]
     whole, price = question.search.fitter.among_all(state), question.design.hypotheses[number].price
     alone = whole.target.table(number, whole.target.beside({}))
-    diluted = whole.target.table(number, whole.target.beside({}) / excess).total - price
+    diluted = whole.target.table(number, diluted_by(excess, whole.target.beside({}))).total - price
     slot = slot_of(question.search, whole, number, excess)
     bare = state.log_posterior - question.search.fitter.nothing.log_posterior
     noise = bare + price - alone.total

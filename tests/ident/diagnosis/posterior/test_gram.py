@@ -1,0 +1,54 @@
+"""Products of columns, some replaced and others integrated, are those of the matrix that nobody makes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ident.diagnosis.posterior.gram import Beside, Gram
+
+COLUMNS, ROWS = 7, 12
+PLACES = [slice(0, 2), slice(2, 5), slice(5, 7), slice(1, 6)]
+
+
+def columns(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=(ROWS, COLUMNS + 1))
+
+
+@given(seed=st.integers(0, 10**6), replaced=st.sets(st.integers(0, COLUMNS), max_size=5))
+def test_replaced_columns_have_the_products_of_the_new_ones(seed: int, replaced: set[int]) -> None:
+    before, now, numbers = columns(seed), columns(seed), np.array(sorted(replaced), dtype=np.int64)[::-1]
+    now[:, numbers] = columns(seed + 1)[:, numbers]
+    whole = now.T @ now
+    gram = Gram(before.T @ before, numbers, whole[numbers])
+    some = np.array([0, 2, 3, 6])
+    assert gram.columns(some) == pytest.approx(whole[:, some])
+    assert gram.among(some) == pytest.approx(whole[np.ix_(some, some)])
+    assert gram.target == pytest.approx(whole[-1])
+    assert gram.diagonal == pytest.approx(np.diag(whole))
+    for place in PLACES:
+        for other in PLACES:
+            assert gram.of(place, other) == pytest.approx(whole[place, other])
+
+
+@given(seed=st.integers(0, 10**6))
+def test_nothing_that_is_asked_for_changes_what_is_kept(seed: int) -> None:
+    whole = columns(seed).T @ columns(seed)
+    gram = Gram(whole.copy(), np.array([1, COLUMNS]), np.ones((2, COLUMNS + 1)))
+    gram.of(PLACES[0], PLACES[3])[:] = 0.0
+    gram.columns(np.array([1, 2]))[:] = 0.0
+    assert gram.whole == pytest.approx(whole)
+
+
+@given(seed=st.integers(0, 10**6))
+def test_beside_integrated_directions_products_are_by_the_covariance_that_those_add(seed: int) -> None:
+    """Directions of unit variance are noise of the rows: 1 + D Dᵀ."""
+    own, directions = columns(seed), np.linalg.qr(columns(seed + 1)[:, :2])[0] * [0.7, 3.0]
+    covariance = np.eye(ROWS) + directions @ directions.T
+    expected = own.T @ np.linalg.solve(covariance, own)
+    beside = Beside(Gram.of_all(own.T @ own), own.T @ directions, np.sum(directions**2, axis=0))
+    assert beside.of(PLACES[1], PLACES[3]) == pytest.approx(expected[PLACES[1], PLACES[3]])
+    assert beside.with_target(PLACES[2]) == pytest.approx(expected[PLACES[2], -1])
+    assert beside.diagonal == pytest.approx(np.diag(expected))
