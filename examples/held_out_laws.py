@@ -2,9 +2,13 @@
 
     python examples/held_out_laws.py ~/published kr300
 
+    python examples/held_out_laws.py ~/published --moving 0.05
+
 An answer to compare the diagnosis with, so it shares nothing with it: positions pass a low pass forward and backward,
 effort and columns pass it once more, M a + Fv v + Fc sign(v) + offset is fitted with and without the columns of a law,
 and the rms of what it leaves is taken where nothing was fitted. The best law stays, and all others are tried beside it.
+At rest a friction has any value up to that of sliding: with `--moving` rows of less than a share of the speed, and half
+a period of the cutoff beside them, are left out.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ import numpy as np
 from held_out_columns import LAWS, Array, Axis, Columns, axes_of, baseline
 from numpy.typing import NDArray
 from published_machines import ROWS, read_row
-from scipy import signal
+from scipy import ndimage, signal
 
 from ident.records.axis_record import AxisRecord
 
@@ -57,17 +61,34 @@ class Part:
         return np.asarray(white[whole & (self.held == held)])
 
 
-def parts_of(fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord], name: str, cutoff: float) -> list[Part]:
-    """All records of an axis; without any that confirm, every second block of each is held out."""
+def parts_of(
+    fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord], name: str, cutoff: float, moving: float = 0.0
+) -> list[Part]:
+    """All records of an axis; without any that confirm, every second block of each is held out.
+
+    Args:
+        fit, confirm: records.
+        name: of the axis.
+        cutoff: of the low pass [Hz].
+        moving: share of a large speed below which an axis rests.
+    """
     parts = []
     for at, record in enumerate([*fit, *confirm]):
         number = [axis.name for axis in record.axes].index(name)
         step = max(1, int(1 / (RATE * cutoff * record.sample_time)))
+        axis = axes_of(record, cutoff)[number]
         rows = np.arange(0, len(record), step)[5:-5]
+        rows = rows[~resting(axis, moving)[rows]]
         odd = (rows * BLOCKS // len(record)) % 2 == 1
         held = odd if not confirm else np.full(len(rows), at >= len(fit))
-        parts.append(Part(axes_of(record, cutoff)[number], rows, held, np.ones(1)))
+        parts.append(Part(axis, rows, held, np.ones(1)))
     return parts
+
+
+def resting(axis: Axis, moving: float) -> NDArray[np.bool_]:
+    """Samples (N,) slower than a share of a large speed, and half a period of the cutoff before and after them."""
+    slow = np.abs(axis.speed) < moving * axis.scale
+    return np.asarray(ndimage.binary_dilation(slow, np.ones(2 * round(0.5 / axis.cutoff / axis.interval) + 1)))
 
 
 def whitened(parts: Sequence[Part]) -> list[Part]:
@@ -142,13 +163,16 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="where the repositories are")
     parser.add_argument("machines", nargs="*", help="of which machines, all by default")
     parser.add_argument("--whiten", action="store_true", help="weigh rows as their noise is coloured")
+    parser.add_argument("--moving", type=float, default=0.0, metavar="SHARE", help="of a large speed; slower is rest")
     given = parser.parse_args()
+    if given.whiten and given.moving:
+        parser.error("Rows are weighed by those before them, which --moving leaves out. Name one of the two.")
     for row in ROWS:
         if given.machines and row.machine not in given.machines:
             continue
         fit, confirm = read_row(row, given.folder)
         for axis in fit[0].axes:
-            parts = parts_of(fit, confirm, axis.name, row.cutoff)
+            parts = parts_of(fit, confirm, axis.name, row.cutoff, given.moving)
             title = f"{row.machine} {row.title} {axis.named('axis')}"
             for line in report(title, whitened(parts) if given.whiten else parts):
                 print(line, flush=True)

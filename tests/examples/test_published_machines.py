@@ -2,7 +2,7 @@
 
 import importlib
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -106,7 +106,7 @@ def test_every_machine_has_rows_and_every_row_a_machine(machines: ModuleType) ->
 
 
 def test_rows_without_records_say_where_to_get_them(machines: ModuleType, tmp_path: Path) -> None:
-    header, _, *rows = machines.lines(tmp_path, ["kr300"])
+    header, _, *rows = machines.lines(tmp_path, ["kr300"], machines.STANDING)
     assert header.startswith("| machine |")
     assert len(rows) == sum(row.machine == "kr300" for row in machines.ROWS)
     for row in rows:
@@ -162,3 +162,32 @@ def test_least_squares_alone_find_the_gravity_of_a_swinging_arm(load: Any) -> No
     first, second, *_ = held_out.report("arm", held_out.parts_of([record], [], "", 5.0))
     assert first.startswith("arm: effort")
     assert second.strip().startswith("gravity over own position")
+
+
+def test_friction_at_rest_is_no_law_of_anything(load: Any) -> None:
+    """At rest the effort is what it was when the axis came to rest: a function of time, if rows at rest count."""
+    held_out = load("held_out_laws")
+    time = np.arange(0, 60, 0.01)
+    phase = np.minimum(time % 6.0, 3.0)
+    angle = (0.4 + 0.02 * time) * np.sin(2 * np.pi * phase / 3.0) ** 2
+    speed = np.gradient(angle, time)
+    held = np.interp(time, np.arange(0, 66, 6.0), 0.9 * np.sin(np.arange(11.0)))
+    friction = np.where(np.abs(speed) > 1e-9, np.sign(speed), held)
+    noise = np.random.default_rng(1).normal(scale=0.01, size=len(time))
+    effort = 0.5 * np.gradient(speed, time) + 0.2 * speed + friction + noise
+    record = AxisRecord((AxisSignals("", AxisKind.ROTARY, angle, effort),), 0.01, time, np.full(len(time), -1))
+
+    def gap(moving: float) -> float:
+        first = next(iter(held_out.report("arm", held_out.parts_of([record], [], "", 5.0, moving))))
+        return float(first.rpartition(" ")[2])
+
+    assert gap(0.0) > 0.2
+    assert gap(0.05) < 0.1 * gap(0.0)
+
+
+def test_what_causes_predict_is_the_share_of_what_was_missed_that_is_gone(machines: ModuleType) -> None:
+    block = SimpleNamespace(target=np.array([3.0, 4.0, 99.0]), moving=np.array([True, True, False]))
+    held_out = SimpleNamespace(
+        problem=SimpleNamespace(blocks=[block]), before=[np.zeros(3)], after=[np.array([3.0, 2.0, 0.0])]
+    )
+    assert machines.predicted_share(held_out) == pytest.approx(1 - 4 / 25)
