@@ -138,24 +138,32 @@ class Regression:
         Were the colour that of the whole residual, an effect of long memory would be taken for noise of long memory
         and whitened away. What the best candidates can explain is therefore taken off first, believed or not.
         """
+        return self._colour(self.with_strongest(variants))
+
+    def with_strongest(self, variants: Sequence[int]) -> tuple[int, ...]:
+        """These variants and, on top, the best of the others, believed or not."""
         plain, flat = self._colour(variants), self._colour(variants, order=0)
         best = self._best(directions(self.white(plain, variants), self.rows.layout), variants, CONTENDING)
         level = directions(self.white(flat, variants), self.rows.layout)
         large = self._best(level, variants, LARGE * float(level.residual @ level.residual))
         most = min(CONTENDERS, len(self.rows) // ROWS_PER_CONTENDER)
-        return self._colour((*variants, *_one_each([*large[:most], *best[:most]], self.owners)))
+        return (*variants, *_one_each([*large[:most], *best[:most]], self.owners))
 
     def _colour(self, variants: Sequence[int], order: int = ORDER) -> Whitener:
         return self.colour_beside(self.columns_of(variants), order)
 
     def colour_beside(self, columns: Array, order: int = ORDER) -> Whitener:
         """Colour of what the baseline and columns (n, k) leave, fitted by turns with them; of order 0 only levels."""
+        width = self.rows.baseline.shape[1] + columns.shape[1]
+        return fit_whitener(self.rows, self.left_beside(columns, order), width, order, self.repeats)
+
+    def left_beside(self, columns: Array, order: int = ORDER) -> Array:
+        """What the baseline and columns (n, k) leave (n,), fitted once more by the colour of what they leave."""
         design = np.hstack([self.rows.baseline, columns])
         residual = self.rows.target - design @ self._level(design)
         whitener = fit_whitener(self.rows, residual, design.shape[1], order, self.repeats)
         white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
-        residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
-        return fit_whitener(self.rows, residual, design.shape[1], order, self.repeats)
+        return np.asarray(self.rows.target - design @ least_squares(white[:, :-1], white[:, -1]))
 
     def log_likelihood(self, columns: Array, whitener: Whitener) -> float:
         """Largest log likelihood of all rows with the baseline and columns (n, k), but for a constant of all noises."""

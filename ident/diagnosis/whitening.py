@@ -153,15 +153,20 @@ def fit_whitener(
     `repeats` are the colours of `colours_of_repeats`; without them, only what is left has one.
     """
     inflation = len(rows) / max(len(rows) - freedom_lost, 1.0)
-    tolerated, age = _tolerated(rows), row_ages(rows)
-    predictors = []
+    age, colours = row_ages(rows), []
     for group in range(int(rows.group.max(initial=-1)) + 1):
         colour = _colour(residual, age, rows.group == group, inflation)
         known = repeats[group] if repeats is not None else Colour(colour.covariance, 0)
         if known.count and colour.covariance[0] <= PREVAILING * known.covariance[0]:
             colour = known
-        predictors.append(_predictor(colour, tolerated[group], order))
-    return Whitener(tuple(predictors))
+        colours.append(colour)
+    return whitener_of(rows, colours, order)
+
+
+def whitener_of(rows: Rows, colours: Sequence[Colour], order: int = ORDER) -> Whitener:
+    """Whitener of noise of a colour for every group, and of what is tolerated there."""
+    tolerated = _tolerated(rows)
+    return Whitener(tuple(_predictor(one, own, order) for one, own in zip(colours, tolerated, strict=True)))
 
 
 def _tolerated(rows: Rows) -> Array:

@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 GAINED: Final = 3.0
 """Log evidence that an acceleration without its noise may bring: odds of 20 to 1, at which a name is sure."""
 
+ONCE_IN_TWENTY: Final = 1.645
+"""Standard deviations above its mean that a Gaussian number is as seldom."""
+
 
 @dataclass(frozen=True)
 class AccelerationNoise:
@@ -26,16 +29,19 @@ class AccelerationNoise:
 
     While an axis hardly accelerates, what is measured of it is noise, and the best prediction of the effort from that
     is none: what says so looks like an elastic drive, or like a law of the acceleration. To take a noise of power N out
-    of rows whose effort has E turns their variance from E + N into E: a log evidence of ln(1 + N / E) at every
-    frequency of a record, as far as it has rows.
+    of rows whose effort has E turns their variance from E + N into E: a log evidence of ln(1 + r), r = N / E, at every
+    frequency of a record, as far as it has rows, in the mean. Powers before and after are exponential, and have the
+    correlation 1 / (1 + r): the variance of that evidence is 2 r / (1 + r).
 
     Attributes:
         frequency: (F,) rising [Hz].
-        gained: (F,) log evidence up to there.
+        gained: (F,) log evidence up to there, in the mean.
+        variance: (F,) of that.
     """
 
     frequency: Array
     gained: Array
+    variance: Array
 
     @property
     def limit(self) -> float:
@@ -43,9 +49,13 @@ class AccelerationNoise:
         return 2 * math.pi * float(self.frequency[np.searchsorted(self.gained[:-1], GAINED)])
 
     def within(self, bandwidth: float) -> float:
-        """Log evidence in rows of a bandwidth [rad/s]: white ones show what is below half of their rate."""
+        """Log evidence of one record in twenty in rows of a bandwidth [rad/s].
+
+        White rows show what is below half of their rate.
+        """
         shown = ROWS_PER_CUTOFF / 2 * bandwidth / (2 * math.pi)
-        return float(np.interp(shown, self.frequency, self.gained))
+        gained, variance = (float(np.interp(shown, self.frequency, one)) for one in (self.gained, self.variance))
+        return gained + ONCE_IN_TWENTY * math.sqrt(variance)
 
 
 def acceleration_noise(
@@ -67,8 +77,9 @@ def acceleration_noise(
     position, effort = (noise_power(series, dt) for series in (axis.position, axis.effort))
     frequency = np.fft.rfftfreq(len(record), dt)
     noise = inertia**2 * position * (2 * math.pi * frequency) ** 4
-    gained = moving * np.cumsum(np.log1p(noise / max(min(effort, left), np.finfo(float).tiny)))
-    return AccelerationNoise(np.asarray(frequency, dtype=np.float64), gained)
+    ratio = noise / max(min(effort, left), np.finfo(float).tiny)
+    gained, variance = moving * np.cumsum(np.log1p(ratio)), moving * np.cumsum(2 * ratio / (1 + ratio))
+    return AccelerationNoise(np.asarray(frequency, dtype=np.float64), gained, variance)
 
 
 def noise_limit(record: AxisRecord, axis: AxisSignals, noise: AccelerationNoise, cutoff: float) -> float:

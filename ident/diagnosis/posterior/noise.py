@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from ident.diagnosis.linear import rms
+from ident.diagnosis.posterior.autoregression import colours_of
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Rows
-from ident.diagnosis.whitening import ORDER, Predictor, Whitener, fit_whitener, predictor_of
+from ident.diagnosis.whitening import Predictor, Whitener, predictor_of, whitener_of
 
 Array = NDArray[np.float64]
 Sizes = tuple[int, ...]
@@ -227,8 +228,9 @@ def _log(products: Array) -> float:
 def _of(regression: Regression, left: Left | None) -> Whitener:
     """Noise of rows without repeats: of what a set leaves, or the parameters and the strongest candidates."""
     if left is None:
-        return regression.whitener(())
-    return fit_whitener(regression.rows, left.residual, left.fitted, ORDER, regression.repeats)
+        strongest = regression.columns_of(regression.with_strongest(()))
+        left = Left(regression.left_beside(strongest), regression.rows.baseline.shape[1] + strongest.shape[1])
+    return whitener_of(regression.rows, colours_of(regression.rows, left.residual, left.fitted))
 
 
 def _remembering(distance: Array) -> Array:

@@ -1,0 +1,55 @@
+"""Colour of what is left of rows that nothing repeats, by Burg's autoregression.
+
+What is left is filtered, and mostly slow: its spectrum falls by many orders. Autocovariances of a record (Yule and
+Walker) see that through the window of its length, whose side lobes are then the noise that is taken for its fast part.
+Burg (1967) minimizes the errors of predictions forward and backward within the record and knows no window (Kay, Modern
+Spectral Estimation, 1988, chapter 7).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.rows import Rows
+from ident.diagnosis.whitening import ORDER, Colour, row_ages
+
+Array = NDArray[np.float64]
+
+
+def colours_of(rows: Rows, residual: Array, fitted: float) -> tuple[Colour, ...]:
+    """Autocovariance of every group of rows.
+
+    Args:
+        rows: whose uninterrupted runs are independent.
+        residual: (n,) what a model leaves of them.
+        fitted: how many coefficients that model had.
+    """
+    inflation, age = len(rows) / max(len(rows) - fitted, 1.0), row_ages(rows)
+    places = [np.flatnonzero(rows.group == group) for group in range(int(rows.group.max(initial=-1)) + 1)]
+    return tuple(Colour(inflation * autocovariance(residual[own], age[own]), len(own)) for own in places)
+
+
+def autocovariance(residual: Array, age: NDArray[np.int64]) -> Array:
+    """(ORDER + 1,) of the autoregression that predicts every row best from those before it, and those before from it.
+
+    Args:
+        residual: (n,) of runs behind each other.
+        age: (n,) how many rows of the same run lie before each.
+    """
+    forward, backward = residual.copy(), residual.copy()
+    found = np.zeros(ORDER + 1)
+    found[0] = variance = float(residual @ residual) / max(len(residual), 1)
+    weights = np.zeros(0)
+    for order in range(1, ORDER + 1):
+        later = np.flatnonzero(age >= order)
+        ahead, behind = forward[later], backward[later - 1]
+        power = 0.5 * float(ahead @ ahead + behind @ behind)
+        if power == 0:
+            break
+        reflection = float(ahead @ behind) / power
+        found[order] = reflection * variance + weights @ found[order - 1 : 0 : -1]
+        weights = np.append(weights - reflection * weights[::-1], reflection)
+        variance *= 1 - reflection**2
+        forward[later], backward[later] = ahead - reflection * behind, behind - reflection * ahead
+    return found
