@@ -26,6 +26,8 @@ TOLERATED_MEMORY: Final = 0.5
 """Correlation time of what is tolerated [s]: it is model error, and as slow as the motion."""
 PREVAILING: Final = 2.0
 """Power of what is left, over that of the noise in the mean of the repeats, from which model errors prevail."""
+ROWS_PER_LAG: Final = 20
+"""That an autoregression has at least for every order."""
 STRIDE: Final = 128
 """Rows that are whitened at once."""
 TAPER: Final = 1e-4
@@ -195,7 +197,7 @@ def predictor_of(colour: Colour) -> Predictor:
 
 
 def _predictor(colour: Colour, tolerated: Array, order: int) -> Predictor:
-    depth = min(order, colour.count // 20)
+    depth = min(order, colour.count // ROWS_PER_LAG)
     covariance = colour.covariance[: depth + 1] + tolerated[: depth + 1]
     covariance[0] = max(covariance[0] * (1 + TAPER), np.finfo(float).tiny)
     return _levinson(covariance)

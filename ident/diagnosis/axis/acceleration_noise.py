@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -20,7 +21,7 @@ GAINED: Final = 3.0
 """Log evidence that an acceleration without its noise may bring: odds of 20 to 1, at which a name is sure."""
 
 ONCE_IN_TWENTY: Final = 1.645
-"""Standard deviations above its mean that a Gaussian number is as seldom."""
+"""Standard deviations above its mean that one Gaussian number in twenty exceeds."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class AccelerationNoise:
     Attributes:
         frequency: (F,) rising [Hz].
         gained: (F,) log evidence up to there, in the mean.
-        variance: (F,) of that.
+        variance: (F,) of the log evidence up to there.
     """
 
     frequency: Array
@@ -48,14 +49,19 @@ class AccelerationNoise:
         """Frequency [rad/s] up to which it adds up to `GAINED`."""
         return 2 * math.pi * float(self.frequency[np.searchsorted(self.gained[:-1], GAINED)])
 
-    def within(self, bandwidth: float) -> float:
-        """Log evidence of one record in twenty in rows of a bandwidth [rad/s].
+    def within(self, bandwidth: float) -> Array:
+        """Mean and variance (2,) of the log evidence in rows of a bandwidth [rad/s].
 
-        White rows show what is below half of their rate.
+        White rows show what is below half of their rate, if only as far as the filter leaves something of it.
         """
         shown = ROWS_PER_CUTOFF / 2 * bandwidth / (2 * math.pi)
-        gained, variance = (float(np.interp(shown, self.frequency, one)) for one in (self.gained, self.variance))
-        return gained + ONCE_IN_TWENTY * math.sqrt(variance)
+        return np.array([np.interp(shown, self.frequency, one) for one in (self.gained, self.variance)])
+
+
+def at_most(noises: Iterable[AccelerationNoise], bandwidth: float) -> float:
+    """Log evidence in rows of a bandwidth [rad/s] of some records that one such set of records in twenty exceeds."""
+    gained, variance = np.sum([noise.within(bandwidth) for noise in noises], axis=0)
+    return float(gained + ONCE_IN_TWENTY * math.sqrt(variance))
 
 
 def acceleration_noise(

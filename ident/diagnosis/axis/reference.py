@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.axis.acceleration_noise import acceleration_noise, noise_limit
+from ident.diagnosis.axis.acceleration_noise import acceleration_noise, at_most, noise_limit
 from ident.diagnosis.axis.motion import (
     FEWEST_ROWS,
     LEAST_BAND,
@@ -176,7 +176,7 @@ def axis_reference(
         bandwidth,
         scales,
         tuple(sorted({nominal(record.sample_time) for record in strange})),
-        tuple(sum(noise.within(bandwidth) for noise in own) for own in zip(*noises, strict=True)),
+        tuple(at_most(own, bandwidth) for own in zip(*noises, strict=True)),
     )
 
 

@@ -3,7 +3,7 @@
 What is left is filtered, and mostly slow: its spectrum falls by many orders. Autocovariances of a record (Yule and
 Walker) see that through the window of its length, whose side lobes are then the noise that is taken for its fast part.
 Burg (1967) minimizes the errors of predictions forward and backward within the record and knows no window (Kay, Modern
-Spectral Estimation, 1988, chapter 7).
+Spectral Estimation, 1988, chapter 7). What is whitened keeps a floor of `whitening.TAPER` of the variance all the same.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.rows import Rows
-from ident.diagnosis.whitening import ORDER, Colour, row_ages
+from ident.diagnosis.whitening import ORDER, ROWS_PER_LAG, Colour, row_ages
 
 Array = NDArray[np.float64]
 
@@ -45,9 +45,8 @@ def autocovariance(residual: Array, age: NDArray[np.int64]) -> Array:
         later = np.flatnonzero(age >= order)
         ahead, behind = forward[later], backward[later - 1]
         power = 0.5 * float(ahead @ ahead + behind @ behind)
-        if power == 0:
-            break
-        reflection = float(ahead @ behind) / power
+        # Of a few rows at the ends of the longest runs alone nothing is predicted.
+        reflection = float(ahead @ behind) / power if power > 0 and len(later) >= ROWS_PER_LAG else 0.0
         found[order] = reflection * variance + weights @ found[order - 1 : 0 : -1]
         weights = np.append(weights - reflection * weights[::-1], reflection)
         variance *= 1 - reflection**2

@@ -1,6 +1,6 @@
-"""Products of columns of which some are replaced, and others integrated: nothing is made before it is asked for.
+"""Products of columns of which some are replaced, and others integrated, without a copy of those of all.
 
-The products of all columns are large, and most of them are looked at by one hypothesis alone, or by none.
+They are large, and most of them are looked at by one hypothesis alone, or by none.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Gram:
 
     Attributes:
         whole: (K + 1, K + 1) before anything is replaced.
-        replaced: (m,) numbers of those that are.
+        replaced: (m,) numbers of those that are, each once, in any order.
         rows: (m, K + 1) products of these with all, and with each other.
     """
 
