@@ -62,7 +62,7 @@ class Result:
         answer: in words.
         before, after: held-out gap over noise.
         predicted: share of the mean square of the held-out effort that the model misses which its causes take away;
-            no noise is in that, so that it compares one diagnosis with another.
+            no estimate of a noise is in that, so that it compares one diagnosis with another.
         seconds: of the processor.
     """
 
