@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from judges import JUDGES
 from numpy.typing import NDArray
 from published_outcomes import (
     ASYMMETRY,
@@ -38,10 +39,9 @@ from published_outcomes import (
 )
 from published_records import MACHINES, record
 
-from ident.diagnosis.axis.diagnose import STANDING, diagnose_axis
+from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.findings import HeldOut
 from ident.diagnosis.judge import Judge
-from ident.diagnosis.posterior.answer import judge_by_posterior
 from ident.errors import UserError
 from ident.records.axis_record import AxisRecord
 
@@ -50,7 +50,6 @@ Array = NDArray[np.float64]
 FOLDER: Final = "QUASIOMNI_PUBLISHED"
 """Environment variable: folder of the copies."""
 SEED: Final = 1
-CORES: Final[Mapping[str, Judge]] = {"standing": STANDING, "one": judge_by_posterior}
 
 
 @dataclass(frozen=True)
@@ -311,12 +310,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?", default=os.environ.get(FOLDER), help=f"or {FOLDER}")
     parser.add_argument("machines", nargs="*", help="of which machines, all by default")
-    parser.add_argument("--core", choices=list(CORES), default="standing", help="that answers (docs/diagnosis.md)")
+    parser.add_argument("--core", choices=list(JUDGES), default="standing", help="that answers (docs/diagnosis.md)")
     parser.add_argument("--sources", action="store_true", help="print where the records are")
     given = parser.parse_args()
     if given.folder is None and not given.sources:
         parser.error(f"Name the folder of the copies, or set {FOLDER}.")
-    for line in sources() if given.sources else lines(Path(given.folder), given.machines, CORES[given.core]):
+    for line in sources() if given.sources else lines(Path(given.folder), given.machines, JUDGES[given.core]):
         print(line, flush=True)
 
 
