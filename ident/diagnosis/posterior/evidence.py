@@ -119,6 +119,7 @@ class Evidence:
         self.shown: Array = np.diag(self._beside)[:-1] / power
         self._determinant = float(np.sum(np.log(np.diag(self._baseline[0]))))
         smallest = 1 / math.sqrt(len(self.design.target))
+        self._alone = dict[int, Table]()
         self.scales = np.geomspace(smallest, LARGEST, 1 + math.ceil(math.log2(LARGEST / smallest) / OCTAVES))
 
     @property
@@ -130,6 +131,13 @@ class Evidence:
         """The rows, some members by their slopes instead of their columns, with what is expected of those."""
         found = self._bent(bends) if bends else Gram.of_all(self._beside)
         return Target(self, found, -0.5 * float(found.target[-1]) - self._volume - self._determinant)
+
+    def alone(self, hypothesis: int) -> Table:
+        """Log evidence of a hypothesis beside nothing, and beside what acts in other rows."""
+        if hypothesis not in self._alone:
+            blocks, target = self.design.hypotheses[hypothesis].blocks, self.target_beside(())
+            self._alone[hypothesis] = target.table_by(blocks, target.beside({}), range(len(blocks)))
+        return self._alone[hypothesis]
 
     def parameters(self, added: Array) -> Array:
         """(p,) of the plant beside what some members add (n,), in their units; those that are known as they are."""
@@ -145,7 +153,7 @@ class Evidence:
         rows = (along[width:] - self._across.T @ along[:width]).T
         replaced = np.concatenate([numbers_of(self.products.at(bent.place)) for bent in bends])
         # The target is what it was without what slopes miss.
-        target = self._beside[-1] - rows[-1]
+        target = self._beside[:, -1] - rows[-1]
         target[replaced] = rows[:-1, -1] - own[:-1, -1]
         target[-1] += own[-1, -1] - rows[-1, -1]
         rows[:-1, replaced], rows[-1] = own[:-1, :-1], target
@@ -214,14 +222,17 @@ class Target:
             return self.table(hypothesis, self.beside(others))
         # What is expected of it stands in its products already.
         block = replace(self.evidence.design.hypotheses[hypothesis].blocks[only], expected=None)
-        return self._table([block], self.beside(others), (only,))
+        return self.table_by([block], self.beside(others), (only,))
 
     def table(self, hypothesis: int, products: Beside) -> Table:
         """The same, by the products of all columns beside the others."""
-        blocks = self.evidence.design.hypotheses[hypothesis].blocks
-        return self._table(blocks, products, range(len(blocks)))
+        blocks, places = self.evidence.design.hypotheses[hypothesis].blocks, self.evidence.products
+        if all(products.untouched[places.at(block.place)].all() for block in blocks):
+            return self.evidence.alone(hypothesis)
+        return self.table_by(blocks, products, range(len(blocks)))
 
-    def _table(self, blocks: Sequence[Block], products: Beside, numbers: Sequence[int]) -> Table:
+    def table_by(self, blocks: Sequence[Block], products: Beside, numbers: Sequence[int]) -> Table:
+        """The same of some blocks with these numbers."""
         masses = np.array([self._mass(block) for block in blocks])
         made = [self._logs(block, self.evidence.products.at(block.place), products) for block in blocks]
         logs, occam = (np.stack(parts) for parts in zip(*made, strict=True))

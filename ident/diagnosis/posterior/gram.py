@@ -106,6 +106,13 @@ class Beside:
         """Products of the columns of a place with the target."""
         return np.asarray(self.gram.target[place] - (self.across[place] / (1 + self.powers)) @ self.across[-1])
 
+    @cached_property
+    def untouched(self) -> NDArray[np.bool_]:
+        """(K + 1,) columns of which the directions have nothing, neither replaced nor of another target."""
+        found = ~self.across.any(axis=1) & (self.gram.target == self.gram.whole[:, -1])
+        found[self.gram.replaced] = False
+        return np.asarray(found)
+
     @property
     def diagonal(self) -> Array:
         """(K + 1,) powers."""

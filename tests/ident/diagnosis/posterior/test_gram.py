@@ -52,3 +52,23 @@ def test_beside_integrated_directions_products_are_by_the_covariance_that_those_
     assert beside.of(PLACES[1], PLACES[3]) == pytest.approx(expected[PLACES[1], PLACES[3]])
     assert beside.with_target(PLACES[2]) == pytest.approx(expected[PLACES[2], -1])
     assert beside.diagonal == pytest.approx(np.diag(expected))
+
+
+@given(seed=st.integers(0, 10**6), bent=st.booleans())
+def test_what_acts_in_other_rows_is_untouched(seed: int, bent: bool) -> None:
+    """The first three columns act in the first rows alone, the others in the last ones, as two axes do."""
+    own = columns(seed)
+    own[6:, :3] = own[:6, 3:COLUMNS] = 0.0
+    now, numbers = own.copy(), np.array([1, COLUMNS] if bent else [], dtype=np.int64)
+    now[:6, numbers] += columns(seed + 1)[:6, numbers]
+    whole, rows = own.T @ own, (now.T @ now)[numbers]
+    rows[:, 3:COLUMNS] = whole[3:COLUMNS, numbers].T
+    gram = Gram(whole, numbers, rows)
+    directions = np.zeros((ROWS, 1))
+    directions[:6] = 0.1
+    beside = Beside(gram, now.T @ directions, np.array([0.06]))
+    assert not beside.untouched[:3].any()
+    for place in (slice(3, 5), slice(5, COLUMNS)):
+        assert beside.untouched[place].all()
+        assert beside.of(place, place) == pytest.approx(whole[place, place])
+        assert beside.with_target(place) == pytest.approx(whole[place, -1])

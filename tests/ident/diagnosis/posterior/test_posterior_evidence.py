@@ -120,7 +120,9 @@ def test_a_tempered_likelihood_is_that_of_rows_of_so_much_more_variance(
     assert list(state.members) == [number]
     whole, price = question.search.fitter.among_all(state), question.design.hypotheses[number].price
     alone = whole.target.table(number, whole.target.beside({}))
-    diluted = whole.target.table(number, diluted_by(excess, whole.target.beside({}))).total - price
+    blocks = question.design.hypotheses[number].blocks
+    products = diluted_by(excess, whole.target.beside({}))
+    diluted = whole.target.table_by(blocks, products, range(len(blocks))).total - price
     slot = slot_of(question.search, whole, number, excess)
     bare = state.log_posterior - question.search.fitter.nothing.log_posterior
     noise = bare + price - alone.total
