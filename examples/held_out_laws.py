@@ -1,7 +1,6 @@
 """Which single law closes most of the held-out gap of a servo axis, by least squares alone.
 
     python examples/held_out_laws.py ~/published kr300
-
     python examples/held_out_laws.py ~/published --moving 0.05
 
 An answer to compare the diagnosis with, so it shares nothing with it: positions pass a low pass forward and backward,

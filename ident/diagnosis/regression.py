@@ -16,7 +16,7 @@ from ident.diagnosis.linear import least_squares, unit_of
 from ident.diagnosis.problem import Problem, Series
 from ident.diagnosis.rows import Rows
 from ident.diagnosis.settings import Settings
-from ident.diagnosis.whitening import ORDER, Colour, Whitener, Whitening, colours_of_repeats, fit_whitener
+from ident.diagnosis.whitening import ORDER, Colour, Left, Whitener, Whitening, colours_of_repeats, fit_whitener
 
 Array = NDArray[np.float64]
 
@@ -154,16 +154,17 @@ class Regression:
 
     def colour_beside(self, columns: Array, order: int = ORDER) -> Whitener:
         """Colour of what the baseline and columns (n, k) leave, fitted by turns with them; of order 0 only levels."""
-        width = self.rows.baseline.shape[1] + columns.shape[1]
-        return fit_whitener(self.rows, self.left_beside(columns, order), width, order, self.repeats)
+        left = self.left_beside(columns, order)
+        return fit_whitener(self.rows, left.residual, left.fitted, order, self.repeats)
 
-    def left_beside(self, columns: Array, order: int = ORDER) -> Array:
-        """What the baseline and columns (n, k) leave (n,), fitted once more by the colour of what they leave."""
+    def left_beside(self, columns: Array, order: int = ORDER) -> Left:
+        """What the baseline and columns (n, k) leave, fitted once more by the colour of what they leave."""
         design = np.hstack([self.rows.baseline, columns])
         residual = self.rows.target - design @ self._level(design)
         whitener = fit_whitener(self.rows, residual, design.shape[1], order, self.repeats)
         white = whitener.apply(self.rows, np.column_stack([design, self.rows.target]))
-        return np.asarray(self.rows.target - design @ least_squares(white[:, :-1], white[:, -1]))
+        residual = self.rows.target - design @ least_squares(white[:, :-1], white[:, -1])
+        return Left(residual, design.shape[1])
 
     def log_likelihood(self, columns: Array, whitener: Whitener) -> float:
         """Largest log likelihood of all rows with the baseline and columns (n, k), but for a constant of all noises."""

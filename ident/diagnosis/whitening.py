@@ -7,7 +7,7 @@ prevail, and where nothing repeats, the colour is that of what is left.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -26,8 +26,6 @@ TOLERATED_MEMORY: Final = 0.5
 """Correlation time of what is tolerated [s]: it is model error, and as slow as the motion."""
 PREVAILING: Final = 2.0
 """Power of what is left, over that of the noise in the mean of the repeats, from which model errors prevail."""
-ROWS_PER_LAG: Final = 20
-"""That an autoregression has at least for every order."""
 STRIDE: Final = 128
 """Rows that are whitened at once."""
 TAPER: Final = 1e-4
@@ -115,6 +113,23 @@ class Colour:
     count: int
 
 
+@dataclass(frozen=True)
+class Left:
+    """What a model leaves of the rows.
+
+    Attributes:
+        residual: (n,).
+        fitted: how many coefficients were, what is known of them beforehand taken off.
+    """
+
+    residual: Array
+    fitted: float
+
+
+Autocovariance = Callable[[Array, NDArray[np.int64]], Array]
+"""Of a residual (n,), runs behind each other, and how many rows of its run lie before each: (ORDER + 1,)."""
+
+
 def colours_of_repeats(rows: Rows, residuals: Sequence[Array]) -> tuple[Colour, ...]:
     """Colour of the noise in the mean over the repeats, by group, from what differs between them.
 
@@ -154,15 +169,20 @@ def fit_whitener(
 
     `repeats` are the colours of `colours_of_repeats`; without them, only what is left has one.
     """
-    inflation = len(rows) / max(len(rows) - freedom_lost, 1.0)
-    age, colours = row_ages(rows), []
-    for group in range(int(rows.group.max(initial=-1)) + 1):
-        colour = _colour(residual, age, rows.group == group, inflation)
-        known = repeats[group] if repeats is not None else Colour(colour.covariance, 0)
-        if known.count and colour.covariance[0] <= PREVAILING * known.covariance[0]:
-            colour = known
-        colours.append(colour)
+    colours = colours_of(rows, Left(residual, freedom_lost), _through_window)
+    if repeats is not None:
+        colours = [
+            known if known.count and own.covariance[0] <= PREVAILING * known.covariance[0] else own
+            for own, known in zip(colours, repeats, strict=True)
+        ]
     return whitener_of(rows, colours, order)
+
+
+def colours_of(rows: Rows, left: Left, autocovariance: Autocovariance) -> Sequence[Colour]:
+    """Colour of what is left of every group of rows, by an estimate of the autocovariance of its runs."""
+    inflation, age = len(rows) / max(len(rows) - left.fitted, 1.0), row_ages(rows)
+    places = [np.flatnonzero(rows.group == group) for group in range(int(rows.group.max(initial=-1)) + 1)]
+    return [Colour(inflation * autocovariance(left.residual[own], age[own]), len(own)) for own in places]
 
 
 def whitener_of(rows: Rows, colours: Sequence[Colour], order: int = ORDER) -> Whitener:
@@ -182,13 +202,12 @@ def _tolerated(rows: Rows) -> Array:
     return found
 
 
-def _colour(residual: Array, age: NDArray[np.int64], chosen: NDArray[np.bool_], inflation: float) -> Colour:
-    place = np.flatnonzero(chosen)
+def _through_window(residual: Array, age: NDArray[np.int64]) -> Array:
     covariance = np.empty(ORDER + 1)
     for lag in range(ORDER + 1):
-        later = place[age[place] >= lag]
+        later = np.flatnonzero(age >= lag)
         covariance[lag] = residual[later] @ residual[later - lag]
-    return Colour(covariance * inflation / max(len(place), 1), len(place))
+    return covariance / max(len(residual), 1)
 
 
 def predictor_of(colour: Colour) -> Predictor:
@@ -197,7 +216,7 @@ def predictor_of(colour: Colour) -> Predictor:
 
 
 def _predictor(colour: Colour, tolerated: Array, order: int) -> Predictor:
-    depth = min(order, colour.count // ROWS_PER_LAG)
+    depth = min(order, colour.count // 20)
     covariance = colour.covariance[: depth + 1] + tolerated[: depth + 1]
     covariance[0] = max(covariance[0] * (1 + TAPER), np.finfo(float).tiny)
     return _levinson(covariance)

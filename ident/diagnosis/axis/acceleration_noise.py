@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from ident.diagnosis.axis.motion import FEWEST_ROWS, LARGEST_ROWS_CUTOFF, noise_power, sample_noise
 from ident.diagnosis.rows import ROWS_PER_CUTOFF
@@ -19,9 +20,6 @@ Array = NDArray[np.float64]
 
 GAINED: Final = 3.0
 """Log evidence that an acceleration without its noise may bring: odds of 20 to 1, at which a name is sure."""
-
-ONCE_IN_TWENTY: Final = 1.645
-"""Standard deviations above its mean that one Gaussian number in twenty exceeds."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +57,12 @@ class AccelerationNoise:
 
 
 def at_most(noises: Iterable[AccelerationNoise], bandwidth: float) -> float:
-    """Log evidence in rows of a bandwidth [rad/s] of some records that one such set of records in twenty exceeds."""
+    """Log evidence in rows of a bandwidth [rad/s] of some records that one such set of records in twenty exceeds.
+
+    By as many deviations of a Gaussian number as odds of `GAINED` are.
+    """
     gained, variance = np.sum([noise.within(bandwidth) for noise in noises], axis=0)
-    return float(gained + ONCE_IN_TWENTY * math.sqrt(variance))
+    return float(gained - special.ndtri(math.exp(-GAINED)) * math.sqrt(variance))
 
 
 def acceleration_noise(

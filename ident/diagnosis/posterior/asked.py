@@ -10,12 +10,13 @@ from ident.diagnosis.posterior.differing import with_known_differences
 from ident.diagnosis.posterior.fitting import Fitter
 from ident.diagnosis.posterior.hidden import with_hidden_orders
 from ident.diagnosis.posterior.hypotheses import Design, make_design
-from ident.diagnosis.posterior.noise import Colours, Left
+from ident.diagnosis.posterior.noise import Colours
 from ident.diagnosis.posterior.state import State
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import make_rows
 from ident.diagnosis.settings import Settings
+from ident.diagnosis.whitening import Left
 
 
 @dataclass(frozen=True)

@@ -11,23 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.rows import Rows
-from ident.diagnosis.whitening import ORDER, ROWS_PER_LAG, Colour, row_ages
+from ident.diagnosis.whitening import ORDER
 
 Array = NDArray[np.float64]
-
-
-def colours_of(rows: Rows, residual: Array, fitted: float) -> tuple[Colour, ...]:
-    """Autocovariance of every group of rows.
-
-    Args:
-        rows: whose uninterrupted runs are independent.
-        residual: (n,) what a model leaves of them.
-        fitted: how many coefficients that model had.
-    """
-    inflation, age = len(rows) / max(len(rows) - fitted, 1.0), row_ages(rows)
-    places = [np.flatnonzero(rows.group == group) for group in range(int(rows.group.max(initial=-1)) + 1)]
-    return tuple(Colour(inflation * autocovariance(residual[own], age[own]), len(own)) for own in places)
 
 
 def autocovariance(residual: Array, age: NDArray[np.int64]) -> Array:
@@ -45,8 +31,8 @@ def autocovariance(residual: Array, age: NDArray[np.int64]) -> Array:
         later = np.flatnonzero(age >= order)
         ahead, behind = forward[later], backward[later - 1]
         power = 0.5 * float(ahead @ ahead + behind @ behind)
-        # Of a few rows at the ends of the longest runs alone nothing is predicted.
-        reflection = float(ahead @ behind) / power if power > 0 and len(later) >= ROWS_PER_LAG else 0.0
+        # Fewer rows than coefficients, at the ends of the longest runs, predict nothing.
+        reflection = float(ahead @ behind) / power if power > 0 and len(later) >= ORDER else 0.0
         found[order] = reflection * variance + weights @ found[order - 1 : 0 : -1]
         weights = np.append(weights - reflection * weights[::-1], reflection)
         variance *= 1 - reflection**2

@@ -226,8 +226,8 @@ class Target:
 
     def table(self, hypothesis: int, products: Beside) -> Table:
         """The same, by the products of all columns beside the others."""
-        blocks, places = self.evidence.design.hypotheses[hypothesis].blocks, self.evidence.products
-        if all(products.untouched[places.at(block.place)].all() for block in blocks):
+        blocks, at = self.evidence.design.hypotheses[hypothesis].blocks, self.evidence.products.at
+        if all(products.untouched[at(block.place)].all() for block in blocks):
             return self.evidence.alone(hypothesis)
         return self.table_by(blocks, products, range(len(blocks)))
 

@@ -16,10 +16,11 @@ from ident.diagnosis.posterior.bends import Bends, Bent, Form
 from ident.diagnosis.posterior.evidence import Evidence, Member, Members
 from ident.diagnosis.posterior.hypotheses import Block, Design
 from ident.diagnosis.posterior.misfit import excess_of_scatter, tempered
-from ident.diagnosis.posterior.noise import Colours, Left, Sizes, most_likely
+from ident.diagnosis.posterior.noise import Colours, Sizes, most_likely
 from ident.diagnosis.posterior.products import Products, numbers_of
 from ident.diagnosis.posterior.state import State
 from ident.diagnosis.problem import Series, summed
+from ident.diagnosis.whitening import Left
 
 Array = NDArray[np.float64]
 

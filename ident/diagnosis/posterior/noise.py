@@ -11,6 +11,7 @@ price.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -18,10 +19,10 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from ident.diagnosis.linear import rms
-from ident.diagnosis.posterior.autoregression import colours_of
+from ident.diagnosis.posterior.autoregression import autocovariance
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import Rows
-from ident.diagnosis.whitening import Predictor, Whitener, predictor_of, whitener_of
+from ident.diagnosis.whitening import Left, Predictor, Whitener, colours_of, predictor_of, whitener_of
 
 Array = NDArray[np.float64]
 Sizes = tuple[int, ...]
@@ -44,19 +45,6 @@ ROUNDING: Final = 1e-9
 
 ROUNDS: Final = 4
 """Times that the sizes of all labels are looked at."""
-
-
-@dataclass(frozen=True)
-class Left:
-    """What a set leaves of the rows.
-
-    Attributes:
-        residual: (n,).
-        fitted: how many coefficients were, what is known of them beforehand taken off.
-    """
-
-    residual: Array
-    fitted: float
 
 
 class Colours:
@@ -106,7 +94,7 @@ class Colours:
         """Whether what differs between repeats tells the noise of all rows."""
         return all(colour.count for colour in regression.repeats)
 
-    @property
+    @cached_property
     def rows_of_labels(self) -> tuple[NDArray[np.int64], ...]:
         """Numbers of the rows of every label."""
         places = [[self._places[number] for number in numbers] for numbers in self.blocks]
@@ -228,9 +216,8 @@ def _log(products: Array) -> float:
 def _of(regression: Regression, left: Left | None) -> Whitener:
     """Noise of rows without repeats: of what a set leaves, or the parameters and the strongest candidates."""
     if left is None:
-        strongest = regression.columns_of(regression.with_strongest(()))
-        left = Left(regression.left_beside(strongest), regression.rows.baseline.shape[1] + strongest.shape[1])
-    return whitener_of(regression.rows, colours_of(regression.rows, left.residual, left.fitted))
+        left = regression.left_beside(regression.columns_of(regression.with_strongest(())))
+    return whitener_of(regression.rows, colours_of(regression.rows, left, autocovariance))
 
 
 def _remembering(distance: Array) -> Array:
