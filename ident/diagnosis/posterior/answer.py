@@ -21,7 +21,7 @@ from ident.diagnosis.law.reach import told_samples
 from ident.diagnosis.law.stage import Law
 from ident.diagnosis.limits import Limits
 from ident.diagnosis.orders import with_orders
-from ident.diagnosis.posterior.asked import Asked, asked_beside, asked_of
+from ident.diagnosis.posterior.asked import Asked, asked_beside, asked_beside_a_law, asked_of
 from ident.diagnosis.posterior.noise import SIZES
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.posterior.slots import slot_of
@@ -61,19 +61,29 @@ def judge_by_posterior(fit: Problem, confirm: Problem, *, seed: int, stage: Stag
         stage: told what begins.
     """
     stage(f"comparing {len(fit.candidates)} causes and {len(fit.dependences)} laws")
-    asked = asked_of(with_orders((fit, confirm)), seed)
-    search = Search(asked.fitter)
-    state = search.run()
-    if (again := asked_beside(asked, state)) is not None:
-        stage("again beside what is there")
-        asked, search = again, Search(again.fitter)
-        state = search.run()
+    asked, search, state = _found(asked_of(with_orders((fit, confirm)), seed), stage)
+    if (again := asked_beside_a_law(asked, state)) is not None:
+        stage("again, noise being what a law leaves")
+        beside = _found(again, stage)
+        if beside[-1].log_posterior > state.log_posterior:
+            asked, search, state = beside
     stage("numbers of the answer")
     answer = _Answer(asked, search, state)
     while (other := answer.better()) is not None:
         search, state = other
         answer = _Answer(asked, search, state)
     return answer.findings()
+
+
+def _found(asked: Asked, stage: Stage) -> tuple[Asked, Search, State]:
+    """What is there, asked once more beside it."""
+    search = Search(asked.fitter)
+    state = search.run()
+    if (again := asked_beside(asked, state)) is None:
+        return asked, search, state
+    stage("again beside what is there")
+    search = Search(again.fitter)
+    return again, search, search.run()
 
 
 class _Answer:

@@ -12,6 +12,7 @@ from ident.diagnosis.posterior.hidden import with_hidden_orders
 from ident.diagnosis.posterior.hypotheses import Design, make_design
 from ident.diagnosis.posterior.noise import Colours
 from ident.diagnosis.posterior.state import State
+from ident.diagnosis.posterior.swallowed import beside_a_law
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import make_rows
@@ -51,6 +52,14 @@ def asked_beside(asked: Asked, state: State) -> Asked | None:
         left = asked.fitter.left(state)
     problems = with_hidden_orders(problems, asked.design, asked.designs, state) or problems
     return None if problems is asked.problems and left is None else asked_of(problems, asked.seed, left)
+
+
+def asked_beside_a_law(asked: Asked, state: State) -> Asked | None:
+    """The same asked with the noise beside a law that it may have swallowed; None where repeats tell the noise."""
+    if Colours.repeats(asked.regression):
+        return None
+    left = beside_a_law(asked.problems[0], asked.regression.rows, asked.designs, asked.fitter.left(state))
+    return None if left is None else asked_of(asked.problems, asked.seed, left)
 
 
 def asked_of(problems: tuple[Problem, ...], seed: int, left: Left | None = None) -> Asked:
