@@ -20,13 +20,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from judges import JUDGES
 
 from hil.exam.sources.axes import DrawnAxis, Lacking, draw_axis
 from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import LAW
-from ident.diagnosis.judge import Judge
 from ident.errors import UserError
 from ident.records.axis_record import AxisRecord
 
@@ -108,11 +106,11 @@ def _drawn(seed: int, attempt: int) -> Drawn:
     return trouble, axis, [record], [slower.drive(seed + 1)]
 
 
-def outcome_of(seed: int, judge: Judge) -> Outcome:
+def outcome_of(seed: int) -> Outcome:
     """Diagnose one."""
     trouble, axis, fit, confirm = drawn(seed)
     try:
-        findings = diagnose_axis(fit, confirm, seed=1, judged=judge)
+        findings = diagnose_axis(fit, confirm, seed=1)
     except UserError as error:
         return Outcome(trouble, axis.lacking, str(error), refused=True)
     effects = findings.diagnosis().effects
@@ -122,10 +120,10 @@ def outcome_of(seed: int, judge: Judge) -> Outcome:
     return Outcome(trouble, axis.lacking, str(findings.verdict), wrong=wrong)
 
 
-def outcomes(first_seed: int, count: int, judge: Judge) -> Iterator[Outcome]:
+def outcomes(first_seed: int, count: int) -> Iterator[Outcome]:
     """Of `count` seeds, one line each."""
     for seed in range(first_seed, first_seed + count):
-        outcome = outcome_of(seed, judge)
+        outcome = outcome_of(seed)
         print(seed, outcome.trouble, outcome.lacking, outcome.said, *outcome.wrong, sep=" | ", flush=True)
         yield outcome
 
@@ -135,9 +133,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--first-seed", type=int, default=60000)
     parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--core", choices=list(JUDGES), default="standing", help="that answers (docs/diagnosis.md)")
     arguments = parser.parse_args()
-    found = list(outcomes(arguments.first_seed, arguments.count, JUDGES[arguments.core]))
+    found = list(outcomes(arguments.first_seed, arguments.count))
     for trouble in Trouble:
         own = [one for one in found if one.trouble is trouble]
         refused, wrong = sum(one.refused for one in own), sum(bool(one.wrong) for one in own)

@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from judges import JUDGES
 from numpy.typing import NDArray
 from published_outcomes import (
     ASYMMETRY,
@@ -41,7 +40,6 @@ from published_records import MACHINES, record
 
 from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.findings import HeldOut
-from ident.diagnosis.judge import Judge
 from ident.errors import UserError
 from ident.records.axis_record import AxisRecord
 
@@ -244,11 +242,11 @@ def read_row(row: Row, folder: Path) -> tuple[list[AxisRecord], list[AxisRecord]
     return fit, confirm
 
 
-def result_of(row: Row, fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord], judge: Judge) -> Result:
+def result_of(row: Row, fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord]) -> Result:
     """Diagnose a row."""
     start, nothing = time.process_time(), float("nan")
     try:
-        findings = diagnose_axis(fit, confirm, seed=SEED, judged=judge)
+        findings = diagnose_axis(fit, confirm, seed=SEED)
     except UserError as error:
         return Result(Outcome.REFUSED, str(error), nothing, nothing, nothing, time.process_time() - start)
     diagnosis, seconds = findings.diagnosis(), time.process_time() - start
@@ -277,7 +275,7 @@ def _expectation(row: Row) -> str:
     )
 
 
-def lines(folder: Path, machines: Sequence[str], judge: Judge) -> Iterator[str]:
+def lines(folder: Path, machines: Sequence[str]) -> Iterator[str]:
     """The table, a row a line, as Markdown; rows without records say where to get them."""
     yield "| machine | expected (closes) | answer (closes) | outcome | gap over noise | predicts | time |"
     yield "|---|---|---|---|---|---|---|"
@@ -290,7 +288,7 @@ def lines(folder: Path, machines: Sequence[str], judge: Judge) -> Iterator[str]:
         except UserError as error:
             yield f"| {name} | {_expectation(row)} | skipped: {error} | | | | |"
             continue
-        result, answered = result_of(row, fit, confirm, judge), ("", "")
+        result, answered = result_of(row, fit, confirm), ("", "")
         if result.outcome is not Outcome.REFUSED:
             answered = (f"{result.before:.2f}, then {result.after:.2f}", f"{result.predicted:.2f}")
         cells = (name, _expectation(row), result.answer, result.outcome.value, *answered, f"{result.seconds:.0f} s")
@@ -310,12 +308,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?", default=os.environ.get(FOLDER), help=f"or {FOLDER}")
     parser.add_argument("machines", nargs="*", help="of which machines, all by default")
-    parser.add_argument("--core", choices=list(JUDGES), default="standing", help="that answers (docs/diagnosis.md)")
     parser.add_argument("--sources", action="store_true", help="print where the records are")
     given = parser.parse_args()
     if given.folder is None and not given.sources:
         parser.error(f"Name the folder of the copies, or set {FOLDER}.")
-    for line in sources() if given.sources else lines(Path(given.folder), given.machines, JUDGES[given.core]):
+    for line in sources() if given.sources else lines(Path(given.folder), given.machines):
         print(line, flush=True)
 
 

@@ -11,7 +11,7 @@ import typer
 
 from hil.exam.answer_file import open_cases
 from hil.exam.drawing import Composition, composition_of
-from hil.exam.folder import Core, ExamFolder
+from hil.exam.folder import ExamFolder
 from hil.exam.score_figures import confusion_svg, reliability_svg
 from hil.exam.score_report import score_exams, score_json, score_markdown, summary_lines
 from hil.exam.scoring import removable
@@ -39,10 +39,6 @@ FolderArgument = Annotated[Path, typer.Argument(help="Folder of the exam.")]
 SourceOption = Annotated[
     Source,
     typer.Option(help="What drives the cases: the emulated vehicle, one that shares no code with it, or servo axes."),
-]
-
-CoreOption = Annotated[
-    Core, typer.Option(help="What diagnoses: what stands, or the one comparison that is tried beside it.")
 ]
 
 _DEFAULT = Composition()
@@ -141,7 +137,6 @@ def diagnose(
         bool, typer.Option("--oracle", help="Open the answer; gather what somebody finds who knows each candidate.")
     ] = False,
     key: KeyOption = None,
-    core: CoreOption = Core.STANDING,
     jobs: JobsOption = 2,
     scheduler: SchedulerOption = None,
 ) -> None:
@@ -153,7 +148,7 @@ def diagnose(
     from hil.exam.diagnosing import diagnose_exam
     from hil.exam.oracle import ask_oracle, asked_of_oracle
 
-    opened = ExamFolder(folder, core)
+    opened = ExamFolder(folder)
     if oracle:
         asked = asked_of_oracle(open_cases(opened, key))
         with bar("asking the oracle") as shown:
@@ -207,7 +202,6 @@ def score_command(
     out: Annotated[
         Path | None, typer.Option(help="Folder for the score. Default: that of the exam; several need one.")
     ] = None,
-    core: CoreOption = Core.STANDING,
 ) -> None:
     """Open the sealed answers and score; writes score.md, score.json, reliability.svg and confusion.svg.
 
@@ -215,8 +209,8 @@ def score_command(
     """
     if out is None and len(folders) > 1:
         raise UserError("Several exams have no one folder for their score.", "Name one: --out FOLDER.")
-    target = out or (folders[0] if core is Core.STANDING else folders[0] / str(core))
-    report = score_exams([ExamFolder(folder, core) for folder in folders], np.random.default_rng(0), key or [])
+    target = out or folders[0]
+    report = score_exams([ExamFolder(folder) for folder in folders], np.random.default_rng(0), key or [])
     for line in summary_lines(report):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     for name, text in (

@@ -10,22 +10,19 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any, Final
 
 from hil.exam.axes.record_bytes import axis_record_of
-from hil.exam.folder import RECORDS, Core, ExamFolder, read_exam
+from hil.exam.folder import RECORDS, ExamFolder, read_exam
 from hil.exam.record_bytes import record_from_bytes
 from hil.exam.workers import run_all
 from ident.diagnosis.alone import closed_alone
-from ident.diagnosis.axis.diagnose import STANDING, diagnose_axis
+from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.diagnosis import faulty
 from ident.diagnosis.findings import Findings
-from ident.diagnosis.judge import Judge, judge
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.posterior.answer import judge_by_posterior
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.effects.extended import ExtendedModel
@@ -102,7 +99,7 @@ def diagnose_exam(
         refuse_undiagnosed(folder, there)
     asked = [identifier for identifier in there if removed is None or identifier in removed]
     task = _axis_task(folder, removed or {}) if exam.of_axes else _vehicle_task(folder, removed or {})
-    function = _FUNCTIONS[folder.core, exam.of_axes]
+    function = diagnose_axis_case if exam.of_axes else diagnose_case
     places = {identifier: folder.diagnosis(identifier, removed is not None) for identifier in asked}
     keep_answers(function, task, places, jobs=jobs, scheduler=scheduler, progress=progress)
 
@@ -180,13 +177,7 @@ def refuse_undiagnosed(folder: ExamFolder, identifiers: Sequence[str]) -> None:
 
 
 def diagnose_case(
-    identifier: str,
-    fit: bytes,
-    confirm: bytes,
-    vehicle: str,
-    model: str,
-    removed: str | None,
-    judged: Judge = judge,
+    identifier: str, fit: bytes, confirm: bytes, vehicle: str, model: str, removed: str | None
 ) -> tuple[str, bytes]:
     """Diagnosis of one case as JSON; runs in a worker.
 
@@ -198,7 +189,6 @@ def diagnose_case(
         fit, confirm: its records, as Parquet.
         vehicle, model: texts of the files.
         removed: candidate that the library is to lack.
-        judged: finds the causes.
     """
     forbid_emulator()
     world = described(vehicle, model)
@@ -209,7 +199,7 @@ def diagnose_case(
         faults = sure_faults(records, world[0])
         if faults:
             return faulty(faults).as_json()
-        found = diagnose_vehicle(records[:1], records[1:], *world, effects=effects, judged=judged)
+        found = diagnose_vehicle(records[:1], records[1:], *world, effects=effects)
         return found.diagnosis.as_json() | ({} if removed else {"alone": _alone(found.findings, found.problems)})
 
     return identifier, _timed(answer)
@@ -224,29 +214,16 @@ def described(vehicle: str, model: str) -> tuple[VehicleDescription, ExtendedMod
         return load_vehicle(files[0]), read_model(files[1])
 
 
-def diagnose_axis_case(
-    identifier: str, fit: bytes, confirm: bytes, removed: str | None, judged: Judge = STANDING
-) -> tuple[str, bytes]:
+def diagnose_axis_case(identifier: str, fit: bytes, confirm: bytes, removed: str | None) -> tuple[str, bytes]:
     """The same of a case of an axis."""
     forbid_emulator()
     lacking = () if removed is None else (removed,)
 
     def answer() -> dict[str, Any]:
         records = axis_records(fit, confirm)
-        return diagnose_axis(records[:1], records[1:], seed=1, lacking=lacking, judged=judged).diagnosis().as_json()
+        return diagnose_axis(records[:1], records[1:], seed=1, lacking=lacking).diagnosis().as_json()
 
     return identifier, _timed(answer)
-
-
-_FUNCTIONS: Final[Mapping[tuple[Core, bool], Callable[..., tuple[str, bytes]]]] = MappingProxyType(
-    {
-        (Core.STANDING, False): diagnose_case,
-        (Core.STANDING, True): diagnose_axis_case,
-        (Core.ONE, False): partial(diagnose_case, judged=judge_by_posterior),
-        (Core.ONE, True): partial(diagnose_axis_case, judged=judge_by_posterior),
-    }
-)
-"""Diagnosis of one case, by core and whether the exam is of axes."""
 
 
 def vehicle_records(fit: bytes, confirm: bytes) -> list[Record]:

@@ -9,13 +9,11 @@
 | `truth/ID.json` | why a case could not be driven, encrypted as well |
 | `diagnoses/ID.json` | answers of the diagnosing side |
 | `diagnoses_without/ID.json` | the same with the true candidate left out of the library |
-| `diagnoses_one/ID.json`, `diagnoses_one_without/ID.json` | the same of the core `one` (docs/diagnosis.md) |
 | `oracle/ID.json` | what somebody would find who knows the true candidate |
 """
 
 from __future__ import annotations
 
-import enum
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,24 +30,15 @@ AXES: Final = "drawn axes"
 """What stands for the vehicle of an exam of axes, each of another machine."""
 
 
-class Core(enum.StrEnum):
-    """What diagnoses: what `quasiomni diagnose` does, or the one comparison that is tried beside it."""
-
-    STANDING = "standing"
-    ONE = "one"
-
-
 @dataclass(frozen=True)
 class ExamFolder:
     """Paths inside the folder of an exam.
 
     Attributes:
         path: of the folder.
-        core: whose answers are meant.
     """
 
     path: Path
-    core: Core = Core.STANDING
 
     @property
     def manifest(self) -> Path:
@@ -85,8 +74,7 @@ class ExamFolder:
 
     def diagnosis(self, identifier: str, removed: bool = False) -> Path:
         """What the diagnosing side answered; with the true candidate removed, or with all."""
-        parts = ["diagnoses", *([str(self.core)] if self.core is not Core.STANDING else []), *["without"] * removed]
-        return self.path / "_".join(parts) / f"{identifier}.json"
+        return self.path / ("diagnoses_without" if removed else "diagnoses") / f"{identifier}.json"
 
     def oracle(self, identifier: str) -> Path:
         """Evidence of candidates that somebody knows, of a case."""

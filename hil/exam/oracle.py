@@ -90,7 +90,7 @@ def evidence_of_case(
     forbid_emulator()
     try:
         problems = _axis(fit, confirm) if texts is None else _vehicle(fit, confirm, *texts)
-        found = log_evidence_of(*problems, keys, seed=1)
+        found = log_evidence_of(*problems, keys)
     except (ArithmeticError, ValueError, UserError):
         # A record that the diagnosis refuses shows an oracle nothing either.
         found = dict.fromkeys(keys, NOTHING)

@@ -29,14 +29,12 @@ class White:
         target: (n,).
         baseline: (n, p + c) columns of the model, and of effects that are taken as given.
         columns: (n, K) of all candidates.
-        stretch: (n,) number of the stretch whose sign is flipped as one, increasing.
         confirming: (n,) rows that take no part in the fit.
     """
 
     target: Array
     baseline: Array
     columns: Array
-    stretch: NDArray[np.int64]
     confirming: Mask
 
 
@@ -68,7 +66,6 @@ class Directions:
         negligible: (D, 2) the same as sizes, of negative and of positive ones.
         bounded: variants of several columns whose coefficients have a least value.
         residual: (n,) target minus its projection on the baseline.
-        volume: log of the determinant of each variant's columns beside the baseline.
     """
 
     basis: Array
@@ -76,7 +73,6 @@ class Directions:
     least: Array
     negligible: Array
     residual: Array
-    volume: Array
     bounded: tuple[Bounded, ...] = ()
 
     @property
@@ -105,11 +101,9 @@ class Directions:
         return np.asarray(squares[..., stops] - squares[..., starts])
 
 
-def directions(white: White, layout: Sequence[Column], rows: Mask | None = None) -> Directions:
-    """Directions beside the baseline, in all rows or in some."""
-    chosen = slice(None) if rows is None else rows
-    base = orthonormal(white.baseline[chosen])
-    target, columns = white.target[chosen], white.columns[chosen]
+def directions(white: White, layout: Sequence[Column]) -> Directions:
+    """Directions beside the baseline."""
+    base, target, columns = orthonormal(white.baseline), white.target, white.columns
     residual = target - base @ (base.T @ target)
     left = np.asfortranarray(columns - base @ (base.T @ columns))
     full = np.linalg.norm(white.columns, axis=0)
@@ -131,17 +125,15 @@ def directions(white: White, layout: Sequence[Column], rows: Mask | None = None)
         for number, (one, place, column) in enumerate(zip(found, places, layout, strict=True))
         if one.turn is not None
     )
-    volumes = np.array([one.volume for one in found])
-    return Directions(basis, places, limits[:, 0], limits[:, 1:], residual, volumes, bounded)
+    return Directions(basis, places, limits[:, 0], limits[:, 1:], residual, bounded)
 
 
 @dataclass(frozen=True)
 class _Added:
-    """What one variant adds: directions (n, count), limits of their amplitudes, log determinant, bounded ones' turn."""
+    """What one variant adds: directions (n, count), limits of their amplitudes, bounded ones' turn."""
 
     vectors: Array
     bounds: tuple[float, float, float]
-    volume: float
     turn: Array | None = None
 
     @property
@@ -158,7 +150,7 @@ def _alone(left: Array, scale: Array, length: Array, column: Column) -> _Added:
     vectors = left[:, place] / whole if seen else left[:, :0]
     low, high = column.negligible
     bounds = (column.least * whole, low * whole, high * whole)
-    return _Added(vectors, bounds, 2 * math.log(max(relative, VISIBLE)))
+    return _Added(vectors, bounds)
 
 
 def _together(left: Array, scale: Array, column: Column) -> _Added:
@@ -168,8 +160,7 @@ def _together(left: Array, scale: Array, column: Column) -> _Added:
     powers, turn = np.linalg.eigh(columns.T @ columns)
     singular, turn = np.sqrt(np.maximum(powers[::-1], 0.0)), turn[:, ::-1]
     count = int(np.sum(singular > VISIBLE))
-    volume = 2 * float(np.sum(np.log(np.maximum(singular, VISIBLE))))
     by_length = turn[:, :count] / singular[:count]
     bound = count > 0 and math.isfinite(column.least)
     coefficients = by_length / unit[:, None] if bound else None
-    return _Added(columns @ by_length, (-math.inf, *column.negligible), volume, coefficients)
+    return _Added(columns @ by_length, (-math.inf, *column.negligible), coefficients)

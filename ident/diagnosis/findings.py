@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.diagnosis import Diagnosis, Gap, NamedEffect, Share, Verdict
 from ident.diagnosis.generic import Generic
 from ident.diagnosis.law.answer import Alternative, LawAnswer
-from ident.diagnosis.law.free import Curve
-from ident.diagnosis.law.stage import Law
-from ident.diagnosis.probability import Ranked, calibration
+from ident.diagnosis.law.law import Law
 from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.refit import Part, Refit
 from ident.vehicle.quantities import Quantity
@@ -23,6 +21,37 @@ Array = NDArray[np.float64]
 
 LAW: Final = "law"
 """Name of a cause that has none."""
+
+COVERAGE: Final = 0.95
+"""Probability that an ambiguity set holds together."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """What may stand in one place of an explanation.
+
+    Attributes:
+        probabilities: of every candidate by key, most probable first; what is missing to one is no effect.
+        names: of every effect by name, whatever its place.
+        alike: keys that are the same as the one taken in these records, itself first.
+        log_odds: of every candidate by key, against nothing in this place, the greatest first.
+    """
+
+    probabilities: Mapping[str, float]
+    names: Mapping[str, float]
+    alike: tuple[str, ...]
+    log_odds: Mapping[str, float]
+
+    def ambiguity_set(self, name: str) -> tuple[str, ...]:
+        """Names up to a probability of `COVERAGE`, and those of candidates that are the same; `name` first."""
+        total, chosen, reached = sum(self.names.values()), [name], 0.0
+        for other, probability in self.names.items():
+            if total == 0 or reached >= COVERAGE * total:
+                break
+            reached += probability
+            chosen.append(other)
+        chosen += [key.split("@")[0] for key in self.alike]
+        return tuple(dict.fromkeys(chosen))
 
 
 @dataclass(frozen=True)
@@ -34,14 +63,12 @@ class Cause:
         part: its parameters, all records fitted.
         ranked: what else may stand in its place.
         probability: that its name is right, or one that is the same in these records.
-        log_evidence, log_predictive: of all records, and what the confirming rows add.
+        log_odds: that it is there against nothing in its place.
         closed: share of the removable held-out gap that it closes, others given, the values of a judged model held; not
             negative where that gap is within the accidents of its noise.
         needed: the same with everything else refitted without it.
         biased: how much each parameter of the model shifts when the effect is left out, by name, in standard
             deviations.
-        curve: whether it fits the curve of its variable as well as a free function does.
-        sizeless: it may be of no size itself, and what comes along with it is the explanation.
         law: as it was learnt, of a law without a name.
         law_answer: as it is written down.
         alternatives: what adds the same to these records.
@@ -51,13 +78,10 @@ class Cause:
     part: Part
     ranked: Ranked
     probability: float
-    log_evidence: float
-    log_predictive: float
+    log_odds: float
     closed: float
     needed: float
     biased: Mapping[str, float]
-    curve: Curve
-    sizeless: bool
     law: Law | None = None
     law_answer: LawAnswer | None = None
     alternatives: tuple[Alternative, ...] = ()
@@ -94,14 +118,13 @@ class Findings:
         verdict: of the search and of what is left.
         causes: most probable first.
         doubtful: what came out best beside the causes and was not believed, with its probability, best first.
-        events: what one drive shows clearly and the other does not, best first: no cause.
         gap: held out.
         where: shares of the gap.
         invisible: names of effects that are nowhere visible.
         before, after: of all rows without and with the causes; before is the model that was given, or a refit.
-        significance: that the best candidate is there by chance.
+        significance: least probability of nothing in the place of a cause.
         remainder: what a smooth function still predicts.
-        lasting: whether something repeats in every record, above its limit, that the effects leave.
+        lasting: whether more is lacking somewhere than noise and tolerance that are not known exactly.
         repeated_before, repeated_after: rms over noise of what repeats, by step and coordinate.
         problem: that was fitted.
         held_out: models that the confirming rows took no part in.
@@ -110,7 +133,6 @@ class Findings:
     verdict: Verdict
     causes: tuple[Cause, ...]
     doubtful: Mapping[str, float]
-    events: tuple[str, ...]
     gap: Gap
     where: tuple[Share, ...]
     invisible: tuple[str, ...]
@@ -126,10 +148,9 @@ class Findings:
 
     def diagnosis(self, next_experiment: str | None = None) -> Diagnosis:
         """The answer as it is written down."""
-        coverage = calibration().coverage
         return Diagnosis(
             verdict=self.verdict,
-            effects=tuple(_named(cause, coverage) for cause in self.causes) if self.verdict.explains else (),
+            effects=tuple(_named(cause) for cause in self.causes) if self.verdict.explains else (),
             where=self.where,
             gap=self.gap,
             invisible=self.invisible,
@@ -137,22 +158,14 @@ class Findings:
         )
 
 
-def _ambiguity_set(cause: Cause, coverage: float) -> tuple[str, ...]:
-    """Names that the records do not tell apart, and a law among them where a free function does as well or better."""
-    if cause.law is not None:
-        return (LAW,)
-    names = cause.ranked.ambiguity_set(str(cause.candidate.effect), coverage)
-    return names if cause.curve is Curve.ITS_OWN else (*names, LAW)
-
-
-def _named(cause: Cause, coverage: float) -> NamedEffect:
+def _named(cause: Cause) -> NamedEffect:
     name = LAW if cause.law is not None else str(cause.candidate.effect)
     return NamedEffect(
         name=name,
         where=cause.candidate.where,
         parameters=cause.quantities,
         probability=round(cause.probability, 2),
-        ambiguity_set=_ambiguity_set(cause, coverage),
+        ambiguity_set=(LAW,) if cause.law is not None else cause.ranked.ambiguity_set(name),
         gap_closed_held_out=cause.closed,
         alternatives=cause.alternatives,
         law=cause.law_answer,
@@ -165,7 +178,7 @@ def ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
     What is found beside another cause is right only as far as that one is.
     """
     found: list[Cause] = []
-    for cause in sorted(causes, key=lambda cause: (-round(2 * cause.needed), -cause.log_evidence)):
+    for cause in sorted(causes, key=lambda cause: (-round(2 * cause.needed), -cause.log_odds)):
         surest = min([cause.probability, *(other.probability for other in found[-1:])])
         found.append(replace(cause, probability=surest))
     return tuple(found)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,25 @@ from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.refit import Refit, refit
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.remainder import Told, held_out_gap, held_out_gap_of_means, noise_floors
-from ident.diagnosis.search import Taken
-from ident.diagnosis.whitening import Predictor, Whitener
+from ident.diagnosis.whitening import Predictor, Whitener, Whitening
 
 Array = NDArray[np.float64]
+
+BLUR: Final = 0.5
+"""Part of the noise's power that no member is asked to come nearer to the rows than without it."""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """Effects that an answer consists of.
+
+    Attributes:
+        variants: of them.
+        whitener: of what they leave.
+    """
+
+    variants: tuple[int, ...]
+    whitener: Whitening
 
 
 class Fitted:
@@ -50,8 +66,7 @@ class Fitted:
         self.after, self.before = self._refit(found.variants), self._refit(())
         left = self.rows.target - self.rows.stack(list(self.after.blocks)) - self.rest.prediction
         self.floors = noise_floors(self.rows, self.after.blocks, left)
-        self._plain = self._held_out_models(())
-        self.untouched = self._drifting(self._plain)
+        self.untouched = self._held_out_models(())
 
     @property
     def count(self) -> int:
@@ -61,11 +76,6 @@ class Fitted:
     def candidate(self, index: int) -> Candidate:
         """That an effect is a variant of."""
         return self.problems[0].candidates[self.regression.owners[self.found.variants[index]]]
-
-    @property
-    def reached(self) -> frozenset[str]:
-        """Labels of the blocks in which an effect acts."""
-        return frozenset[str]().union(*(self.reached_by(index) for index in range(self.count)))
 
     def reached_by(self, index: int) -> frozenset[str]:
         """Labels of the blocks in which one effect acts."""
@@ -106,11 +116,7 @@ class Fitted:
         if self.found.variants:
             return self.exactly
         models = self._settled(self._held_out_refit(()))
-        return held_out_gap(self.rows, self.floors, self._drifting(models), models, self.told)
-
-    def measured(self, floors: Array, labels: Collection[str], told: Told) -> Gap:
-        """The same of the means over the repeats, in blocks of some labels, with noise and samples of all as given."""
-        return held_out_gap_of_means(self.rows, floors, self.untouched, self._extended_models, labels, told)
+        return held_out_gap(self.rows, self.floors, models, models, self.told)
 
     @cached_property
     def whole(self) -> Gap:
@@ -121,11 +127,6 @@ class Fitted:
     def removable(self) -> float:
         """Power of the held-out gap above the noise."""
         return self.whole.before**2 - self.whole.floor**2
-
-    @property
-    def left(self) -> float:
-        """Share of the removable held-out gap that all effects leave."""
-        return max(1 - self.whole.closed, 0.0)
 
     @cached_property
     def closed(self) -> list[float]:
@@ -162,18 +163,14 @@ class Fitted:
         models = self._held_out_models(variants, held=held)
         return held_out_gap_of_means(self.rows, self.floors, self.untouched, models, labels, self.told)
 
-    def closed_where_it_acts(self, index: int) -> float:
-        """Share of what can be removed of the means over the repeats that an effect closes where it acts, held out."""
-        return _share(*self._where_it_acts(index))
-
-    def gain(self, index: int, blur: float) -> float:
-        """Log of what is above the noise, and `blur` of it, without an effect over the same with it; where it acts.
+    def gain(self, index: int) -> float:
+        """Log of what is above the noise, and `BLUR` of it, without an effect over the same with it; where it acts.
 
         Held out, of the means over the repeats, the values of a judged model held. What a greater effect beside it
         closes does not count.
         """
         whole, without = self._where_it_acts(index, held=self._is_given)
-        above = [max(after**2 - whole.floor**2, 0.0) + blur for after in (without, whole.after)]
+        above = [max(after**2 - whole.floor**2, 0.0) + BLUR for after in (without, whole.after)]
         return math.log(above[0] / above[1]) / 2
 
     def _where_it_acts(self, index: int, *, held: bool = False) -> tuple[Gap, float]:
@@ -246,30 +243,7 @@ class Fitted:
 
     @property
     def _extended_models(self) -> Sequence[Array]:
-        return self._extended.blocks if self.found.variants else self._plain
-
-    @cached_property
-    def closed_by_drift(self) -> float:
-        """Share of the removable held-out gap that what follows time closes, the other effects given."""
-        models = self._drifting(self._extended_models)
-        without = held_out_gap(self.rows, self.floors, self.untouched, models, self.told)
-        return _share(self.exactly, without.after)
-
-    def _drifting(self, models: Sequence[Array]) -> Sequence[Array]:
-        """Models of all blocks that say nothing of a drift that was taken off the targets, parameters refitted."""
-        drifts = [block.drift for block, _ in self.rows.blocks]
-        if all(drift is None for drift in drifts):
-            return models
-        absorbed = np.zeros(self.rows.baseline.shape[1])
-        if not self._is_given:
-            fitted = ~self.rows.confirming
-            pair = np.column_stack([self.rows.baseline, self.rows.stack(drifts)])
-            white = self._weights.apply(self.rows, pair)[fitted]
-            absorbed = least_squares(white[:, :-1], white[:, -1])
-        return [
-            model + block.baseline @ absorbed - (0.0 if block.drift is None else block.drift)
-            for (block, _), model in zip(self.rows.blocks, models, strict=True)
-        ]
+        return self._extended.blocks if self.found.variants else self.untouched
 
 
 def _share(whole: Gap, without: float) -> float:

@@ -58,7 +58,6 @@ class Block:
         features: (N, f) states that an unknown cause might depend on (speeds, angles, accelerations); any scale.
         tolerance: rms up to which a gap means nothing, however well it repeats, in the unit of the target.
         irregular: (N,) part of the target that may differ between repeats and is no noise; None: nothing.
-        drift: (N,) what follows time, taken off the target; None: nothing.
     """
 
     record: str
@@ -76,7 +75,6 @@ class Block:
     features: Array | None = None
     tolerance: float = 0.0
     irregular: Array | None = None
-    drift: Array | None = None
 
     @property
     def regular(self) -> Array:
@@ -100,6 +98,7 @@ class Variant:
         bent: the candidate's contribution says more than these columns; without it, a refit takes the columns alone.
         beside: how many of the columns, the last ones, only come along with the effect.
         itself: the other columns must show by themselves; not so where what comes along is what the effect does.
+        found: (m,) numbers of the exact form that a refit may begin with as well; None: none.
     """
 
     columns: tuple[Array | None, ...]
@@ -107,6 +106,7 @@ class Variant:
     bent: bool = True
     beside: int = 0
     itself: bool = True
+    found: Array | None = None
 
     def numbers(self, coefficients: Array) -> Array:
         """(m,) of the exact form, by coefficients (k,) of the columns."""
@@ -152,14 +152,10 @@ class Candidate:
             rows; empty where there are none.
         part: the same as part of each parameter.
         yielding: the same over what comes along: a load, of what flanks yield under it.
-        curve: whose friction over the speed it changes, if it is a friction.
         periodic: of a wave over an angle; its variants are then those of the orders that the records show.
         price: log evidence that the choice of its variants costs beyond that of its coefficients.
         noise: log evidence that the noise of what its columns are made of may be for it.
-        learnt: its columns are a function that was learnt on fitted rows and tried on the confirming ones, uncertain
-            where the fitted ones are few; they need not confirm it again as if it were known exactly.
         usual: its size in practice; inf where nothing is known of it.
-        along: effect at the same place that comes along with it in its widest variant; both at once are that variant.
     """
 
     effect: str
@@ -178,12 +174,9 @@ class Candidate:
     spread: tuple[float, ...] = ()
     part: float = 0.0
     yielding: float = 0.0
-    curve: str = ""
-    along: str = ""
     periodic: Periodic | None = None
     price: float = 0.0
     noise: float = 0.0
-    learnt: bool = False
     usual: float = math.inf
 
     @property

@@ -175,20 +175,18 @@ class _Model:
         self.regression, self.whitener, self.chosen = regression, whitener, chosen
         self.rows: Rows = regression.rows
         self.size = self.rows.baseline.shape[1]
-        linear = self._linear(variants)
+        linear = self._linear(regression.columns_of(variants), self.rows.target)
         self.unknowns: list[_Unknown] = []
-        parts, taken = [linear[: self.size]], self.size
+        starts, taken = [(linear[: self.size], linear[: self.size])], self.size
         for variant in variants:
             column = self.rows.layout[variant]
-            width = column.width
-            unknown, start = _unknown(
-                problems, column, linear[taken : taken + width], sum(len(p) for p in parts), exact
-            )
+            width, first = column.width, sum(len(one) for one, _ in starts)
+            unknown, *own = _unknown(problems, column, linear[taken : taken + width], first, exact)
             self.unknowns.append(unknown)
-            parts.append(start)
+            starts.append((own[0], own[1]))
             taken += width
-        self.start = np.concatenate(parts)
         self._kept: dict[int, tuple[bytes, Array]] = {}
+        self.start = self._better(*(np.concatenate(one) for one in zip(*starts, strict=True)))
 
     @property
     def nonlinear(self) -> bool:
@@ -228,9 +226,22 @@ class _Model:
             parts.append(Part(unknown.candidate.key, numbers[stated], total, numbers, deviations, tuple(series)))
         return Refit(values[: self.size], covariance[: self.size, : self.size], tuple(parts), tuple(blocks))
 
-    def _linear(self, variants: Sequence[int]) -> Array:
-        design = np.hstack([self.rows.baseline, self.regression.columns_of(variants)])
-        white = self.whitener.apply(self.rows, np.column_stack([design, self.rows.target]))[self.chosen]
+    def _better(self, by_columns: Array, found: Array) -> Array:
+        """All values to begin with: by columns, or those found before, the baseline fitted beside, if those leave less.
+
+        What the rows fitted do not tell is not taken from what other rows told.
+        """
+        if np.array_equal(by_columns, found):
+            return by_columns
+        added = sum((self._added(number, found) for number in range(len(self.unknowns))), np.zeros(len(self.rows)))
+        baseline = self._linear(np.zeros((len(self.rows), 0)), self.rows.target - added)
+        beside = np.concatenate([baseline, found[self.size :]])
+        left = [float(np.sum(self.residual(one) ** 2)) for one in (by_columns, beside)]
+        return beside if left[1] < left[0] else by_columns
+
+    def _linear(self, columns: Array, target: Array) -> Array:
+        design = np.hstack([self.rows.baseline, columns])
+        white = self.whitener.apply(self.rows, np.column_stack([design, target]))[self.chosen]
         prior = self._weight * self.regression.prior_jacobian(design.shape[1])
         known = self._weight * self.regression.prior_residual(np.zeros(self.size))
         return least_squares(np.vstack([white[:, :-1], prior]), np.append(white[:, -1], known))
@@ -314,19 +325,21 @@ class _Model:
 
 def _unknown(
     problems: Sequence[Problem], column: Column, coefficients: Array, first: int, by_form: bool
-) -> tuple[_Unknown, Array]:
+) -> tuple[_Unknown, Array, Array]:
+    """The numbers of a variant, and what they begin with: by coefficients of its columns, and as they were found."""
     candidates = [problem.candidates[column.candidate] for problem in problems]
     variant = candidates[0].variants[column.variant]
     finish = variant.start or _same
     columns = tuple(part for candidate in candidates for part in candidate.variants[column.variant].columns)
     if candidates[0].contribution is None or not by_form or not variant.bent:
         place = slice(first, first + len(coefficients))
-        return _Unknown(candidates, place, None, columns, finish), coefficients
+        return _Unknown(candidates, place, None, columns, finish), coefficients, coefficients
 
     start = np.asarray(finish(coefficients), dtype=float)
     turned = None if candidates[0].turned is None else partial(turned_by, candidates)
     exact = partial(contributions_of, candidates)
-    return _Unknown(candidates, slice(first, first + len(start)), exact, columns, _same, turned), start
+    unknown = _Unknown(candidates, slice(first, first + len(start)), exact, columns, _same, turned)
+    return unknown, start, start if variant.found is None else variant.found
 
 
 def _beyond(candidate: Candidate, numbers: Array) -> Array:

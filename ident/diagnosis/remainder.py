@@ -135,16 +135,6 @@ def repeated(rows: Rows, floors: Array, models: Series) -> Mapping[str, float]:
     return _repeated(rows, floors, models, (False, True))
 
 
-def lasting(rows: Rows, floors: Array, models: Series) -> Mapping[str, float]:
-    """The same of what repeats in the records that are fitted and in those that confirm: the smaller of the two.
-
-    Where only one of them has rows of a coordinate, what those repeat. What one campaign alone repeats comes from how
-    it began: wheels a few increments askew after an alignment.
-    """
-    fitted, confirming = (_repeated(rows, floors, models, (part,)) for part in (False, True))
-    return {label: min(size, confirming.get(label, size)) for label, size in {**confirming, **fitted}.items()}
-
-
 def _repeated(rows: Rows, floors: Array, models: Series, parts: Collection[bool]) -> Mapping[str, float]:
     """In the records whose rows confirm, or not, as `parts` says."""
     sums: dict[str, tuple[float, int]] = {}

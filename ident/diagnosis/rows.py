@@ -55,7 +55,6 @@ class Column:
         beside: columns, the last ones, that only come along.
         itself: whether the other ones must show by themselves.
         price: log evidence that its choice costs.
-        shape_of: variant that it is the shape of, at the numbers that were fitted; it costs what those do. None: none.
     """
 
     candidate: int
@@ -66,7 +65,6 @@ class Column:
     beside: int = 0
     itself: bool = True
     price: float = 0.0
-    shape_of: int | None = None
 
     @property
     def own(self) -> slice:

@@ -87,15 +87,6 @@ class Whitener:
             white[start:end] = self.predictors[rows.group[start]].apply(whole[start:end])
         return white.reshape(np.shape(values))
 
-    def log_volume(self, rows: Rows) -> float:
-        """Log of the determinant of what whitening does to the rows: white rows are dense by as much."""
-        ages = row_ages(rows)
-        found = 0.0
-        for group, predictor in enumerate(self.predictors):
-            reached = np.minimum(ages[rows.group == group], len(predictor.deviations) - 1)
-            found -= float(np.sum(np.log(predictor.deviations[reached])))
-        return found
-
 
 def row_ages(rows: Rows) -> NDArray[np.int64]:
     """How many rows of the same run lie before each row (n,)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
@@ -78,22 +78,34 @@ MEMORY: Final = 50.0
 """Time constants over which a series is mirrored: of a wave at the cutoff e^-19 is left of what lies beyond them."""
 
 
-def mirrored(values: Array, order: int, cutoff: float, sample_time: float) -> Array:
-    """Butterworth low-pass forwards and backwards along axis 0, for the terms of an equation; cutoff in rad/s.
+def mirrored(values: Array, passes: Sequence[tuple[int, float]], sample_time: float) -> Array:
+    """Butterworth low-passes, each forwards and backwards, along axis 0, for the terms of an equation.
 
     Beyond its ends a term goes on as in a mirror, where the equation holds as it does inside. A reflection in the end
     sample, right for the positions of a motion that goes on, would make the noise of that one sample twice as large and
     let it last: that of an acceleration, differences twice over, is a thousand times what rows behind the filter show.
 
+    What is mirrored stays so behind a filter of zero phase: all of them at once are one gain of its spectrum.
+
     Args:
-        values: (N, ...).
-        order: of the prototype.
-        cutoff: [rad/s].
+        values: (N, ...), at least two samples.
+        passes: order of the prototype and cutoff [rad/s] of each.
         sample_time: [s].
     """
-    sections = butterworth(order, cutoff, sample_time)
-    reach = min(math.ceil(MEMORY / (cutoff * sample_time)), len(values) - 1)
-    return np.asarray(signal.sosfiltfilt(sections, values, axis=0, padtype="even", padlen=reach))
+    count, reach = len(values), max(math.ceil(MEMORY / (cutoff * sample_time)) for _, cutoff in passes)
+    size = fft.next_fast_len(count + 2 * reach, real=True)
+    sides = [(reach, size - count - reach)] + [(0, 0)] * (values.ndim - 1)
+    spectrum = fft.rfft(np.pad(values, sides, mode="reflect"), axis=0)
+    spectrum *= _gain(tuple(passes), sample_time, size).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(fft.irfft(spectrum, size, axis=0)[reach : reach + count])
+
+
+@lru_cache(maxsize=32)
+def _gain(passes: tuple[tuple[int, float], ...], sample_time: float, size: int) -> Array:
+    """(size // 2 + 1,) of filters forwards and backwards, at the frequencies of a real transform; to be read only."""
+    turns = 2 * np.pi * np.arange(size // 2 + 1) / size
+    gains = [np.abs(signal.sosfreqz(butterworth(*one, sample_time), worN=turns)[1]) ** 2 for one in passes]
+    return np.asarray(np.prod(gains, axis=0))
 
 
 def filter_weights(

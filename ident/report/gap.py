@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,8 +76,7 @@ class Row:
         name, where: what and where.
         probability: that the name is right.
         numbers: parameters with standard deviations.
-        evidence: log Bayes factor of all records.
-        predictive: that of the confirming rows, in words: not all that judge ask for it.
+        log_odds: that it is there against nothing in its place, by all records.
         closed: share of the held-out gap.
         rivals: what these records do not tell apart from it.
         biased: parameters that shift by more than BIASED standard deviations when it is left out.
@@ -88,8 +86,7 @@ class Row:
     where: str
     probability: float
     numbers: str
-    evidence: float
-    predictive: str
+    log_odds: float
     closed: float
     rivals: str
     biased: str
@@ -122,7 +119,7 @@ def _answer(content: GapReport) -> dict[str, Any]:
     findings, diagnosis = content.findings, content.diagnosis
     lines = judged_steps(diagnosis)
     return {
-        "headline": headline(diagnosis, findings.events),
+        "headline": headline(diagnosis),
         "verdict": str(diagnosis.verdict),
         "significance": findings.significance,
         "gap": diagnosis.gap,
@@ -143,8 +140,6 @@ def _details(content: GapReport) -> dict[str, Any]:
     return {
         "rows": [_row(cause, content) for cause in findings.causes],
         "believed": content.diagnosis.verdict.explains,
-        "sizeless": [cause.candidate.key for cause in findings.causes if cause.sizeless],
-        "events": findings.events,
         "parameters": _parameters(findings),
         "remainder": findings.remainder,
         "repeated": _repeated(findings),
@@ -185,8 +180,7 @@ def _row(cause: Cause, content: GapReport) -> Row:
         where=cause.candidate.where,
         probability=cause.probability,
         numbers=", ".join(f"{p.name} {digits.with_std(v, s)} {digits.unit_text(p.unit)}" for p, v, s in values),
-        evidence=cause.log_evidence,
-        predictive="–" if math.isnan(cause.log_predictive) else f"{cause.log_predictive:.1f}",
+        log_odds=cause.log_odds,
         closed=cause.closed,
         rivals=", ".join(rivals) or "–",
         biased=", ".join(f"{symbol} by {shift:+.1f} std" for symbol, shift in biased) or "–",

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import Final
 
 from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Share, Verdict
-from ident.diagnosis.findings import Cause, Findings
+from ident.diagnosis.findings import Findings
 from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.report.digits import percent, plain, significant, unit_text, with_std
 from ident.report.headline import headline
 from ident.report.law_text import law_line
 
 MOST_LINES: Final = 10
-MOST_EVENTS: Final = 3
 
 _UNSEEN: Final = {REPEATED: "Held-out steps, times the noise", LANE_CHANGE: "Lane change, times the noise"}
 
@@ -26,14 +25,12 @@ def summary_lines(findings: Findings, diagnosis: Diagnosis) -> list[str]:
     if place is not None and diagnosis.verdict is not Verdict.NONE:
         lines.append(f"Where: {percent(place.share)} of it in {place_text(place)}.")
     if diagnosis.verdict is Verdict.UNKNOWN and findings.causes:
-        lines.append(f"Nearest, but not it: {', '.join(nearest_text(cause) for cause in findings.causes)}.")
-    if findings.events:
-        lines.append(f"Only one of the two drives shows, so no cause: {', '.join(findings.events[:MOST_EVENTS])}.")
+        lines.append(f"Nearest, but not it: {', '.join(cause.candidate.key for cause in findings.causes)}.")
     if diagnosis.invisible:
         lines.append(f"These records cannot show: {', '.join(diagnosis.invisible)}.")
     lines.append(f"Next: {next_text(diagnosis)}")
     causes = _shortened([cause_line(effect) for effect in diagnosis.effects], MOST_LINES - 1 - len(lines))
-    return [headline(diagnosis, findings.events), *causes, *lines]
+    return [headline(diagnosis), *causes, *lines]
 
 
 def _shortened(causes: Sequence[str], room: int) -> list[str]:
@@ -64,7 +61,7 @@ def gap_line(findings: Findings, diagnosis: Diagnosis) -> str:
     before = f"Gap on held-out data: {significant(gap.before)} times the noise"
     if diagnosis.verdict is Verdict.NONE:
         return f"{before}."
-    rest = "; the rest repeats, and has no name" if findings.lasting and diagnosis.verdict.explains else ""
+    rest = "; the rest has no name" if findings.lasting and diagnosis.verdict.explains else ""
     return f"{before}, {significant(gap.after)} with the causes in the model: {percent(gap.closed)} of it closed{rest}."
 
 
@@ -91,11 +88,6 @@ def largest_share(diagnosis: Diagnosis) -> Share | None:
 def place_text(share: Share) -> str:
     """Step and coordinate in words."""
     return f"{share.step}, {share.coordinate} ({share.channel})"
-
-
-def nearest_text(cause: Cause) -> str:
-    """An effect that is not the answer."""
-    return f"what comes along with {cause.candidate.key}" if cause.sizeless else cause.candidate.key
 
 
 def next_text(diagnosis: Diagnosis) -> str:

@@ -43,23 +43,21 @@ _GROUPS: Final = MappingProxyType(
 
 _NONE: Final = "Nothing is missing: what is left is noise, as far as these records can tell."
 _NONE_REPEATS: Final = "Nothing is missing in the steps that repeat."
-_NONE_OF_BOTH: Final = "Nothing is missing that both drives show."
 _UNKNOWN: Final = "Something is missing that the library has no name for."
 
 
-def headline(diagnosis: Diagnosis, events: Sequence[str] = ()) -> str:
+def headline(diagnosis: Diagnosis) -> str:
     """One or two sentences, the number in them.
 
     Neither that nothing is missing nor that a gap is closed is said over a held-out step above its noise.
 
     Args:
         diagnosis: the answer.
-        events: candidates that only one of two drives shows.
     """
     worst = worst_left(diagnosis.unseen)
     left = worst is not None and worst.gap.after > ABOVE
     if diagnosis.verdict is Verdict.NONE:
-        return _nothing(events, worst if left else None)
+        return _nothing(worst if left else None)
     if diagnosis.verdict is Verdict.UNKNOWN:
         return _UNKNOWN if worst is None or not left else f"{_UNKNOWN} {_at_noise(worst)}."
     return f"{_causes(diagnosis.effects)} {_explained(diagnosis, worst if left else None)}"
@@ -118,9 +116,7 @@ def _power_closed(one: Unseen) -> float:
     return one.gap.before**2 - one.gap.after**2
 
 
-def _nothing(events: Sequence[str], left: Unseen | None) -> str:
-    if events:
-        return _NONE_OF_BOTH
+def _nothing(left: Unseen | None) -> str:
     if left is None:
         return _NONE
     if left.steps == LANE_CHANGE:

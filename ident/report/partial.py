@@ -6,7 +6,6 @@ direction), is asked for f by (target - all else)/L[g], at the x = L[g x]/L[g] a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -18,7 +17,7 @@ from ident.diagnosis.functions import function_of
 from ident.diagnosis.law.dependence import Basis, Dependence
 from ident.diagnosis.problem import Block, Problem
 from ident.diagnosis.remainder import noise_floors
-from ident.diagnosis.rows import Kept, Rows, make_rows
+from ident.diagnosis.rows import Rows, make_rows
 from ident.report.sketch import joint_of
 
 Array = NDArray[np.float64]
@@ -78,7 +77,7 @@ def law_points(findings: Findings, cause: Cause) -> Points | None:
     problems = (findings.problem, findings.held_out.problem)
     fitted, confirming = (_named(problem, cause.law.dependence.key) for problem in problems)
     if fitted is None or confirming is None:
-        return _over_time(findings, cause.law.dependence)
+        return None
     return _points(findings, cause, (fitted, confirming))
 
 
@@ -202,36 +201,3 @@ def _places(moments: Array, period: float) -> tuple[Array, Array]:
         return first, np.sqrt(np.abs(second - first**2))
     angle = np.mod(np.arctan2(second, first), 2 * np.pi)
     return period * angle / (2 * np.pi), period / (2 * np.pi) * np.sqrt(2 * np.abs(1 - np.hypot(first, second)))
-
-
-def _over_time(findings: Findings, law: Dependence) -> Points | None:
-    """Of a law of time that was taken off the targets of fitted rows: each sample by itself, for repeats differ."""
-    problem = findings.problem
-    beside = next((one for one in problem.dependences if (one.where, one.partner) == (law.where, law.partner)), None)
-    if beside is None:
-        return None
-    levers = beside.design(lambda x: np.ones((*x.shape, 1)))
-    rows = _rows(problem)
-    models = findings.after.blocks[: len(problem.blocks)]
-    floors = noise_floors(rows, models, rows.target - rows.stack(list(models)))
-    parts = list(_samples(zip(rows.blocks, models, levers, law.arguments, floors.tolist(), strict=True)))
-    if not parts:
-        return None
-    x, y, added, noise = (np.concatenate(series) for series in zip(*parts, strict=True))
-    everything = np.ones(len(x), dtype=bool)
-    return _clear(Points(law, x, y, added, noise, ~everything), everything)
-
-
-_Entry = tuple[tuple[Block, Kept], Array, Array | None, Array | None, float]
-
-
-def _samples(entries: Iterable[_Entry]) -> Iterator[Sequence[Array]]:
-    """Variable, partial residual, what the law adds and noise of the samples of every block in which it acts."""
-    for (block, kept), model, lever, time, floor in entries:
-        if lever is None or time is None or block.drift is None:
-            continue
-        samples = kept.samples.ravel()
-        used = samples[np.abs(lever[samples, 0]) > SEEN]
-        over = lever[used, 0]
-        left = (block.target - model + block.drift)[used]
-        yield time[used, 0], left / over, block.drift[used] / over, floor / np.abs(over)

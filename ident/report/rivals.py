@@ -1,9 +1,9 @@
-"""What else was considered, and how far behind it is: bars of log evidence in the place of each cause."""
+"""What else was considered, and how far behind it is: bars of log odds in the place of each cause."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
@@ -21,7 +21,7 @@ MOST: Final = 6
 HIDDEN: Final = 0.0005
 """Probability below which a number says nothing."""
 
-EVIDENCE: Final = "log evidence"
+ODDS: Final = "log odds"
 PROBABILITY: Final = "probability"
 """What the length of bars says."""
 
@@ -49,7 +49,7 @@ class Bar:
     Attributes:
         name: in words, with its place.
         standing: beside the one taken.
-        value: log evidence or probability.
+        value: log odds or probability.
         length: of the bar, as a share of the chart's width.
         text: of the value.
         probability: in words; empty where there is none.
@@ -69,7 +69,7 @@ class Chart:
 
     Attributes:
         title: what they compete for.
-        unit: EVIDENCE or PROBABILITY.
+        unit: ODDS or PROBABILITY.
         bars: at least one.
         clear: what they come to, in words; empty where there is nothing to say.
     """
@@ -81,27 +81,15 @@ class Chart:
 
 
 def rival_charts(findings: Findings) -> list[Chart]:
-    """What competes with each cause, names and laws apart, then what was not believed."""
-    charts = [*(chart for cause in findings.causes for chart in _of_cause(cause, findings)), _doubtful(findings)]
+    """What competes with each cause, then what was not believed."""
+    charts = [*(_in_the_place_of(cause, findings) for cause in findings.causes), _doubtful(findings)]
     return [chart for chart in charts if chart is not None]
 
 
-def _of_cause(cause: Cause, findings: Findings) -> Iterator[Chart | None]:
-    """By log evidence. That of laws and that of names are of noises of other colours: they do not compare."""
-    ranked = cause.ranked
-    if cause.law is None:
-        yield _by_evidence(cause, findings, "In", ranked.log_evidence, ranked.alike)
-        return
-    yield _by_evidence(cause, findings, "Laws in", cause.law.odds, cause.law.same)
-    yield _by_evidence(cause, findings, "Names in", ranked.log_evidence, ranked.alike)
-
-
-def _by_evidence(
-    cause: Cause, findings: Findings, kind: str, evidence: Mapping[str, float], alike: Sequence[str]
-) -> Chart | None:
+def _in_the_place_of(cause: Cause, findings: Findings) -> Chart | None:
     taken, laws = cause.candidate.key, _laws(cause, findings)
-    same = frozenset(alike) - {taken}
-    values = {key: value for key, value in evidence.items() if math.isfinite(value)}
+    same = frozenset(cause.ranked.alike) - {taken}
+    values = {key: value for key, value in cause.ranked.log_odds.items() if math.isfinite(value)}
     ordered = sorted(values.items(), key=lambda entry: -entry[1])[:MOST]
     if not ordered:
         return None
@@ -117,7 +105,7 @@ def _by_evidence(
         )
         for key, value in ordered
     )
-    return Chart(f"{kind} the place of {_name(taken, laws)}", EVIDENCE, bars, _lead(bars))
+    return Chart(f"In the place of {_name(taken, laws)}", ODDS, bars, _lead(bars))
 
 
 def _standing(key: str, taken: str, same: frozenset[str]) -> Standing:

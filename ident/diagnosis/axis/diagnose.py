@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import Final
 
 from threadpoolctl import threadpool_limits
 
@@ -13,20 +11,12 @@ from ident.diagnosis.axis.problem import axis_problem, delayed_axes
 from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_other_axes
 from ident.diagnosis.axis.scale import Scale
 from ident.diagnosis.findings import Findings
-from ident.diagnosis.judge import Judge, judge
-from ident.diagnosis.limits import Limits
 from ident.diagnosis.names import LATE
+from ident.diagnosis.posterior.answer import judge
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.split import split_problem
 from ident.records.axis_record import AxisRecord, AxisSignals
 from ident.stages import Stage, untold
-
-LIMITS: Final = Limits(nearly=0.6, humble=True)
-"""Of an axis. Its effort has little noise, beside which cogging and errors of its pitch always repeat, without a name:
-what they leave does not take the name from a cause that closes one and a half times as much, but makes it less sure."""
-
-STANDING: Final[Judge] = partial(judge, limits=LIMITS)
-"""What finds the causes of an axis, unless something else is asked to."""
 
 
 def diagnose_axis(
@@ -37,18 +27,16 @@ def diagnose_axis(
     cutoff: float | None = None,
     lacking: Collection[str] = (),
     stage: Stage = untold,
-    judged: Judge = STANDING,
 ) -> Findings:
     """What the model M a + Fv v + Fc sign(v) + offset lacks.
 
     Args:
         fit: records that causes are looked for in.
         confirm: independent records of the same axes; none: a part of `fit` confirms.
-        seed: of the surrogates.
+        seed: of the smooth function of what is left.
         cutoff: of the position filter [rad/s]; None: chosen from the records.
         lacking: names of effects that are not looked for.
         stage: told what begins.
-        judged: finds the causes.
 
     Raises:
         RecordError: the records do not have the same axes.
@@ -56,7 +44,7 @@ def diagnose_axis(
     """
     # Tall, thin matrices: more threads of the linear algebra library only wait for each other.
     with threadpool_limits(limits=1, user_api="blas"):
-        return _diagnosed(fit, confirm, seed, cutoff, lacking, stage, judged)
+        return _diagnosed(fit, confirm, seed, cutoff, lacking, stage)
 
 
 def _diagnosed(
@@ -66,14 +54,13 @@ def _diagnosed(
     cutoff: float | None,
     lacking: Collection[str],
     stage: Stage,
-    judged: Judge,
 ) -> Findings:
     refuse_other_axes([*fit, *confirm])
     stage("filter of the records")
     reference = axis_reference(fit, cutoff, confirm)
 
     def found_by(reference: Reference) -> Findings:
-        return judged(*pose_axis(fit, confirm, reference, lacking), seed=seed, stage=stage)
+        return judge(*pose_axis(fit, confirm, reference, lacking), seed=seed, stage=stage)
 
     findings = found_by(reference)
     scales = tuple(_on_second_thought(reference.scales, findings, fit[0].axes))

@@ -80,8 +80,8 @@ class Signals:
 
     def filtered(self, values: Array) -> Array:
         """The filter of the positions and that of the rows, on everything alike."""
-        dt = self.record.sample_time
-        return mirrored(mirrored(values, BUTTERWORTH_ORDER, self.cutoff, dt), FILTER_ORDER, self.bandwidth, dt)
+        passes = ((BUTTERWORTH_ORDER, self.cutoff), (FILTER_ORDER, self.bandwidth))
+        return mirrored(values, passes, self.record.sample_time)
 
     @cached_property
     def _untold(self) -> list[Untold]:

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.law.dependence import Dependence, law_name
 from ident.diagnosis.law.formula import formula_of
-from ident.diagnosis.law.stage import Law
+from ident.diagnosis.law.law import Law
+from ident.diagnosis.problem import Problem
+from ident.diagnosis.rows import Column
 from ident.effects import Effect, make_effect
 from ident.effects.laws import COUNT, LAWS, coefficient
 from ident.writing import json_number
@@ -111,12 +113,18 @@ def law_answer(law: Law, channel: str, nearest: tuple[str, float] | None) -> Law
     )
 
 
-def alternatives(law: Law, dependences: Sequence[Dependence]) -> tuple[Alternative, ...]:
-    """The laws of another variable, or elsewhere, that add the same to these records."""
+def channel_of(problem: Problem, column: Column) -> str:
+    """Of the rows in which a variant acts."""
+    series = problem.candidates[column.candidate].variants[column.variant].columns
+    return str(next(block.channel for block, one in zip(problem.blocks, series, strict=True) if one is not None))
+
+
+def same_laws(keys: Sequence[str], dependences: Sequence[Dependence]) -> tuple[Alternative, ...]:
+    """The laws of another variable, or elsewhere, that add the same to these records as the first of them does."""
     by_key = {one.key: one for one in dependences}
-    others = [by_key[key] for key in law.same]
+    own, *others = (by_key[key] for key in keys)
     found = dict.fromkeys((str(other.variable), other.where) for other in others)
-    found.pop((str(law.dependence.variable), law.dependence.where), None)
+    found.pop((str(own.variable), own.where), None)
     return tuple(Alternative(None, variable, where) for variable, where in found)
 
 

@@ -1,8 +1,8 @@
-"""How well a smooth function explains the rows: its evidence, and its curve.
+"""The curve of a law that was found, learnt from the rows.
 
-The function is Gaussian beside the baseline and the effects taken, whose columns are projected out; its length and size
-are those that make the fitted rows most likely (Rasmussen and Williams 2006, (5.8)), and are held for the confirming
-ones. Noise that remembers itself makes all evidence smaller by the factor by which it scatters (`evidence.scatter`).
+The function is Gaussian beside the baseline and the effects taken, whose columns are projected out, with the length
+that it was found with; its size is the one that makes the fitted rows most likely (Rasmussen and Williams 2006, (5.8)),
+and is held for the confirming ones. Its covariance is wider by as much as rows scatter more than the noise says.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from ident.diagnosis.directions import VISIBLE
-from ident.diagnosis.evidence import scatter
 from ident.diagnosis.law.dependence import Dependence, Variable
 from ident.diagnosis.law.spline import Knots, knots_around, knots_over
 from ident.diagnosis.linear import orthonormal
@@ -49,30 +48,16 @@ class Learnt:
     """One dependence, learnt.
 
     Attributes:
-        index: of the dependence in its problem.
         knots: of its function.
-        log_evidence: of the fitted rows, against no function.
-        log_predictive: what the confirming rows add to it.
         weights: (K,) coefficients, learnt from the fitted rows alone.
         whole: (K,) the same from all rows.
         covariance: (K, K) of those.
-        shape: (n + known,) what it adds to the whitened rows beside the baseline, by all rows.
-        scale: by which all evidence was divided, as the noise along the function scatters more than white noise.
     """
 
-    index: int
     knots: Knots
-    log_evidence: float
-    log_predictive: float
     weights: Array
     whole: Array
     covariance: Array
-    shape: Array
-    scale: float
-
-    def total(self, cost: float) -> float:
-        """Log evidence of all rows, less that of a noise without a law by which `cost` more of them is explained."""
-        return self.log_evidence + self.log_predictive - cost / self.scale
 
 
 @dataclass(frozen=True)
@@ -82,12 +67,10 @@ class _Beside:
     Attributes:
         basis: (n, p) orthonormal, of what is projected out.
         residual: (n,) of the target.
-        stretch: (n,) number of the stretch of noise that a row belongs to.
     """
 
     basis: Array
     residual: Array
-    stretch: NDArray[np.int64]
 
     def without(self, columns: Array) -> Array:
         """Columns (n, k) beside it."""
@@ -101,48 +84,30 @@ class Learner:
         rows = regression.rows
         self._whitener, self.rows = whitener, rows
         white = regression.white(whitener, tuple(taken), np.zeros((len(rows), 0)))
-        self._target, self._model, self._stretch = white.target, white.baseline, white.stretch
-        self.fitted = ~white.confirming
+        self._target, self._model, self.fitted = white.target, white.baseline, ~white.confirming
         self._part, self._all = self._beside(self.fitted), self._beside(np.ones(len(self.fitted), dtype=bool))
 
-    def learn(self, index: int, design: Array, knots: Knots) -> Learnt | None:
+    def learn(self, design: Array, knots: Knots, prior: Array, excess: float) -> Learnt | None:
         """A dependence; None where the fitted rows show nothing of it.
 
         Args:
-            index: of it in its problem.
             design: (n, K) its columns in the rows.
             knots: of its function.
+            prior: (K, R) factor of the covariance of its coefficients, but for its size.
+            excess: by how much the rows scatter more than the noise says, as a ratio of variances.
         """
         white = self._white(design)
-        part = _Moments.of(white[self.fitted], self._part)
-        shares = [share for share in LENGTHS if share >= knots.shortest]
-        best = max((_fit(part, knots.prior(share)) for share in shares), key=lambda fit: fit.log)
+        best = _fit(_Moments.of(white[self.fitted], self._part), prior)
         if not best.log > 0:
             return None
-        whole = _fit(_Moments.of(white, self._all), best.prior, best.size)
-        scale = self._scale(best, whole)
-        turn = best.prior @ _beside_absorbed(white @ best.prior, whole.moments.columns @ best.prior)
+        whole = _fit(_Moments.of(white, self._all), prior, best.size)
+        turn = prior @ _beside_absorbed(white @ prior, whole.moments.columns @ prior)
         return Learnt(
-            index=index,
             knots=knots,
-            log_evidence=best.log / scale,
-            log_predictive=(whole.log - best.log) / scale,
             weights=turn @ best.mean,
             whole=turn @ whole.mean,
-            covariance=scale * turn @ whole.covariance @ turn.T,
-            shape=whole.shape,
-            scale=scale,
+            covariance=excess * turn @ whole.covariance @ turn.T,
         )
-
-    def _scale(self, part: _Fit, whole: _Fit) -> float:
-        """By how much the noise along the function scatters more than white noise would."""
-        pairs = ((part.shape, self._part), (whole.shape, self._all))
-        found = [
-            scatter((shape / length)[:, None], beside.residual, beside.stretch)
-            for shape, beside in pairs
-            if (length := float(np.linalg.norm(shape))) > 0
-        ]
-        return max(found, default=1.0)
 
     def _white(self, design: Array) -> Array:
         """Columns (n, K) as the rows have them; what is known of the parameters says nothing of a law."""
@@ -152,7 +117,7 @@ class Learner:
     def _beside(self, chosen: Mask) -> _Beside:
         basis = orthonormal(self._model[chosen])
         target = self._target[chosen]
-        return _Beside(basis, target - basis @ (basis.T @ target), self._stretch[chosen])
+        return _Beside(basis, target - basis @ (basis.T @ target))
 
 
 @dataclass(frozen=True)
@@ -181,7 +146,6 @@ class _Fit:
     """A function of one prior beside some rows.
 
     Attributes:
-        prior: (K, R) factor of its covariance.
         size: power of the prior, over that of the noise.
         log: log evidence against no function.
         mean: (R,) coefficients in the directions of the prior.
@@ -189,17 +153,11 @@ class _Fit:
         moments: of the rows.
     """
 
-    prior: Array
     size: float
     log: float
     mean: Array
     covariance: Array
     moments: _Moments
-
-    @property
-    def shape(self) -> Array:
-        """What it adds to the rows (n,)."""
-        return np.asarray(self.moments.columns @ (self.prior @ self.mean))
 
 
 def _fit(moments: _Moments, prior: Array, size: float | None = None) -> _Fit:
@@ -212,8 +170,8 @@ def _fit(moments: _Moments, prior: Array, size: float | None = None) -> _Fit:
     gains = sizes[:, None] / (1 + sizes[:, None] * powers)
     logs = 0.5 * np.sum(gains * amplitudes**2 - np.log1p(sizes[:, None] * powers), axis=1)
     best = int(np.argmax(logs))
-    mean = turn @ (gains[best] * amplitudes)
-    return _Fit(prior, float(sizes[best]), float(logs[best]), mean, turn * gains[best] @ turn.T, moments)
+    mean, covariance = turn @ (gains[best] * amplitudes), turn * gains[best] @ turn.T
+    return _Fit(float(sizes[best]), float(logs[best]), mean, covariance, moments)
 
 
 def _beside_absorbed(design: Array, left: Array) -> Array:

@@ -13,36 +13,32 @@ from scipy.special import logsumexp
 
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import LAW, Cause, Findings, ordered
-from ident.diagnosis.fitted import Fitted
-from ident.diagnosis.law.answer import Alternative, LawAnswer, alternatives, law_answer, same_names
-from ident.diagnosis.law.free import Curve
-from ident.diagnosis.law.neighbours import channel_of
+from ident.diagnosis.fitted import Fitted, Taken
+from ident.diagnosis.law.answer import LawAnswer, channel_of, law_answer, same_laws, same_names
+from ident.diagnosis.law.law import Law
 from ident.diagnosis.law.reach import told_samples
-from ident.diagnosis.law.stage import Law
-from ident.diagnosis.limits import Limits
 from ident.diagnosis.orders import with_orders
 from ident.diagnosis.posterior.asked import Asked, asked_beside, asked_beside_a_law, asked_of
-from ident.diagnosis.posterior.noise import SIZES
+from ident.diagnosis.posterior.noise import SIZES, Colours
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.posterior.slots import slot_of
 from ident.diagnosis.posterior.state import State
 from ident.diagnosis.posterior.taken import as_variants
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.remainder import repeated, shares
-from ident.diagnosis.search import Taken
 from ident.diagnosis.sized import is_foreign, is_nothing, is_sizeless
 from ident.stages import Stage, untold
 
 Array = NDArray[np.float64]
 
-DOUBTED: Final = 0.5
-"""Probability of nothing in its place from which a member is none."""
+DOUBTED: Final = 0.05
+"""Probability of nothing in its place from which a member is none: so many false alarms are too many."""
 
 EXACT: Final = 0.01
 """Share of the held-out gap that a member must close beside others, whose columns are exact to about as much."""
 
-LIMITS: Final = Limits()
-"""What is much of a held-out gap, and what is an accident of its noise."""
+MEASURABLE: Final = 0.05
+"""Power of what causes could close of a held-out gap, over the noise's, from which that is no accident of the noise."""
 
 MISTAKEN: Final = 1.0
 """What is lacking, over noise and tolerance, that may be a mistake in those."""
@@ -50,8 +46,14 @@ MISTAKEN: Final = 1.0
 OPEN: Final = 0.5
 """Share of the held-out gap that members leave, more being lacking than is tolerated, from which they are no answer."""
 
+PAID: Final = 0.05
+"""Log of what is above the noise that a member must gain beside greater ones, if it closes less than is exact."""
 
-def judge_by_posterior(fit: Problem, confirm: Problem, *, seed: int, stage: Stage = untold) -> Findings:
+WIDENING: Final = 0.1
+"""Share of the held-out gap by which a member, or all of them, may seem to widen it."""
+
+
+def judge(fit: Problem, confirm: Problem, *, seed: int, stage: Stage = untold) -> Findings:
     """Find the causes of a gap.
 
     Args:
@@ -61,24 +63,23 @@ def judge_by_posterior(fit: Problem, confirm: Problem, *, seed: int, stage: Stag
         stage: told what begins.
     """
     stage(f"comparing {len(fit.candidates)} causes and {len(fit.dependences)} laws")
-    asked, search, state = _found(asked_of(with_orders((fit, confirm)), seed), stage)
+    asked, search, state = _found(asked_of(with_orders((fit, confirm))), stage)
     if (again := asked_beside_a_law(asked, state)) is not None:
         stage("again, noise being what a law leaves")
-        beside = _found(again, stage)
-        if beside[-1].log_posterior > state.log_posterior:
-            asked, search, state = beside
+        asked, search, state = _likelier(again, state, stage) or (asked, search, state)
     stage("numbers of the answer")
-    answer = _Answer(asked, search, state)
+    answer = _Answer(asked, search, state, seed)
     while (other := answer.better()) is not None:
         search, state = other
-        answer = _Answer(asked, search, state)
+        answer = _Answer(asked, search, state, seed)
     return answer.findings()
 
 
 def _found(asked: Asked, stage: Stage) -> tuple[Asked, Search, State]:
     """What is there, asked once more beside it."""
     search = Search(asked.fitter)
-    state = search.run()
+    # Without repeats the first noise only leads to the second: what has grown by it leaves as much as what is best.
+    state = search.run() if Colours.repeats(asked.regression) else search.grown(asked.fitter.nothing)
     if (again := asked_beside(asked, state)) is None:
         return asked, search, state
     stage("again beside what is there")
@@ -86,11 +87,27 @@ def _found(asked: Asked, stage: Stage) -> tuple[Asked, Search, State]:
     return again, search, search.run()
 
 
+def _likelier(asked: Asked, before: State, stage: Stage) -> tuple[Asked, Search, State] | None:
+    """What another noise leads to that is likelier than a set; None where that is nothing.
+
+    Args:
+        asked: with that noise.
+        before: the set.
+        stage: told what begins.
+    """
+    grown = Search(asked.fitter).grown(asked.fitter.state(before.members, None))
+    beside = asked_beside(asked, grown)
+    if beside is None or beside.fitter.state(grown.members, None).log_posterior <= before.log_posterior:
+        return None
+    found = _found(asked, stage)
+    return found if found[-1].log_posterior > before.log_posterior else None
+
+
 class _Answer:
     """What is computed of the best set."""
 
-    def __init__(self, asked: Asked, search: Search, state: State) -> None:
-        self.search, self.state, self.design, self._seed = search, state, asked.design, asked.seed
+    def __init__(self, asked: Asked, search: Search, state: State, seed: int) -> None:
+        self.search, self.state, self.design, self._seed = search, state, asked.design, seed
         excess, whole = search.fitter.excess(state), search.fitter.among_all(state)
         self.slots = {index: slot_of(search, whole, index, excess[index]) for index in state.members}
         self.taken = as_variants(asked.problems, asked.regression, asked.designs, self.design, state, self.slots)
@@ -153,7 +170,7 @@ class _Answer:
 
     def _widening(self) -> list[int]:
         """The member that widens the held-out gap most, if any does."""
-        widened = [place for place, closed in enumerate(self.fitted.lacking) if closed < -LIMITS.widening]
+        widened = [place for place, closed in enumerate(self.fitted.lacking) if closed < -WIDENING]
         return self._closing_least(widened) if self._measurable() else []
 
     def _needless(self) -> list[int]:
@@ -168,11 +185,11 @@ class _Answer:
 
     def _pays(self, place: int) -> bool:
         """Whether a member closes what its columns are exact to, or much of what a greater one leaves."""
-        return self.fitted.lacking[place] >= EXACT or self.fitted.gain(place, LIMITS.blur) >= LIMITS.name
+        return self.fitted.lacking[place] >= EXACT or self.fitted.gain(place) >= PAID
 
     def _measurable(self) -> bool:
         """Whether the held-out gap that causes could close is more than an accident of the noise."""
-        return self.fitted.removable > LIMITS.measurable * self.fitted.whole.floor**2
+        return self.fitted.removable > MEASURABLE * self.fitted.whole.floor**2
 
     def _has_size(self, place: int) -> bool:
         """Whether a size is surely not zero, and its own, and the numbers are of the effect's family.
@@ -181,21 +198,19 @@ class _Answer:
         an effect of the family without which most of the held-out gap stays is surely not zero.
         """
         candidate, part = self.fitted.candidate(place), self.fitted.after.parts[place]
-        if is_nothing(candidate, part, LIMITS):
+        if is_nothing(candidate, part):
             return not is_foreign(candidate, part) and self._measurable() and self.fitted.lacking[place] > OPEN
-        return not is_sizeless(candidate, part, LIMITS)
+        return not is_sizeless(candidate, part)
 
     def findings(self) -> Findings:
         """The answer, with all that reports show of it."""
         fitted, regression = self.fitted, self.taken.regression
         causes = ordered([self._cause(place, index) for place, index in enumerate(self.taken.variants)])
         verdict = self._verdict()
-        lasting = self._lacking()
         return Findings(
             verdict=verdict,
             causes=causes,
             doubtful=self._doubtful(),
-            events=(),
             gap=fitted.settled if verdict is Verdict.NONE else fitted.exactly,
             where=shares(regression.rows, fitted.floors, fitted.judged()),
             invisible=self._invisible(),
@@ -203,7 +218,7 @@ class _Answer:
             after=fitted.after,
             significance=min((slot.nothing for slot in self.slots.values()), default=1.0),
             remainder=fitted.rest,
-            lasting=lasting,
+            lasting=self._lacking,
             repeated_before=repeated(regression.rows, fitted.floors, fitted.judged()),
             repeated_after=repeated(regression.rows, fitted.floors, fitted.after.blocks),
             problem=self.taken.problems[0],
@@ -227,17 +242,21 @@ class _Answer:
         hypotheses = self.design.hypotheses
         return {index: one.total - hypotheses[index].price for index, one in tables.items() if one.is_there}
 
+    @cached_property
     def _lacking(self) -> bool:
-        """Whether more is lacking somewhere than noise and tolerance that are not known exactly."""
-        return any(SIZES[size] > MISTAKEN for size in self.state.evidence.sizes)
+        """Whether more is lacking somewhere than noise and tolerance that are not known exactly.
+
+        Of rows without repeats the noise is what the fitted ones leave: the confirming ones may say more.
+        """
+        gap = self.fitted.beside_what_is_known
+        surely = any(SIZES[size] > MISTAKEN for size in self.state.evidence.sizes)
+        return surely or gap.after > math.hypot(1.0, MISTAKEN) * gap.floor
 
     def _verdict(self) -> Verdict:
-        gap = self.fitted.beside_what_is_known
-        # Of rows without repeats the noise is what the fitted ones leave: the confirming ones may say more.
-        lacking = self._lacking() or gap.after > math.hypot(1.0, MISTAKEN) * gap.floor
         if not self.taken.variants:
-            return Verdict.UNKNOWN if lacking or self._nameless() else Verdict.NONE
-        if lacking and gap.closed < 1 - OPEN:
+            return Verdict.UNKNOWN if self._lacking or self._nameless() else Verdict.NONE
+        least = 1 - OPEN if self._lacking else -WIDENING if self._measurable() else -math.inf
+        if self.fitted.exactly.closed < least:
             return Verdict.UNKNOWN
         return Verdict.LAW if self.taken.laws else Verdict.EFFECT
 
@@ -254,28 +273,22 @@ class _Answer:
         return tuple(name for name in names if name not in shown and not name.startswith(LAW))
 
     def _cause(self, place: int, index: int) -> Cause:
-        slot, law, problem = self.slots[index], self.taken.laws.get(index), self.taken.problems[0]
-        hypotheses = self.design.hypotheses
+        slot, law, hypotheses = self.slots[index], self.taken.laws.get(index), self.design.hypotheses
+        alike = [hypotheses[one].key for one in slot.alike]
         return Cause(
             candidate=self.fitted.candidate(place),
             part=self.fitted.after.parts[place],
             ranked=slot.ranked(hypotheses),
             probability=slot.probability(hypotheses),
-            log_evidence=slot.logs[index],
-            log_predictive=math.nan,
+            log_odds=slot.logs[index],
             # Nothing is said to widen a gap within the accidents of its noise.
             closed=max(self.fitted.lacking[place], -math.inf if self._measurable() else 0.0),
             needed=self.fitted.closed[place],
             biased=self.fitted.biased(place),
-            curve=Curve.ITS_OWN,
-            sizeless=False,
             law=law,
             law_answer=None if law is None else self._law_answer(law, index),
-            alternatives=self._alternatives(index) if law is None else alternatives(law, problem.dependences),
+            alternatives=same_names(alike) if law is None else same_laws(alike, self.taken.problems[0].dependences),
         )
-
-    def _alternatives(self, index: int) -> tuple[Alternative, ...]:
-        return same_names([self.design.hypotheses[one].key for one in self.slots[index].alike])
 
     def _law_answer(self, law: Law, index: int) -> LawAnswer:
         column = self.taken.regression.rows.layout[self.taken.variants[index]]

@@ -16,7 +16,6 @@ from ident.diagnosis.posterior.swallowed import beside_a_law
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import make_rows
-from ident.diagnosis.settings import Settings
 from ident.diagnosis.whitening import Left
 
 
@@ -30,7 +29,6 @@ class Asked:
         designs: of their laws.
         design: of all hypotheses.
         fitter: of sets of them.
-        seed: of the smooth function of what is left.
     """
 
     problems: tuple[Problem, ...]
@@ -38,7 +36,6 @@ class Asked:
     designs: Designs
     design: Design
     fitter: Fitter
-    seed: int
 
 
 def asked_beside(asked: Asked, state: State) -> Asked | None:
@@ -51,7 +48,7 @@ def asked_beside(asked: Asked, state: State) -> Asked | None:
     else:
         left = asked.fitter.left(state)
     problems = with_hidden_orders(problems, asked.design, asked.designs, state) or problems
-    return None if problems is asked.problems and left is None else asked_of(problems, asked.seed, left)
+    return None if problems is asked.problems and left is None else asked_of(problems, asked.designs, left)
 
 
 def asked_beside_a_law(asked: Asked, state: State) -> Asked | None:
@@ -59,18 +56,18 @@ def asked_beside_a_law(asked: Asked, state: State) -> Asked | None:
     if Colours.repeats(asked.regression):
         return None
     left = beside_a_law(asked.problems[0], asked.regression.rows, asked.designs, asked.fitter.left(state))
-    return None if left is None else asked_of(asked.problems, asked.seed, left)
+    return None if left is None else asked_of(asked.problems, asked.designs, left)
 
 
-def asked_of(problems: tuple[Problem, ...], seed: int, left: Left | None = None) -> Asked:
+def asked_of(problems: tuple[Problem, ...], designs: Designs | None = None, left: Left | None = None) -> Asked:
     """Everything that may be there, and what fits it.
 
     Args:
         problems: to fit and to confirm.
-        seed: of the smooth function of what is left.
+        designs: of their laws, made for other candidates; None: they are made.
         left: what a set leaves of their rows.
     """
-    regression = Regression(problems[0], make_rows(*problems), Settings(), seed)
-    colours, designs = Colours(regression, left), Designs(problems, regression.rows)
+    regression = Regression(problems[0], make_rows(*problems))
+    colours, designs = Colours(regression, left), designs or Designs(problems, regression.rows)
     design = make_design(problems, regression, colours, designs)
-    return Asked(problems, regression, designs, design, Fitter(design, colours, Bends(problems, colours)), seed)
+    return Asked(problems, regression, designs, design, Fitter(design, colours, Bends(problems, colours)))

@@ -81,6 +81,11 @@ class Fitter:
         """No hypothesis at all."""
         return self.state({}, None)
 
+    def is_bent(self, index: int, member: Member) -> bool:
+        """Whether there is more to a member than its columns."""
+        hypothesis = self.design.hypotheses[index]
+        return self._bends.is_bent(hypothesis, hypothesis.blocks[member.block])
+
     def state(self, members: Members, before: State | None) -> State:
         """A set, its members' numbers fitted by turns, with the noise that they leave.
 

@@ -216,7 +216,7 @@ def _log(products: Array) -> float:
 def _of(regression: Regression, left: Left | None) -> Whitener:
     """Noise of rows without repeats: of what a set leaves, or the parameters and the strongest candidates."""
     if left is None:
-        left = regression.left_beside(regression.columns_of(regression.with_strongest(())))
+        left = regression.left_beside(regression.columns_of(regression.strongest))
     return whitener_of(regression.rows, colours_of(regression.rows, left, autocovariance))
 
 

@@ -53,14 +53,7 @@ class Search:
         """The best set that was found."""
         return self.further(self.fitter.nothing)
 
-    def further(self, state: State) -> State:
-        """The best set that was found, beginning with another."""
-        best = self._against_rivals(self._grown(state))
-        named = self._named(best)
-        # Names that stand for a law were taken one after the other.
-        return best if named is best else self._against_rivals(named)
-
-    def _grown(self, state: State) -> State:
+    def grown(self, state: State) -> State:
         """With further members, each of which tempered evidence makes likelier than nothing."""
         while len(state.members) < MOST:
             further = self._pruned(self._believed(state))
@@ -68,6 +61,13 @@ class Search:
                 break
             state = further
         return state
+
+    def further(self, state: State) -> State:
+        """The best set that was found, beginning with another."""
+        best = self._against_rivals(self.grown(state))
+        named = self._named(best)
+        # Names that stand for a law were taken one after the other.
+        return best if named is best else self._against_rivals(named)
 
     def _believed(self, state: State, *, named: bool = False) -> State:
         """The best set with one member more that is likelier than nothing, evidence tempered; or the same, without any.
@@ -106,7 +106,9 @@ class Search:
             ordered = sorted((index for index in one if index not in doubted), key=lambda index: -one[index][0])
             for index in ordered[:SURVIVORS]:
                 odds, member = one[index]
-                if odds > max(one[ordered[0]][0], 0.0) - MARGIN:
+                least = max(one[ordered[0]][0], 0.0) - MARGIN
+                # What is no more than its columns promises what it keeps.
+                if odds > (least if self.fitter.is_bent(index, member) else max(least, 0.0)):
                     found.setdefault(index, member)
         return [self.fitter.state({**state.members, index: one}, state) for index, one in found.items()]
 

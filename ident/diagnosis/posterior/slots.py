@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from ident.diagnosis.findings import Ranked
 from ident.diagnosis.posterior.hypotheses import Hypothesis
 from ident.diagnosis.posterior.misfit import tempered
 from ident.diagnosis.posterior.search import Search
 from ident.diagnosis.posterior.state import State
-from ident.diagnosis.probability import Ranked
-from ident.diagnosis.regression import SAME
 
 Array = NDArray[np.float64]
 
@@ -30,6 +29,12 @@ BETWEEN: Final = 0.2
 RIVALS: Final = 4
 """That are fitted exactly."""
 
+SAME: Final = 0.9999
+"""Cosine of what two names of as many numbers add to the rows, from which those do not tell them apart."""
+
+SAME_LAW: Final = 0.98
+"""The same of two laws: what is learnt is known to about as much."""
+
 
 @dataclass(frozen=True)
 class Slot:
@@ -38,14 +43,16 @@ class Slot:
     Attributes:
         logs: log posterior odds of every hypothesis against nothing there, the greatest first.
         cosines: of what the member adds and what every other can.
-        alike: hypotheses that add the same, the member first.
+        alike: hypotheses of its kind, names or laws, that add the same, the member first.
         rivals: sets with another hypothesis there, of those that were fitted exactly.
+        excess: of the scatter of the rows over their noise, along the member.
     """
 
     logs: Mapping[int, float]
     cosines: Mapping[int, float]
     alike: tuple[int, ...]
     rivals: Mapping[int, State]
+    excess: float
 
     def ahead(self, barred: Collection[int]) -> tuple[float, int] | None:
         """By how much the most likely rival is more likely, of those fitted exactly and not barred; None if none is."""
@@ -98,13 +105,15 @@ def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
     odds = {one: place.odds(one) for one in place.logs}
     logs = {one: log for one, log in sorted(odds.items(), key=lambda entry: -entry[1]) if math.isfinite(log)}
     cosines, hypotheses = _cosines(state, index, logs), search.design.hypotheses
-    width = len(hypotheses[index].blocks[state.members[index].block].factor)
+    width, law = len(hypotheses[index].blocks[state.members[index].block].factor), hypotheses[index].free
     alike = [
         one
         for one, (cosine, size) in cosines.items()
-        if cosine > SAME and size == width and one != index and not (hypotheses[one].free or hypotheses[index].free)
+        if one != index
+        and hypotheses[one].free is law
+        and (cosine > SAME_LAW if law else cosine > SAME and size == width)
     ]
-    return Slot(logs, {one: cosine for one, (cosine, _) in cosines.items()}, (index, *alike), place.rivals)
+    return Slot(logs, {one: cosine for one, (cosine, _) in cosines.items()}, (index, *alike), place.rivals, excess)
 
 
 class _Place:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.law.law import Law, with_law
 from ident.diagnosis.law.learning import Designs, Learner
-from ident.diagnosis.law.stage import SAME, Law, with_law
 from ident.diagnosis.posterior.hypotheses import Design
 from ident.diagnosis.posterior.slots import Slot
 from ident.diagnosis.posterior.state import State
@@ -53,7 +53,7 @@ def as_variants(
         if column is not None and index in state.bends:
             problems = tuple(_started(problem, column, state.bends[index].numbers) for problem in problems)
     for index in [one for one in state.members if design.hypotheses[one].free]:
-        law = _law(problems, regression, designs, design, state, slots[index], index, tuple(variants.values()))
+        law = _law(problems, regression, designs, design, state, slots[index].excess, index, tuple(variants.values()))
         if law is not None:
             problems, regression, variants[index] = with_law(problems, regression, law)
             laws[index] = law
@@ -62,10 +62,10 @@ def as_variants(
 
 
 def _started(problem: Problem, column: Column, numbers: Array) -> Problem:
-    """A problem in which the exact refit of a variant begins with the numbers (m,) that were found."""
+    """A problem in which the exact refit of a variant may begin with the numbers (m,) that were found."""
     candidate = problem.candidates[column.candidate]
     variants = list(candidate.variants)
-    variants[column.variant] = replace(variants[column.variant], start=lambda _: numbers)
+    variants[column.variant] = replace(variants[column.variant], found=numbers)
     candidates = list(problem.candidates)
     candidates[column.candidate] = replace(candidate, variants=tuple(variants))
     return replace(problem, candidates=tuple(candidates))
@@ -77,7 +77,7 @@ def _law(
     designs: Designs,
     design: Design,
     state: State,
-    slot: Slot,
+    excess: float,
     index: int,
     others: tuple[int, ...],
 ) -> Law | None:
@@ -85,12 +85,10 @@ def _law(
     assert number is not None
     knots = designs.knots(number)
     assert knots is not None
-    learnt = Learner(regression, state.evidence.noise, others).learn(number, designs.columns(number), knots)
+    prior = design.hypotheses[index].blocks[state.members[index].block].prior
+    assert prior is not None
+    learner = Learner(regression, state.evidence.noise, others)
+    learnt = learner.learn(designs.columns(number), knots, prior, excess)
     if learnt is None:
         return None
-    free = {one: log for one, log in slot.logs.items() if design.hypotheses[one].free}
-    odds = {design.hypotheses[one].key: log for one, log in free.items()}
-    same = [design.hypotheses[one].key for one in free if slot.cosines.get(one, 0.0) > SAME]
-    key = design.hypotheses[index].key
-    alike = (key, *(one for one in same if one != key))
-    return Law(problems[0].dependences[number], learnt, odds, alike, len(problems[0].candidates))
+    return Law(problems[0].dependences[number], number, learnt, len(problems[0].candidates))

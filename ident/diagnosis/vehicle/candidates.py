@@ -25,7 +25,6 @@ from ident.diagnosis.vehicle.library import (
     ONE_SIDED,
     SHAPES,
     TermCause,
-    friction_curve,
     placed_parameters,
     ripple_over,
     term_causes,
@@ -137,9 +136,7 @@ def candidate_of(
         part=PLAY_PART if cause.name == EffectName.BACKLASH and cause.where in DRIVES else 0.0,
         yielding=LOAD_STD[cause.where] if cause.name == EffectName.BACKLASH else 0.0,
         periodic=ripple_over(cause.where, context.geometry) if cause.name == EffectName.TORQUE_RIPPLE else None,
-        curve=friction_curve(cause.name, cause.where),
         price=RARER if cause.name == EffectName.TORQUE_FILTER else 0.0,
-        along=EffectName.ELASTICITY if cause.name == EffectName.BACKLASH else "",
     )
 
 

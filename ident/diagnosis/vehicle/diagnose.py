@@ -11,8 +11,8 @@ from threadpoolctl import threadpool_limits
 
 from ident.diagnosis.diagnosis import Diagnosis
 from ident.diagnosis.findings import Findings
-from ident.diagnosis.judge import Judge, judge
 from ident.diagnosis.names import EffectName
+from ident.diagnosis.posterior.answer import judge
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.split import split_problem
 from ident.diagnosis.vehicle.belonging import refuse_other_vehicle
@@ -59,7 +59,6 @@ def diagnose_vehicle(
     seed: int = 1,
     effects: Sequence[EffectName] = tuple(EffectName),
     stage: Stage = untold,
-    judged: Judge = judge,
 ) -> VehicleDiagnosis:
     """What the model of the platform lacks.
 
@@ -68,10 +67,9 @@ def diagnose_vehicle(
         confirm: independent records; none: a part of `fit` confirms.
         vehicle: its geometry is taken as true.
         model: being judged, with the effects that it has; None: parameters are refitted, only structure can be missing.
-        seed: of the surrogates.
+        seed: of the smooth function of what is left.
         effects: that are looked for.
         stage: told what begins.
-        judged: finds the causes.
 
     Raises:
         RecordError: a record is of another vehicle, does not move, has no torques or holds none of the steps of a
@@ -82,7 +80,7 @@ def diagnose_vehicle(
     with threadpool_limits(limits=1, user_api="blas"):
         stage("rows of the records")
         question = pose_vehicle(fit, confirm, vehicle, model, effects)
-        findings = judged(*question.problems, seed=seed, stage=stage)
+        findings = judge(*question.problems, seed=seed, stage=stage)
         invisible = tuple(str(name) for name in effects if name in question.hidden or name in findings.invisible)
         findings = replace(findings, invisible=invisible)
         stage("the next experiment")

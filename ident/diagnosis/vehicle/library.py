@@ -17,7 +17,6 @@ from ident.diagnosis.names import EffectName, places_of
 from ident.diagnosis.problem import Periodic
 from ident.diagnosis.vehicle.rows import UnitTerm
 from ident.effects import EFFECTS, EffectParameter, effect_term
-from ident.plant.places import ALL_WHEELS, STEERING, WHEEL_PLACES
 from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]
@@ -88,27 +87,6 @@ ONE_SIDED: Final = (
 
 POSITIVE: Final = (*ONE_SIDED, EffectName.PAYLOAD)
 """Effects that stand for no change in the other direction: nobody takes off a load that is not there."""
-
-
-FRICTIONS: Final = (
-    EffectName.STRIBECK,
-    EffectName.ASYMMETRIC_COULOMB,
-    EffectName.ASYMMETRIC_VISCOUS,
-    EffectName.QUADRATIC_DRAG,
-)
-"""Effects that change the friction of the joints at their place."""
-
-_CURVES: Final[Mapping[str, str]] = MappingProxyType(
-    dict.fromkeys((*WHEEL_PLACES, *ALL_WHEELS, "d_vw", "d_cw"), ALL_WHEELS[0])
-    | {"steering": "steering"}
-    | dict.fromkeys((STEERING[0], "d_vl", "d_cl"), STEERING[0])
-    | dict.fromkeys((STEERING[1], "d_vr", "d_cr"), STEERING[1])
-)
-
-
-def friction_curve(name: EffectName, where: str) -> str:
-    """Whose friction over the speed an effect changes: that of the wheels or of a steering axis; mostly none."""
-    return _CURVES.get(where, "") if name in (*FRICTIONS, EffectName.PARAMETER_CHANGE) else ""
 
 
 def ripple_over(where: str, geometry: Geometry) -> Periodic:

@@ -79,12 +79,3 @@ def test_the_exam_is_diagnosed_and_scored(folder: ExamFolder) -> None:
     assert [score["rates"][name][1] for name in (FALSE_ALARMS, REJECTED, RIGHT)] == [1, 1, 1]
     assert sum(count for _, _, count in score["confusion"]) == len(answers)
     assert all((folder.path / name).is_file() for name in ("score.md", "reliability.svg", "confusion.svg"))
-
-
-def test_one_comparison_answers_the_same_exam(folder: ExamFolder) -> None:
-    diagnosed = quasiomni("exam", "diagnose", str(folder.path), "--jobs", "1", "--core", "one")
-    assert diagnosed.returncode == 0, diagnosed.stderr
-    scored = quasiomni("exam", "score", str(folder.path), "--core", "one", *key_of(folder))
-    assert scored.returncode == 0, scored.stderr
-    score = json.loads((folder.path / "one" / "score.json").read_text())
-    assert [score["rates"][name][1] for name in (FALSE_ALARMS, REJECTED, RIGHT)] == [1, 1, 1]

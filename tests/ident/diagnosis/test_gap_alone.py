@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ident.diagnosis.alone import Alone, closed_alone
-from ident.diagnosis.judge import judge
+from ident.diagnosis.posterior.answer import judge
 from ident.diagnosis.problem import Nominal, Problem
 
 TRUE = np.array([1.0, -2.0, 0.5])

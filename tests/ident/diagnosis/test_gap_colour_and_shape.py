@@ -1,4 +1,4 @@
-"""What repeats is in no colour, what one campaign alone repeats is no gap, and a large effect has no companion."""
+"""What repeats is in no colour, and a large effect has no companion."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ident.diagnosis.judge import judge
+from ident.diagnosis.posterior.answer import judge
 from ident.diagnosis.problem import Block, Candidate, Problem, Variant
 from ident.diagnosis.regression import Regression
-from ident.diagnosis.remainder import lasting, repeated
 from ident.diagnosis.rows import make_rows
-from ident.diagnosis.settings import Settings
 from ident.diagnosis.whitening import colours_of_repeats, fit_whitener
 from ident.effects import EffectParameter
 
@@ -80,22 +78,11 @@ def test_what_is_known_not_to_repeat_is_no_noise(world: type[Any]) -> None:
         return power(problems)
 
     def power(problems: Sequence[Problem]) -> Array:
-        regression = Regression(problems[0], make_rows(*problems), Settings(), 1)
+        regression = Regression(problems[0], make_rows(*problems))
         return np.array([colour.covariance[0] for colour in regression.repeats])
 
     assert noise(known=True) == pytest.approx(power(calm), rel=0.02)
     assert np.all(noise(known=False) > 4 * power(calm))
-
-
-@pytest.mark.parametrize("parts", [(0,), (1,), (0, 1)])
-def test_only_what_repeats_in_both_campaigns_lasts(world: type[Any], parts: Sequence[int]) -> None:
-    problems = [world(seed=7, true={"a": 1.0} if part in parts else {}).problem(part) for part in (0, 1)]
-    rows = make_rows(*problems)
-    models = [block.baseline @ TRUTH for block, _ in rows.blocks]
-    floors = np.ones(len(rows.blocks))
-    assert max(repeated(rows, floors, models).values()) > 0.6
-    both = max(lasting(rows, floors, models).values())
-    assert both > 0.8 if len(parts) == 2 else both < 0.25
 
 
 def bent(problem: Problem, size: float, name: str = "a", by: str = "b") -> Problem:

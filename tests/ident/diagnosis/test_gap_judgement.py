@@ -14,14 +14,11 @@ from hypothesis import strategies as st
 
 from ident.diagnosis.diagnosis import Gap, Verdict, write_diagnosis
 from ident.diagnosis.findings import Findings
-from ident.diagnosis.judge import judge
-from ident.diagnosis.probability import calibration
+from ident.diagnosis.posterior.answer import judge
 from ident.diagnosis.problem import Nominal, Problem, Variant
-from ident.diagnosis.settings import Settings
 from ident.diagnosis.split import split_problem
 from ident.effects import EffectParameter
 from ident.errors import UserError
-from ident.report.gap_summary import summary_lines
 
 
 def _judged(world: Any) -> Findings:
@@ -39,7 +36,7 @@ def test_an_effect_is_named_with_its_size_and_closes_the_gap(world: type[Any]) -
     (cause,) = findings.causes
     assert abs(cause.part.values[0] - 0.3) < 3 * cause.part.std[0]
     assert cause.part.std[0] < 0.03
-    assert cause.probability == pytest.approx(calibration().ceiling)
+    assert cause.probability > 0.99
     assert findings.gap.closed > 0.8
     assert findings.gap.floor == pytest.approx(1.0)
 
@@ -115,7 +112,7 @@ def test_candidates_that_are_the_same_form_one_ambiguity_set_whose_probability_i
     findings = _judged(world(seed=11, true={"a": 0.3}, alike={"d": "a"}))
     (effect,), (cause,) = findings.diagnosis().effects, findings.causes
     assert set(effect.ambiguity_set) == {"a", "d"}
-    assert effect.probability == pytest.approx(calibration().ceiling)
+    assert effect.probability > 0.99
     assert cause.ranked.names["a"] == pytest.approx(cause.ranked.names["d"])
 
 
@@ -147,15 +144,11 @@ def test_what_happened_in_one_drive_only_is_no_cause_and_hides_none(world: type[
     problems = [_in_part(world(seed=24, true={"c": 0.3}).problem(one), one == part) for one in (0, 1)]
     findings = judge(*problems, seed=1)
     assert _names(findings) == ["c"]
-    assert findings.events == ("a@place",)
-    assert any("Only one of the two drives" in line for line in summary_lines(findings, findings.diagnosis()))
 
 
-@pytest.mark.parametrize(("weaker", "named"), [(30.0, ["a"]), (400.0, [])])
-def test_a_cause_that_one_drive_shows_far_better_counts_if_the_other_shows_it_too(
-    world: type[Any], weaker: float, named: list[str]
-) -> None:
-    """As where a wheel slides thirty times as far in one drive: a thousandth of the power is left, and is plain."""
+@pytest.mark.parametrize("weaker", [30.0, 400.0])
+def test_a_cause_that_one_drive_shows_far_better_counts_where_the_other_agrees(world: type[Any], weaker: float) -> None:
+    """As where a wheel slides thirty times as far in one drive, or hardly at all."""
     drawn = world(seed=26, true={"a": 10.0})
     fit, confirm = drawn.problem(0), drawn.problem(1)
     first, *others = confirm.candidates
@@ -168,7 +161,7 @@ def test_a_cause_that_one_drive_shows_far_better_counts_if_the_other_shows_it_to
     )
     weak = replace(first, variants=(replace(variant, columns=tuple(faint)),))
     findings = judge(fit, replace(confirm, blocks=blocks, candidates=(weak, *others)), seed=1)
-    assert _names(findings) == named
+    assert _names(findings) == ["a"]
 
 
 def test_a_candidate_that_one_record_speaks_against_is_none_in_the_other(world: type[Any]) -> None:
@@ -198,7 +191,7 @@ def test_what_comes_along_with_an_effect_is_no_second_one(
     findings = judge(*problems, seed=1)
     assert _names(findings) == named
     (cause,) = findings.causes
-    assert cause.ranked.names[named[0]] > 0.9
+    assert cause.ranked.names[named[0]] > 2 * max(p for name, p in cause.ranked.names.items() if name != named[0])
     assert cause.part.values == pytest.approx([true[named[0]]], abs=4 * cause.part.std[0])
 
 
@@ -220,17 +213,14 @@ def _with_drag(problem: Problem) -> Problem:
     return replace(problem, candidates=(askew, *others))
 
 
-@pytest.mark.parametrize(("own", "verdict"), [(0.2, Verdict.EFFECT), (0.0, Verdict.UNKNOWN)])
+@pytest.mark.parametrize(("own", "named", "verdict"), [(0.2, ["a"], Verdict.EFFECT), (0.0, [], Verdict.UNKNOWN)])
 def test_what_only_comes_along_with_an_effect_of_no_size_has_another_cause(
-    world: type[Any], own: float, verdict: Verdict
+    world: type[Any], own: float, named: list[str], verdict: Verdict
 ) -> None:
     problems = [_with_drag(world(seed=22, true={"a": own, "b": 0.4}).problem(part)) for part in (0, 1)]
     findings = judge(*problems, seed=1)
-    assert _names(findings) == ["a"]
+    assert _names(findings) == named
     assert findings.verdict is verdict
-    (cause,) = findings.causes
-    assert (abs(cause.part.values[0]) < cause.part.std[0]) == (own == 0)
-    assert cause.sizeless == (own == 0)
 
 
 def test_where_nothing_came_along_a_small_size_is_as_good_as_its_rows(world: type[Any]) -> None:
@@ -256,7 +246,7 @@ def test_a_play_within_what_its_flanks_may_yield_is_their_compliance(
     problems = []
     for part in (0, 1):
         play, soft, *others = _with_play(world(seed=21, true={"a": own, "b": 0.5}).problem(part)).candidates
-        play = replace(play, effect="a", along="b", yielding=0.4)
+        play = replace(play, effect="a", yielding=0.4)
         problem = world(seed=21, true={"a": own, "b": 0.5}).problem(part)
         problems.append(replace(problem, candidates=(play, soft, *others)))
     findings = judge(*problems, seed=1)
@@ -279,23 +269,6 @@ def test_a_small_cause_that_the_confirming_drive_speaks_against_is_not_named(
     assert _names(judge(fit, confirm, seed=1)) == named
 
 
-@pytest.mark.parametrize(
-    ("true", "asked", "names"),
-    [
-        ({"b": 0.25}, {"least": 1e3}, 0),
-        ({"b": 0.25}, {"beside": 1e3}, 1),
-        ({"b": 0.25, "e": -0.25}, {"beside": 1e3}, 1),
-        ({"b": 0.25, "e": -0.25}, {}, 2),
-    ],
-)
-def test_evidence_asked_of_a_cause_alone_and_of_one_beside_another_are_two_numbers(
-    world: type[Any], true: dict[str, float], asked: dict[str, float], names: int
-) -> None:
-    drawn = world(seed=8, true=true)
-    found = judge(drawn.problem(0), drawn.problem(1), seed=1, settings=Settings(**asked))
-    assert len(found.causes) == names
-
-
 def _in_two_steps(problem: Problem, more: float) -> Problem:
     """Its second coordinate in a step of its own, in which `a` is larger by `more`."""
     first, second = problem.blocks
@@ -305,27 +278,17 @@ def _in_two_steps(problem: Problem, more: float) -> Problem:
     return replace(problem, blocks=(first, other))
 
 
-@pytest.mark.parametrize(("more", "verdict"), [(0.0, Verdict.EFFECT), (0.4, Verdict.UNKNOWN)])
-def test_a_cause_has_the_same_size_in_every_step(world: type[Any], more: float, verdict: Verdict) -> None:
+@pytest.mark.parametrize("more", [0.0, 0.4])
+def test_a_cause_that_has_another_size_in_another_step_is_less_sure_and_leaves_a_gap(
+    world: type[Any], more: float
+) -> None:
     problems = [_in_two_steps(world(seed=27, true={"a": 0.3}).problem(part), more) for part in (0, 1)]
     findings = judge(*problems, seed=1)
-    assert _names(findings) == ["a"]
-    assert findings.verdict is verdict
-
-
-@pytest.mark.parametrize(("joints", "verdict"), [("xyz", Verdict.EFFECT), ("xxx", Verdict.UNKNOWN)])
-def test_three_names_for_the_friction_of_one_joint_are_no_answer(
-    world: type[Any], joints: str, verdict: Verdict
-) -> None:
-    problems = []
-    for part in (0, 1):
-        problem = world(seed=28, true={"a": 0.3, "c": 0.3, "e": -0.3}).problem(part)
-        curves = dict(zip("ace", joints, strict=True))
-        bent = [replace(one, curve=curves.get(one.effect, "")) for one in problem.candidates]
-        problems.append(replace(problem, candidates=tuple(bent)))
-    findings = judge(*problems, seed=1)
-    assert sorted(_names(findings)) == ["a", "c", "e"]
-    assert findings.verdict is verdict
+    (cause,) = findings.causes
+    assert cause.candidate.effect == "a"
+    assert cause.part.values[0] == pytest.approx(0.3 + more / 2, abs=3 * cause.part.std[0])
+    assert (findings.gap.after > 1.02) == (more > 0)
+    assert (cause.part.std[0] > 0.025) == (more > 0)
 
 
 def test_what_is_known_of_a_parameter_holds_without_a_model_too(world: type[Any]) -> None:
@@ -489,12 +452,13 @@ def _with_rows_of_its_own(problem: Problem, size: float) -> Problem:
     return replace(problem, blocks=(*problem.blocks, own), candidates=candidates)
 
 
-@pytest.mark.parametrize(("size", "verdict"), [(4.0, Verdict.EFFECT), (0.3, Verdict.UNKNOWN)])
-def test_what_lasts_in_rows_of_their_own_is_pardoned_beside_a_cause_that_closes_nearly_all(
-    world: type[Any], size: float, verdict: Verdict
+@pytest.mark.parametrize("size", [4.0, 0.3])
+def test_what_lasts_in_rows_of_their_own_is_left_beside_a_cause_that_closes_all_of_its_own(
+    world: type[Any], size: float
 ) -> None:
     problems = (_with_rows_of_its_own(world(seed=21, true={"c": size}).problem(part), 1.2) for part in (0, 1))
     findings = judge(*problems, seed=1)
     assert _names(findings) == ["c"]
-    assert findings.verdict is verdict
-    assert findings.lasting
+    assert findings.verdict is Verdict.EFFECT
+    assert findings.causes[0].closed > 0.98
+    assert findings.gap.after > 1.15

@@ -15,8 +15,7 @@ from ident.diagnosis.problem import Candidate, Problem, Variant
 from ident.diagnosis.refit import MOST_STEPS, Refit, refit
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import make_rows
-from ident.diagnosis.settings import Settings
-from ident.diagnosis.shapes import shaped
+from ident.diagnosis.whitening import Whitener
 from ident.effects import EffectParameter
 
 Array = NDArray[np.float64]
@@ -54,10 +53,14 @@ def bent(problem: Problem, calls: list[bytes], *, spread: float = 0.0, part: flo
     return replace(problem, blocks=tuple(blocks), candidates=(first, *problem.candidates[1:]))
 
 
+def whitener_of(regression: Regression) -> Whitener:
+    return regression.colour_beside(regression.columns_of((0,)))
+
+
 def refitted(problems: list[Problem]) -> tuple[Refit, Array, Regression]:
     """Its answer, the whitened rows of target and model, and what they were made with."""
-    regression = Regression(problems[0], make_rows(*problems), Settings(), 1)
-    whitener = regression.whitener((0,))
+    regression = Regression(problems[0], make_rows(*problems))
+    whitener = whitener_of(regression)
     found = refit(problems, regression, (0,), whitener, np.ones(len(regression.rows), dtype=bool))
     left = regression.rows.target - regression.rows.stack(list(found.blocks))
     return found, whitener.apply(regression.rows, left[:, None])[:, 0], regression
@@ -67,7 +70,7 @@ def test_it_ends_where_a_general_minimiser_does(world: type[Any]) -> None:
     calls: list[bytes] = []
     problems = [bent(world(seed=3).problem(part), calls) for part in (0, 1)]
     found, left, regression = refitted(problems)
-    rows, whitener = regression.rows, regression.whitener((0,))
+    rows, whitener = regression.rows, whitener_of(regression)
     forms = [problem.candidates[0].contribution for problem in problems]
 
     def residual(values: Array) -> Array:
@@ -76,8 +79,9 @@ def test_it_ends_where_a_general_minimiser_does(world: type[Any]) -> None:
         return np.asarray(whitener.apply(rows, (rows.target - model)[:, None])[:, 0])
 
     best = least_squares(residual, [*TRUTH, SIZE])
-    assert found.baseline == pytest.approx(best.x[:3], abs=1e-3)
-    assert found.parts[0].values[0] == pytest.approx(best.x[3], abs=1e-3)
+    # A step that would gain a seventh of a deviation is not taken any more.
+    assert np.all(np.abs(found.baseline - best.x[:3]) < found.baseline_std / 5)
+    assert found.parts[0].values[0] == pytest.approx(best.x[3], abs=found.parts[0].std[0] / 5)
     assert float(left @ left) == pytest.approx(2 * best.cost, rel=1e-4)
     assert found.parts[0].values[0] == pytest.approx(SIZE, abs=4 * found.parts[0].std[0])
 
@@ -100,26 +104,3 @@ def test_what_a_way_of_telling_adds_to_a_deviation_is_absolute_or_a_part(world: 
     )
     assert wide.std[0] == pytest.approx(np.hypot(plain.std[0], 0.1))
     assert relative.std[0] == pytest.approx(np.hypot(plain.std[0], 0.25 * plain.values[0]))
-
-
-def test_a_shape_costs_what_the_numbers_cost_that_it_was_fitted_with(world: type[Any]) -> None:
-    """One column in place of two is no cheaper: its form was chosen by the same rows."""
-    plain = [bent(world(seed=3).problem(part), []) for part in (0, 1)]
-    problems = [replace(one, candidates=(_widened(one), *one.candidates[1:])) for one in plain]
-    regression = Regression(problems[0], make_rows(*problems), Settings(), 1)
-    found = shaped(problems, regression, (0,))
-    (shape,) = found.taken
-    assert shape != 0
-    evidence = found.regression.evidence(found.regression.whitener(found.taken), ())
-    prices = 0.5 * evidence.directions.ratios(evidence.amplitudes) / evidence.scale - evidence.log_evidence
-    assert found.regression.rows.layout[shape].width == 1
-    assert found.regression.rows.layout[0].width == 2
-    assert prices[shape] == pytest.approx(prices[0])
-
-
-def _widened(problem: Problem) -> Candidate:
-    """The first effect with a column beside its own that is not the one by which its form is curved."""
-    first = problem.candidates[0]
-    pairs = zip(first.variants[0].columns, problem.candidate("c@place").variants[0].columns, strict=True)
-    columns = tuple(np.hstack([one, two]) for one, two in pairs if one is not None and two is not None)
-    return replace(first, variants=(Variant(columns, lambda found: found[:1]),))

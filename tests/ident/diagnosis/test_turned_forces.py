@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 from hil.exam.sources.machine import Machine
 from ident.diagnosis.axis.problem import axis_problem
 from ident.diagnosis.axis.reference import axis_reference
-from ident.diagnosis.posterior.answer import judge_by_posterior
+from ident.diagnosis.posterior.answer import judge
 from ident.diagnosis.problem import Candidate, Problem, Series, forces_of, turned_by
 from ident.diagnosis.refit import Refit, refit
 from ident.diagnosis.regression import Regression
 from ident.diagnosis.rows import make_rows
-from ident.diagnosis.settings import Settings
 
 Array = NDArray[np.float64]
 
@@ -61,11 +60,12 @@ def problems(world: type[Any]) -> tuple[Problem, Problem]:
 
 
 def refitted(problems: Sequence[Problem]) -> Refit:
-    regression = Regression(problems[0], make_rows(*problems), Settings(), 1)
+    regression = Regression(problems[0], make_rows(*problems))
     keys = [problems[0].candidates[column.candidate].key for column in regression.rows.layout]
     variants = [keys.index(key) for key in ("a@place", "c@place")]
     everything = np.ones(len(regression.rows), dtype=bool)
-    return refit(problems, regression, variants, regression.whitener(variants), everything)
+    whitener = regression.colour_beside(regression.columns_of(variants))
+    return refit(problems, regression, variants, whitener, everything)
 
 
 def test_sizes_beside_what_turns_them_are_their_own(problems: tuple[Problem, Problem]) -> None:
@@ -84,7 +84,7 @@ def test_without_being_turned_a_size_is_what_became_of_it(problems: tuple[Proble
 
 
 def test_the_posterior_finds_both_with_their_sizes(problems: tuple[Problem, Problem]) -> None:
-    found = {str(cause.candidate.effect): cause.part for cause in judge_by_posterior(*problems, seed=1).causes}
+    found = {str(cause.candidate.effect): cause.part for cause in judge(*problems, seed=1).causes}
     assert set(found) == {"a", "c"}
     for name, true in (("a", TURNING), ("c", TURNED)):
         assert found[name].values[0] == pytest.approx(true, abs=3 * found[name].std[0])

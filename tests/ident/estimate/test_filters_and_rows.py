@@ -66,7 +66,7 @@ def test_a_mirrored_filter_shrinks_a_sine_as_its_order_says(frequency: float, or
     """Butterworth of order n, forwards and backwards: gain 1 / (1 + (tan wT/2 / tan w_g T/2)^2n), phase 0."""
     time = DT * np.arange(20000)
     inner = slice(4000, -4000)
-    found = mirrored(np.sin(frequency * time), order, CUTOFF, DT)[inner]
+    found = mirrored(np.sin(frequency * time), [(order, CUTOFF)], DT)[inner]
     basis = np.stack([np.sin(frequency * time), np.cos(frequency * time)], axis=1)[inner]
     in_phase, quadrature = np.linalg.lstsq(basis, found, rcond=None)[0]
     gain = 1 / (1 + (np.tan(frequency * DT / 2) / np.tan(CUTOFF * DT / 2)) ** (2 * order))
@@ -79,9 +79,9 @@ def test_what_noise_makes_of_the_end_of_an_acceleration_is_one_impulse_behind_a_
     """Of an acceleration from noisy positions; a reflection in the end sample makes it last, and larger."""
     positions = np.random.default_rng(seed).normal(size=20000)
     rough = differentiate(differentiate(positions, DT, SEVEN), DT, SEVEN)
-    mirror, point = mirrored(rough, FILTER_ORDER, CUTOFF, DT), zero_phase(rough, CUTOFF, DT)
+    mirror, point = mirrored(rough, [(FILTER_ORDER, CUTOFF)], DT), zero_phase(rough, CUTOFF, DT)
     start, middle = slice(0, 500), slice(5000, 15000)
-    impulse = mirrored(np.eye(1, len(rough))[0], FILTER_ORDER, CUTOFF, DT)[start]
+    impulse = mirrored(np.eye(1, len(rough))[0], [(FILTER_ORDER, CUTOFF)], DT)[start]
     left = mirror[start] - impulse * (impulse @ mirror[start]) / (impulse @ impulse)
     assert np.abs(left).max() < 4 * np.std(mirror[middle])
     assert np.abs(point[start]).max() > 100 * np.std(point[middle])
@@ -92,8 +92,8 @@ def test_what_noise_makes_of_the_end_of_an_acceleration_is_one_impulse_behind_a_
 def test_terms_of_an_equation_that_holds_in_every_sample_keep_it_behind_a_mirror(length: int, seed: int) -> None:
     generator = np.random.default_rng(seed)
     terms, parameters = generator.normal(size=(length, 3)), generator.normal(size=3)
-    left = mirrored(terms @ parameters, FILTER_ORDER, CUTOFF, DT)
-    np.testing.assert_allclose(left, mirrored(terms, FILTER_ORDER, CUTOFF, DT) @ parameters, atol=1e-9)
+    left = mirrored(terms @ parameters, [(FILTER_ORDER, CUTOFF)], DT)
+    np.testing.assert_allclose(left, mirrored(terms, [(FILTER_ORDER, CUTOFF)], DT) @ parameters, atol=1e-9)
 
 
 def test_derivatives_of_a_parabola_are_exact() -> None:

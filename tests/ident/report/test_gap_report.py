@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.diagnosis import Diagnosis, Gap, NamedEffect, Share, Unseen, Verdict
 from ident.diagnosis.findings import Findings
-from ident.diagnosis.judge import judge
+from ident.diagnosis.posterior.answer import judge
 from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant
 from ident.effects import EffectParameter
 from ident.report.commands import Asked
@@ -211,18 +211,13 @@ def test_causes_that_ten_lines_have_no_room_for_are_counted(findings: Findings) 
     gap = Gap(4.0, 1.1, 1.0)
     unseen = tuple(Unseen(steps, "dynamic", gap) for steps in ("repeated", "lane_change"))
     many = replace(_diagnosis(Verdict.EFFECT, 4), unseen=unseen)
-    lines = summary_lines(replace(findings, events=("slip@wheel_fl",)), many)
+    lines = summary_lines(findings, many)
     assert len(lines) == 10
     shown = sum("might as well be slope" in line for line in lines)
     assert f"  and {4 - shown} more (--report FILE shows them)" in lines
     assert lines[-1] == "Next: drive a circle"
 
 
-def test_a_cause_of_no_size_is_said_to_be_what_comes_along_with_it(findings: Findings) -> None:
-    sizeless = tuple(replace(cause, sizeless=True) for cause in findings.causes)
-    unknown = replace(findings, verdict=Verdict.UNKNOWN, causes=sizeless)
-    assert "Nearest, but not it: what comes along with scrub@chassis." in summary_lines(unknown, unknown.diagnosis())
-    page = render_gap_report(GapReport(unknown, unknown.diagnosis(), ("one",), (), None))
-    assert "scrub@chassis may itself be of no size" in page
-    plain = replace(unknown, causes=findings.causes)
-    assert "Nearest, but not it: scrub@chassis." in summary_lines(plain, plain.diagnosis())
+def test_what_is_nearest_is_said_where_it_is_not_the_answer(findings: Findings) -> None:
+    unknown = replace(findings, verdict=Verdict.UNKNOWN)
+    assert "Nearest, but not it: scrub@chassis." in summary_lines(unknown, unknown.diagnosis())

@@ -33,7 +33,7 @@ class Question:
 
 
 def _asked(fit: Problem, confirm: Problem) -> Question:
-    made = asked_of((fit, confirm), 1)
+    made = asked_of((fit, confirm))
     colours, every = Colours(made.regression), np.arange(made.design.columns.shape[1])
     return Question(made.regression, colours, made.design, Products(made.design, colours, every), Search(made.fitter))
 

@@ -11,7 +11,7 @@ import pytest
 
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import Findings
-from ident.diagnosis.posterior.answer import judge_by_posterior
+from ident.diagnosis.posterior.answer import judge
 from ident.diagnosis.problem import Nominal, Problem, Variant
 from ident.effects import EffectParameter
 
@@ -19,7 +19,7 @@ World = Callable[..., Any]
 
 
 def judged(made: Any) -> Findings:
-    return judge_by_posterior(made.problem(0), made.problem(1), seed=1)
+    return judge(made.problem(0), made.problem(1), seed=1)
 
 
 def named(findings: Findings) -> list[str]:
@@ -101,7 +101,7 @@ def with_candidates(made: Any, *merged: tuple[str, ...], least: float | None = N
 def test_a_cause_of_two_numbers_is_named_if_either_is_there(world: World) -> None:
     for seed in (12, 13, 14):
         problems = with_candidates(world(seed, true={"b": 0.4}), ("a", "b"), ("c",))
-        findings = judge_by_posterior(*problems, seed=1)
+        findings = judge(*problems, seed=1)
         assert named(findings) == ["a"]
         assert findings.causes[0].part.values == pytest.approx([0.0, 0.4], abs=0.15)
 
@@ -109,7 +109,7 @@ def test_a_cause_of_two_numbers_is_named_if_either_is_there(world: World) -> Non
 def test_a_cause_of_one_sign_is_none_of_the_other(world: World) -> None:
     for names in (("a",), ("a", "b")):
         problems = with_candidates(world(15, true={"a": -2.0}), names, ("c",), least=0.0)
-        findings = judge_by_posterior(*problems, seed=1)
+        findings = judge(*problems, seed=1)
         assert not findings.causes
         assert findings.verdict is Verdict.UNKNOWN
 
@@ -132,7 +132,7 @@ def test_two_causes_of_which_neither_makes_sense_alone_are_both_named(world: Wor
         blocks = tuple(replace(b, target=t) for b, t in zip(problem.blocks, whole, strict=True))
         return replace(problem, blocks=blocks, candidates=candidates)
 
-    findings = judge_by_posterior(opposed(made.problem(0)), opposed(made.problem(1)), seed=1)
+    findings = judge(opposed(made.problem(0)), opposed(made.problem(1)), seed=1)
     assert sorted(named(findings)) == ["a", "b"]
 
 
@@ -144,7 +144,7 @@ def test_what_the_baseline_absorbs_is_said_to_be_invisible(world: World) -> None
         first = replace(problem.candidates[0], variants=(Variant(columns),))
         return replace(problem, candidates=(first, *problem.candidates[1:]))
 
-    findings = judge_by_posterior(absorbed(made.problem(0)), absorbed(made.problem(1)), seed=1)
+    findings = judge(absorbed(made.problem(0)), absorbed(made.problem(1)), seed=1)
     assert findings.invisible == ("a",)
     assert named(findings) == ["b"]
 
@@ -161,7 +161,7 @@ def test_what_comes_along_with_a_cause_of_no_size_is_something_unknown(world: Wo
 
     for own, verdict in ((0.2, Verdict.EFFECT), (0.0, Verdict.UNKNOWN)):
         made = world(22, true={"a": own, "b": 0.4})
-        findings = judge_by_posterior(dragging(made.problem(0)), dragging(made.problem(1)), seed=1)
+        findings = judge(dragging(made.problem(0)), dragging(made.problem(1)), seed=1)
         assert findings.verdict is verdict
         assert named(findings) == ["a"] * (own > 0)
 
@@ -174,7 +174,7 @@ def test_a_gap_that_only_the_confirming_record_shows_is_something_unknown(
     made = world(31, true={"c": 0.3}, repeats=1, samples=3200)
     confirm = made.problem(1)
     moved = tuple(replace(block, target=block.target + shift * block.baseline[:, 0]) for block in confirm.blocks)
-    findings = judge_by_posterior(made.problem(0), replace(confirm, blocks=moved), seed=1)
+    findings = judge(made.problem(0), replace(confirm, blocks=moved), seed=1)
     assert named(findings) == ["c"]
     assert findings.verdict is verdict
 
@@ -183,7 +183,7 @@ def test_a_gap_that_only_the_confirming_record_shows_is_something_unknown(
 def test_a_parameter_within_what_is_known_of_it_is_no_gap(world: World, deviation: float, verdict: Verdict) -> None:
     made = world(33, repeats=1, samples=3200)
     nominal = Nominal(np.array([2.8, -2.0, 0.5]), np.array([deviation, 1e-3, 1e-3]))
-    findings = judge_by_posterior(*(replace(made.problem(part), nominal=nominal) for part in (0, 1)), seed=1)
+    findings = judge(*(replace(made.problem(part), nominal=nominal) for part in (0, 1)), seed=1)
     assert findings.verdict is verdict
     assert named(findings) == []
 
@@ -207,7 +207,7 @@ def test_what_is_known_to_come_and_go_stays_known_beside_a_cause(world: World) -
         first = replace(problem.candidates[0], variants=(Variant(tuple(one[:, None] for one in slid[part])),))
         return replace(problem, blocks=blocks, candidates=(first, *problem.candidates[1:]))
 
-    findings = judge_by_posterior(sliding(0, 1.0), sliding(1, 1.0), seed=1)
+    findings = judge(sliding(0, 1.0), sliding(1, 1.0), seed=1)
     assert named(findings) == ["a"]
     assert findings.causes[0].part.values[0] == pytest.approx(1.0, abs=0.1)
     assert findings.causes[0].part.std[0] < 0.1

@@ -14,7 +14,6 @@ from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.diagnosis import Diagnosis, Verdict
 from ident.diagnosis.findings import LAW
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.posterior.answer import judge_by_posterior
 
 Say = Callable[..., Diagnosis]
 Law = Callable[[float, float, float], float]
@@ -33,7 +32,7 @@ def said() -> Say:
     def diagnosed(*lacking: str, **changed: object) -> Diagnosis:
         machine = replace(CARRIAGE, **changed)  # type: ignore[arg-type]
         records = [machine.drive(21)], [machine.drive(22)]
-        return diagnose_axis(*records, seed=1, lacking=lacking, judged=judge_by_posterior).diagnosis()
+        return diagnose_axis(*records, seed=1, lacking=lacking).diagnosis()
 
     return diagnosed
 
@@ -134,7 +133,7 @@ def test_beside_a_delay_a_drag_is_as_sure_as_without_one(said: Say) -> None:
 def test_noise_of_an_acceleration_is_no_law_of_a_load(seed: int) -> None:
     """An encoder of 10 um makes accelerations whose noise the effort does not have: what is made of it pays."""
     machine = Machine(rate=100.0, substeps=40, repeats=1, duration=30.0, noise=2.0, encoder=1e-5)
-    findings = diagnose_axis([machine.drive(seed)], [], seed=1, judged=judge_by_posterior)
+    findings = diagnose_axis([machine.drive(seed)], [], seed=1)
     assert findings.verdict is Verdict.NONE
 
 
@@ -149,7 +148,7 @@ def test_probabilities_and_sets_are_those_of_all_that_may_stand_there(said: Say)
 def test_a_second_mass_near_the_band_of_the_rows_is_a_spring(compliance: float, closed: float | None) -> None:
     """At 32 Hz and 20 Hz, beyond rows of 18 Hz: columns of a stiff spring, and of one of another damping, miss it."""
     machine = Machine(compliance=compliance)
-    findings = diagnose_axis([machine.drive(11)], [machine.drive(12)], seed=1, judged=judge_by_posterior)
+    findings = diagnose_axis([machine.drive(11)], [machine.drive(12)], seed=1)
     assert [str(cause.candidate.effect) for cause in findings.causes] == [EffectName.ELASTICITY]
     if closed is None:
         # So near, the rows of the record that confirms are further away with it than without, and it is no answer.
@@ -161,7 +160,7 @@ def test_a_second_mass_near_the_band_of_the_rows_is_a_spring(compliance: float, 
 def test_a_delay_by_itself_is_named_where_records_repeat() -> None:
     """It adds nothing of its own that repeats could differ by."""
     machine = Machine(delay=0.002)
-    (cause,) = diagnose_axis([machine.drive(11)], [machine.drive(12)], seed=1, judged=judge_by_posterior).causes
+    (cause,) = diagnose_axis([machine.drive(11)], [machine.drive(12)], seed=1).causes
     assert cause.candidate.effect == EffectName.TIME_DELAY
     assert cause.part.values[0] == pytest.approx(0.002, rel=0.02)
 
@@ -174,11 +173,11 @@ def warming(time: float, _x: float, v: float) -> float:
 def test_what_warms_up_is_no_noise_though_repeats_differ_by_it() -> None:
     machine = Machine(law=warming)
     records = [machine.drive(11)], [machine.drive(12)]
-    (cause,) = diagnose_axis(*records, seed=1, judged=judge_by_posterior).causes
+    (cause,) = diagnose_axis(*records, seed=1).causes
     assert cause.candidate.effect == "friction_warming"
     assert cause.part.std[0] < 0.15
     assert cause.part.values[0] == pytest.approx(-3.2, abs=2 * cause.part.std[0])
-    findings = diagnose_axis(*records, seed=1, lacking=("friction_warming",), judged=judge_by_posterior)
+    findings = diagnose_axis(*records, seed=1, lacking=("friction_warming",))
     (cause,) = findings.causes
     assert cause.law_answer is not None
     assert (cause.law_answer.variable, cause.law_answer.partner) == ("time", "direction")

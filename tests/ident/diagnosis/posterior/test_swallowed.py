@@ -14,7 +14,6 @@ from hil.exam.sources.machine import Machine
 from ident.diagnosis.axis.diagnose import diagnose_axis, pose_axis
 from ident.diagnosis.axis.reference import axis_reference
 from ident.diagnosis.diagnosis import Verdict
-from ident.diagnosis.posterior.answer import judge_by_posterior
 from ident.diagnosis.posterior.asked import Asked, asked_beside_a_law, asked_of
 from ident.diagnosis.posterior.swallowed import beside_a_law
 from ident.diagnosis.whitening import Left
@@ -42,7 +41,7 @@ def drives(machine: Make, law: Force | None, repeats: int = 1) -> Sequence[AxisR
 
 def asked(records: Sequence[AxisRecord]) -> Asked:
     fit, confirm = list(records[:1]), list(records[1:])
-    return asked_of(pose_axis(fit, confirm, axis_reference(fit, None, confirm), ("torque_ripple",)), 1)
+    return asked_of(pose_axis(fit, confirm, axis_reference(fit, None, confirm), ("torque_ripple",)))
 
 
 def beside(made: Asked, left: Left) -> Left:
@@ -57,7 +56,7 @@ def power(series: NDArray[np.float64]) -> float:
 
 def test_a_ripple_without_a_name_is_a_law_of_the_position(machine: Make) -> None:
     fit, confirm = drives(machine, ripple)
-    found = diagnose_axis([fit], [confirm], seed=1, lacking=("torque_ripple",), judged=judge_by_posterior).diagnosis()
+    found = diagnose_axis([fit], [confirm], seed=1, lacking=("torque_ripple",)).diagnosis()
     assert found.verdict is Verdict.LAW
     (effect,) = found.effects
     assert effect.law is not None

@@ -10,7 +10,6 @@ import pytest
 
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import Findings
-from ident.diagnosis.posterior.answer import judge_by_posterior
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.effects.extended import ExtendedModel
 from ident.records.record import Record, Segment
@@ -28,7 +27,7 @@ def plain(segment: Segment, vehicle: VehicleDescription) -> Segment:
 def judged(drives: Drives, flaw: Callable[..., Segment], vehicle: VehicleDescription) -> Findings:
     fit, confirm = drives(vehicle, lambda segment: flaw(segment, vehicle))
     model = ExtendedModel(replace(vehicle.prior, std=0.005 * vehicle.prior.values))
-    return diagnose_vehicle([fit], [confirm], vehicle, model, judged=judge_by_posterior).findings
+    return diagnose_vehicle([fit], [confirm], vehicle, model).findings
 
 
 @pytest.mark.parametrize(
