@@ -29,6 +29,10 @@ BETWEEN: Final = 0.2
 RIVALS: Final = 4
 """That are fitted exactly."""
 
+UNLISTED: Final = 0.03
+"""Probability that what stands in a place is none of the hypotheses as they are written, however likely one is among
+them: of 35 names of drawn machines that were sure, one was wrong."""
+
 SAME: Final = 0.9999
 """Cosine of what two names of as many numbers add to the rows, from which those do not tell them apart."""
 
@@ -65,6 +69,10 @@ class Slot:
     def _whole(self) -> float:
         return float(logsumexp([0.0, *self.logs.values()]))
 
+    @cached_property
+    def _probabilities(self) -> dict[int, float]:
+        return {index: (1 - UNLISTED) * math.exp(log - self._whole) for index, log in self.logs.items()}
+
     @property
     def nothing(self) -> float:
         """Probability that there is nothing."""
@@ -73,9 +81,9 @@ class Slot:
     def names(self, hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
         """Probability of every name, the most probable first."""
         found: dict[str, float] = {}
-        for index, log in self.logs.items():
+        for index, probability in self._probabilities.items():
             name = hypotheses[index].name
-            found[name] = found.get(name, 0.0) + math.exp(log - self._whole)
+            found[name] = found.get(name, 0.0) + probability
         return dict(sorted(found.items(), key=lambda entry: -entry[1]))
 
     def probability(self, hypotheses: Sequence[Hypothesis]) -> float:
@@ -85,7 +93,7 @@ class Slot:
 
     def ranked(self, hypotheses: Sequence[Hypothesis]) -> Ranked:
         """As reports show it."""
-        probabilities = {hypotheses[index].key: math.exp(log - self._whole) for index, log in self.logs.items()}
+        probabilities = {hypotheses[index].key: probability for index, probability in self._probabilities.items()}
         evidence = {hypotheses[index].key: log for index, log in self.logs.items()}
         alike = tuple(hypotheses[one].key for one in self.alike)
         return Ranked(probabilities, self.names(hypotheses), alike, evidence)

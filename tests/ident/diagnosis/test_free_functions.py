@@ -52,7 +52,7 @@ def test_a_drag_below_the_noise_is_named_where_the_confirming_record_speaks_for_
     findings = _diagnosed(machine(law=lambda time, x, v: 0.12 * _drag(time, x, v)), seed)
     (effect,) = findings.diagnosis().effects
     assert "quadratic_drag" in effect.ambiguity_set
-    assert findings.causes[0].log_predictive > 2.5
+    assert findings.causes[0].log_odds > 2.5
 
 
 def test_of_machines_that_are_their_model_at_most_one_in_eight_is_named_without_repeats() -> None:
