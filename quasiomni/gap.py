@@ -46,7 +46,7 @@ def diagnose(
         Path | None, typer.Option(help="Write the parameters.toml of the model with the effects named here.")
     ] = None,
     force: ForceOption = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the surrogates.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the smooth function of what is left.")] = 1,
 ) -> None:
     """Say why model and machine disagree: which effect, where, how sure, how much it closes, what to do next."""
     given = tuple(records), tuple(confirm or ())

@@ -20,7 +20,7 @@ class DiagnosisOrder:
         vehicle: shipped vehicle file by name, or a path; None: that of the first run folder, or the prototype.
         model: `parameters.toml` under test; None: the parameters are refitted.
         axis: the records are of servo axes.
-        seed: of the surrogates.
+        seed: of the smooth function of what is left.
         json, report, extended: files to write, or None; `extended` is the model with the effects that are named.
         force: take a model that was assessed as unusable.
         network: network file in place of that of the vehicle or of the run folders.

@@ -31,7 +31,8 @@ class Ranked:
     """What may stand in one place of an explanation.
 
     Attributes:
-        probabilities: of every candidate by key, most probable first; what is missing to one is no effect.
+        probabilities: of every candidate by key, most probable first; what is missing to one is nothing, or what none
+            of them describes.
         names: of every effect by name, whatever its place.
         alike: keys that are the same as the one taken in these records, itself first.
         log_odds: of every candidate by key, against nothing in this place, the greatest first.
@@ -115,16 +116,16 @@ class Findings:
     """Everything that was found.
 
     Attributes:
-        verdict: of the search and of what is left.
+        verdict: what kind of answer the causes are, and what they leave.
         causes: most probable first.
         doubtful: what came out best beside the causes and was not believed, with its probability, best first.
         gap: held out.
         where: shares of the gap.
         invisible: names of effects that are nowhere visible.
         before, after: of all rows without and with the causes; before is the model that was given, or a refit.
-        significance: least probability of nothing in the place of a cause.
+        nothing: largest probability of nothing in the place of a cause; None without causes.
         remainder: what a smooth function still predicts.
-        lasting: whether more is lacking somewhere than noise and tolerance that are not known exactly.
+        lacking: whether more is lacking somewhere than noise and tolerance that are not known exactly.
         repeated_before, repeated_after: rms over noise of what repeats, by step and coordinate.
         problem: that was fitted.
         held_out: models that the confirming rows took no part in.
@@ -138,9 +139,9 @@ class Findings:
     invisible: tuple[str, ...]
     before: Refit
     after: Refit
-    significance: float
+    nothing: float | None
     remainder: Generic
-    lasting: bool
+    lacking: bool
     repeated_before: Mapping[str, float]
     repeated_after: Mapping[str, float]
     problem: Problem

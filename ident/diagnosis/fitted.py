@@ -45,7 +45,7 @@ class Fitted:
 
     Attributes:
         rows: of both problems.
-        bare, rest: what a smooth function of the states predicts of what is left without and with the effects.
+        rest: what a smooth function of the states predicts of what is left with the effects.
         before, after: refits of all rows.
         floors: rms of the noise of every block.
         untouched: (N,) of every block, the model without effects that held-out rows are compared with.
@@ -61,8 +61,7 @@ class Fitted:
         self.rows = regression.rows
         self._weights = _weights(regression, found)
         smooth = SmoothFunction(regression, found.whitener, seed)
-        self.bare = smooth.beside(())
-        self.rest = smooth.beside(found.variants) if found.variants else self.bare
+        self.rest = smooth.beside(found.variants)
         self.after, self.before = self._refit(found.variants), self._refit(())
         left = self.rows.target - self.rows.stack(list(self.after.blocks)) - self.rest.prediction
         self.floors = noise_floors(self.rows, self.after.blocks, left)

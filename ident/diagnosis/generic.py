@@ -32,21 +32,12 @@ class Generic:
     """What the smooth function does for the confirming rows.
 
     Attributes:
-        before: their sum of squares, whitened, under the model that it is added to.
-        after: with the function.
         deviations: by how many standard deviations the prediction agrees with what is left.
         prediction: (n,) of the function for all rows, not whitened; only what the model cannot absorb.
     """
 
-    before: float
-    after: float
     deviations: float
     prediction: Array
-
-    @property
-    def gain(self) -> float:
-        """Sum of squares that it takes away, never below 0."""
-        return max(self.before - self.after, 0.0)
 
 
 class SmoothFunction:
@@ -79,8 +70,6 @@ class SmoothFunction:
         products = stretch_sums(predicted[confirming] * left[confirming], regression.stretch[confirming])
         spread = float(np.sqrt(np.sum(products**2)))
         return Generic(
-            before=float(np.sum(left[confirming] ** 2)),
-            after=float(np.sum((left - predicted)[confirming] ** 2)),
             deviations=float(products.sum()) / spread if spread > 0 else 0.0,
             prediction=self._functions @ weights - design @ (absorbed @ weights),
         )

@@ -18,7 +18,7 @@ NOTHING = -math.inf
 def log_evidence_of(fit: Problem, confirm: Problem, keys: Collection[str]) -> dict[str, float]:
     """Log evidence of candidates, each by itself against nothing, in all rows, its numbers integrated.
 
-    Who knows a candidate pays nothing for its choice among others.
+    Who knows a candidate pays nothing for its choice among names and places.
 
     Args:
         fit, confirm: the records.
@@ -30,7 +30,8 @@ def log_evidence_of(fit: Problem, confirm: Problem, keys: Collection[str]) -> di
         tables = fitter.among_all(nothing).tables()
         found = dict.fromkeys(keys, NOTHING)
         for index, hypothesis in enumerate(asked.design.hypotheses):
-            if hypothesis.key in found and tables[index].is_there:
-                with_it = fitter.state({index: tables[index].best}, nothing).log_posterior + hypothesis.price
+            table = tables.get(index)
+            if hypothesis.key in found and table is not None and table.is_there and index not in fitter.invisible:
+                with_it = fitter.state({index: table.best}, nothing).log_posterior + hypothesis.choice
                 found[hypothesis.key] = with_it - nothing.log_posterior
         return found

@@ -97,7 +97,7 @@ class Variant:
             those of what may come along behind the parameters.
         bent: the candidate's contribution says more than these columns; without it, a refit takes the columns alone.
         beside: how many of the columns, the last ones, only come along with the effect.
-        itself: the other columns must show by themselves; not so where what comes along is what the effect does.
+        itself: the other columns are the effect by itself; not so where what comes along is what the effect does.
         found: (m,) numbers of the exact form that a refit may begin with as well; None: none.
     """
 

@@ -237,7 +237,7 @@ class _Model:
         baseline = self._linear(np.zeros((len(self.rows), 0)), self.rows.target - added)
         beside = np.concatenate([baseline, found[self.size :]])
         left = [float(np.sum(self.residual(one) ** 2)) for one in (by_columns, beside)]
-        return beside if left[1] < left[0] else by_columns
+        return beside if left[1] < left[0] or not np.isfinite(left[0]) else by_columns
 
     def _linear(self, columns: Array, target: Array) -> Array:
         design = np.hstack([self.rows.baseline, columns])
@@ -303,7 +303,7 @@ class _Model:
         return np.stack(columns, axis=1)
 
     def _covariance(self, values: Array) -> Array:
-        """Sandwich over the stretches of the surrogates, nowhere below what white rows would give."""
+        """Sandwich over the stretches of rows, nowhere below what white rows would give."""
         jacobian, residual = self.jacobian(values), self.residual(values)
         scale = np.linalg.norm(jacobian, axis=0)
         scale[scale == 0] = 1.0

@@ -38,7 +38,7 @@ STRETCHES: Final = 24
 
 
 class Regression:
-    """Rows of the problems, whitened as the effects taken so far let them be.
+    """Rows of the problems, and the colour of their noise.
 
     Attributes:
         problem: that was posed of the fitted records.
@@ -56,10 +56,6 @@ class Regression:
         """Candidate of every variant."""
         return [column.candidate for column in self.rows.layout]
 
-    def key(self, variant: int) -> str:
-        """Key of a variant's candidate."""
-        return self.problem.candidates[self.owners[variant]].key
-
     def columns_of(self, variants: Sequence[int]) -> Array:
         """Raw columns (n, ...) of some variants."""
         places = [self.rows.columns[:, self.rows.layout[variant].place] for variant in variants]
@@ -67,7 +63,7 @@ class Regression:
 
     @property
     def strongest(self) -> tuple[int, ...]:
-        """The best variants, believed or not.
+        """The best variants of all candidates, whether or not they are there.
 
         Were the colour that of the whole residual, an effect of long memory would be taken for noise of long memory
         and whitened away. What the best candidates can explain is therefore taken off first.

@@ -132,15 +132,9 @@ ALL = "all"
 
 def repeated(rows: Rows, floors: Array, models: Series) -> Mapping[str, float]:
     """Rms over the noise of what repeats, by coordinate; only of blocks with repeats."""
-    return _repeated(rows, floors, models, (False, True))
-
-
-def _repeated(rows: Rows, floors: Array, models: Series, parts: Collection[bool]) -> Mapping[str, float]:
-    """In the records whose rows confirm, or not, as `parts` says."""
     sums: dict[str, tuple[float, int]] = {}
     for index, (block, kept) in enumerate(rows.blocks):
-        confirms = bool(rows.confirming[rows.block_slices[index]].any())
-        if len(kept.samples) < 2 or not kept.samples.size or confirms not in parts:
+        if len(kept.samples) < 2 or not kept.samples.size:
             continue
         excess = _excess(block, kept, models[index], floors[index])
         total, count = sums.get(block.label, (0.0, 0))

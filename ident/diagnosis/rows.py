@@ -53,8 +53,7 @@ class Column:
         least: value that all of its coefficients must reach, -inf where there is none such.
         negligible: sizes that its one coefficient must exceed, where it is negative and where it is positive.
         beside: columns, the last ones, that only come along.
-        itself: whether the other ones must show by themselves.
-        price: log evidence that its choice costs.
+        itself: whether the other ones are the effect by itself.
     """
 
     candidate: int
@@ -64,7 +63,6 @@ class Column:
     negligible: tuple[float, float]
     beside: int = 0
     itself: bool = True
-    price: float = 0.0
 
     @property
     def own(self) -> slice:
@@ -172,7 +170,7 @@ def _candidate_columns(problems: Sequence[Problem], kept: Sequence[Kept]) -> tup
             stacks.append(_stack(kept, series, width))
             variant, place = candidates[0].variants[number], slice(end, end + width)
             bounds = _bounds(candidates[0], width)
-            along = {"beside": variant.beside, "itself": variant.itself, "price": candidates[0].price}
+            along = {"beside": variant.beside, "itself": variant.itself}
             layout.append(Column(index, number, place, *bounds, **along))
             end += width
     return np.hstack(stacks), tuple(layout)

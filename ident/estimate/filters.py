@@ -88,10 +88,11 @@ def mirrored(values: Array, passes: Sequence[tuple[int, float]], sample_time: fl
     What is mirrored stays so behind a filter of zero phase: all of them at once are one gain of its spectrum.
 
     Args:
-        values: (N, ...), at least two samples.
+        values: (N, ...).
         passes: order of the prototype and cutoff [rad/s] of each.
         sample_time: [s].
     """
+    values = np.asarray(values, dtype=float)
     count, reach = len(values), max(math.ceil(MEMORY / (cutoff * sample_time)) for _, cutoff in passes)
     size = fft.next_fast_len(count + 2 * reach, real=True)
     sides = [(reach, size - count - reach)] + [(0, 0)] * (values.ndim - 1)
@@ -102,10 +103,16 @@ def mirrored(values: Array, passes: Sequence[tuple[int, float]], sample_time: fl
 
 @lru_cache(maxsize=32)
 def _gain(passes: tuple[tuple[int, float], ...], sample_time: float, size: int) -> Array:
-    """(size // 2 + 1,) of filters forwards and backwards, at the frequencies of a real transform; to be read only."""
-    turns = 2 * np.pi * np.arange(size // 2 + 1) / size
-    gains = [np.abs(signal.sosfreqz(butterworth(*one, sample_time), worN=turns)[1]) ** 2 for one in passes]
-    return np.asarray(np.prod(gains, axis=0))
+    """(size // 2 + 1,) of Butterworth filters forwards and backwards, bilinear, at the frequencies of a real transform.
+
+    One array for all who ask, to be read only.
+    """
+    tangent = np.tan(np.pi * np.arange(size // 2 + 1) / size)
+    gain = np.ones_like(tangent)
+    for order, cutoff in passes:
+        gain /= 1 + (tangent / math.tan(cutoff * sample_time / 2)) ** (2 * order)
+    gain.setflags(write=False)
+    return gain
 
 
 def filter_weights(

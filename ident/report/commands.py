@@ -41,7 +41,7 @@ class Asked:
         model: under test, or None.
         vehicle, network: files that were named, or None.
         axis: the records are of servo axes.
-        seed: of the surrogates.
+        seed: of the smooth function of what is left.
         extended: file that the extended model is written to, or None.
         run: the first run folder among the records, or None.
         campaign_vehicle: vehicle file of a campaign of the same vehicle; None for the prototype.

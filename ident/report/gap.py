@@ -1,4 +1,4 @@
-"""The HTML report of a diagnosis: gap map, ranked causes with evidence, before and after, what to do next."""
+"""The HTML report of a diagnosis: gap map, ranked causes with their odds, before and after, what to do next."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _answer(content: GapReport) -> dict[str, Any]:
     return {
         "headline": headline(diagnosis),
         "verdict": str(diagnosis.verdict),
-        "significance": findings.significance,
+        "nothing": findings.nothing,
         "gap": diagnosis.gap,
         "effects": [(place_words(one.where), effect_words(one), one) for one in diagnosis.effects],
         "judged_steps": lines,

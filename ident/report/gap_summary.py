@@ -61,7 +61,7 @@ def gap_line(findings: Findings, diagnosis: Diagnosis) -> str:
     before = f"Gap on held-out data: {significant(gap.before)} times the noise"
     if diagnosis.verdict is Verdict.NONE:
         return f"{before}."
-    rest = "; the rest has no name" if findings.lasting and diagnosis.verdict.explains else ""
+    rest = "; the rest has no name" if findings.lacking and diagnosis.verdict.explains else ""
     return f"{before}, {significant(gap.after)} with the causes in the model: {percent(gap.closed)} of it closed{rest}."
 
 

@@ -150,7 +150,8 @@ def _doubtful(findings: Findings) -> Chart | None:
         for key, value in sorted(shares.items(), key=lambda entry: -entry[1])
     )
     title = "Beside the causes" if findings.causes else "In the place of nothing"
-    return Chart(title, PROBABILITY, bars, "not believed; chance, or the records that confirm, speak against it")
+    said = "not believed: not likely enough, or of no size; evidence not tempered"
+    return Chart(title, PROBABILITY, bars, said)
 
 
 def _laws(cause: Cause, findings: Findings) -> Mapping[str, str]:

@@ -176,7 +176,7 @@ class _Answer:
     def _needless(self) -> list[int]:
         """The member that closes least of the held-out gap, if that is next to nothing beside others."""
         trifles = [place for place in range(self.fitted.count) if not self._pays(place)]
-        return self._closing_least(trifles) if self.fitted.count > 1 else []
+        return self._closing_least(trifles) if self.fitted.count > 1 and self._measurable() else []
 
     def _closing_least(self, places: Sequence[int]) -> list[int]:
         """That one of some members."""
@@ -216,9 +216,9 @@ class _Answer:
             invisible=self._invisible(),
             before=fitted.before,
             after=fitted.after,
-            significance=min((slot.nothing for slot in self.slots.values()), default=1.0),
+            nothing=max((slot.nothing for slot in self.slots.values()), default=None),
             remainder=fitted.rest,
-            lasting=self._lacking,
+            lacking=self._lacking,
             repeated_before=repeated(regression.rows, fitted.floors, fitted.judged()),
             repeated_after=repeated(regression.rows, fitted.floors, fitted.after.blocks),
             problem=self.taken.problems[0],

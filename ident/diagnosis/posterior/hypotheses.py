@@ -100,6 +100,7 @@ class Hypothesis:
         key: `name@where`.
         name: of the library, or `law`.
         price: log odds against it, before the rows.
+        choice: what of that is for its name and its place being one of many.
         blocks: at least one.
         candidate: its number, of a name.
         dependence: its number, of a law.
@@ -108,6 +109,7 @@ class Hypothesis:
     key: str
     name: str
     price: float
+    choice: float
     blocks: tuple[Block, ...]
     candidate: int | None = None
     dependence: int | None = None
@@ -182,9 +184,10 @@ class _Builder:
             blocks = tuple(self._block(column, sizes[column.place], weight, candidate) for column in shown)
             if blocks and not candidate.excluded:
                 # What its choice costs beyond that of the variants, whose shares of the prior are their weights.
-                choice = max(candidate.price + weight, 0.0)
-                price = kinds + math.log(places[str(candidate.effect)]) + choice + candidate.noise
-                found.append(Hypothesis(candidate.key, str(candidate.effect), price, blocks, candidate=number))
+                variant = max(candidate.price + weight, 0.0)
+                choice = kinds + math.log(places[str(candidate.effect)])
+                price = choice + variant + candidate.noise
+                found.append(Hypothesis(candidate.key, str(candidate.effect), price, choice, blocks, candidate=number))
         return found
 
     def free(self, problem: Problem, designs: Designs, kinds: float) -> list[Hypothesis]:
@@ -194,7 +197,8 @@ class _Builder:
             knots = designs.knots(number)
             blocks = () if knots is None else self._function(designs.columns(number), knots)
             if blocks:
-                found.append(Hypothesis(dependence.key, LAW, price + dependence.noise, blocks, dependence=number))
+                whole = price + dependence.noise
+                found.append(Hypothesis(dependence.key, LAW, whole, price, blocks, dependence=number))
         return found
 
     def _block(self, column: Column, sizes: Array, weight: float, candidate: Candidate) -> Block:

@@ -274,7 +274,7 @@ def test_on_the_real_axis_a_friction_over_the_rate_is_first_and_an_effort_that_i
 
 @needs_emps
 def test_what_the_real_axis_repeats_beyond_its_causes_is_said(emps: Findings) -> None:
-    assert emps.lasting
+    assert emps.lacking
     assert "the rest has no name" in " ".join(summary_lines(emps, emps.diagnosis()))
 
 

@@ -47,7 +47,7 @@ def test_what_lasts_above_the_noise_is_said_and_takes_an_effect_that_closes_less
         for problem in two(world, 21, {"a": 2.0})
     ]
     findings = judge(*problems, seed=1)
-    assert (findings.verdict, findings.lasting) == (verdict, lasting)
+    assert (findings.verdict, findings.lacking) == (verdict, lasting)
     assert findings.causes[0].candidate.effect == "a"
 
 
@@ -74,4 +74,4 @@ def test_what_lasts_in_rows_of_which_the_model_says_nothing_is_said_beside_the_c
     assert findings.causes[0].candidate.effect == "a"
     assert findings.causes[0].closed > 0.9
     assert findings.verdict is Verdict.EFFECT
-    assert findings.lasting == (misfit > 0)
+    assert findings.lacking == (misfit > 0)

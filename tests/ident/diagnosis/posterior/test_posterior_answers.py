@@ -54,7 +54,7 @@ def test_noise_has_no_cause(world: World) -> None:
 def test_what_is_no_candidate_is_unknown(world: World) -> None:
     findings = judged(world(6, hidden=2.0))
     assert findings.verdict is Verdict.UNKNOWN
-    assert findings.lasting
+    assert findings.lacking
 
 
 def test_the_same_column_at_two_places_is_one_cause_and_an_alternative(world: World) -> None:
@@ -78,7 +78,7 @@ def test_probabilities_are_of_what_may_stand_there(world: World) -> None:
     findings = judged(world(11, true={"b": 0.08}))
     (cause,) = findings.causes
     listed = sum(cause.ranked.probabilities.values()) / (1 - UNLISTED)
-    assert listed + findings.significance == pytest.approx(1.0)
+    assert listed + (findings.nothing or 0.0) == pytest.approx(1.0)
     assert 0.5 < cause.probability < 1.0
 
 
