@@ -1,8 +1,8 @@
 """The curve of a law that was found, learnt from the rows.
 
-The function is Gaussian beside the baseline and the effects taken, whose columns are projected out, with the length
-that it was found with; its size is the one that makes the fitted rows most likely (Rasmussen and Williams 2006, (5.8)),
-and is held for the confirming ones. Its covariance is wider by as much as rows scatter more than the noise says.
+The function is Gaussian beside the baseline and the effects taken, whose columns are projected out; its length and size
+are those that make the fitted rows most likely (Rasmussen and Williams 2006, (5.8)), and are held for the confirming
+ones. Its covariance is wider by as much as rows scatter more than the noise says.
 """
 
 from __future__ import annotations
@@ -87,17 +87,18 @@ class Learner:
         self._target, self._model, self.fitted = white.target, white.baseline, ~white.confirming
         self._part, self._all = self._beside(self.fitted), self._beside(np.ones(len(self.fitted), dtype=bool))
 
-    def learn(self, design: Array, knots: Knots, prior: Array, excess: float) -> Learnt | None:
+    def learn(self, design: Array, knots: Knots, excess: float) -> Learnt | None:
         """A dependence; None where the fitted rows show nothing of it.
 
         Args:
             design: (n, K) its columns in the rows.
             knots: of its function.
-            prior: (K, R) factor of the covariance of its coefficients, but for its size.
             excess: by how much the rows scatter more than the noise says, as a ratio of variances.
         """
         white = self._white(design)
-        best = _fit(_Moments.of(white[self.fitted], self._part), prior)
+        part = _Moments.of(white[self.fitted], self._part)
+        priors = [knots.prior(share) for share in LENGTHS if share >= knots.shortest]
+        best, prior = max(((_fit(part, one), one) for one in priors), key=lambda found: found[0].log)
         if not best.log > 0:
             return None
         whole = _fit(_Moments.of(white, self._all), prior, best.size)

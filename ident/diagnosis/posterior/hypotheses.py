@@ -57,7 +57,6 @@ class Block:
         largest: scale that it may have: of a size that people meet, and a decade more.
         expected: (m,) and (m,) of a single coefficient that is positive: slopes of what physics expects of its numbers,
             in standard deviations, and how far they are from that at zero; None: nothing is expected.
-        prior: (COUNT, R) of a free function, the same factor of its coefficients; None: it has a name.
     """
 
     place: slice
@@ -68,7 +67,6 @@ class Block:
     sizes: Array
     largest: float = math.inf
     expected: tuple[Array, Array] | None = None
-    prior: Array | None = None
 
     @property
     def least(self) -> float:
@@ -228,8 +226,8 @@ class _Builder:
         directions = unit @ turn
         nothing, weight = np.zeros(0, dtype=bool), -math.log(len(made))
         return tuple(
-            Block(place, directions.T @ one / size / count, weight, None, nothing, np.zeros(0), prior=prior)
-            for one, size, prior in zip(made, sizes, factors, strict=True)
+            Block(place, directions.T @ one / size / count, weight, None, nothing, np.zeros(0))
+            for one, size in zip(made, sizes, strict=True)
         )
 
     def _appended(self, columns: Array) -> slice:

@@ -85,10 +85,8 @@ def _law(
     assert number is not None
     knots = designs.knots(number)
     assert knots is not None
-    prior = design.hypotheses[index].blocks[state.members[index].block].prior
-    assert prior is not None
     learner = Learner(regression, state.evidence.noise, others)
-    learnt = learner.learn(designs.columns(number), knots, prior, excess)
+    learnt = learner.learn(designs.columns(number), knots, excess)
     if learnt is None:
         return None
     return Law(problems[0].dependences[number], number, learnt, len(problems[0].candidates))
