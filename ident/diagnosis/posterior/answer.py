@@ -176,7 +176,7 @@ class _Answer:
     def _needless(self) -> list[int]:
         """The member that closes least of the held-out gap, if that is next to nothing beside others."""
         trifles = [place for place in range(self.fitted.count) if not self._pays(place)]
-        return self._closing_least(trifles) if self.fitted.count > 1 and self._measurable() else []
+        return self._closing_least(trifles) if self.fitted.count > 1 else []
 
     def _closing_least(self, places: Sequence[int]) -> list[int]:
         """That one of some members."""
