@@ -85,6 +85,15 @@ class Alternative:
         return {**what, "where": self.where}
 
 
+def curve_of(law: Law) -> Array:
+    """(POINTS, 3) variable, function and its standard deviation over the range that the records have shown."""
+    knots = law.learnt.knots
+    x = np.linspace(0.0, knots.period, POINTS) if knots.period else np.linspace(*knots.ends, POINTS)
+    basis = knots.basis(x)
+    covariance = basis @ law.learnt.covariance @ basis.T
+    return np.stack([x, basis @ law.learnt.whole, np.sqrt(np.maximum(np.diag(covariance), 0.0))], axis=1)
+
+
 def law_answer(law: Law, channel: str, nearest: tuple[str, float] | None) -> LawAnswer:
     """What a law says.
 
@@ -94,10 +103,7 @@ def law_answer(law: Law, channel: str, nearest: tuple[str, float] | None) -> Law
         nearest: key of the nearest effect of the library, and the cosine of what both add.
     """
     dependence, knots = law.dependence, law.learnt.knots
-    x = np.linspace(0.0, knots.period, POINTS) if knots.period else np.linspace(*knots.ends, POINTS)
-    basis = knots.basis(x)
-    y, covariance = basis @ law.learnt.whole, basis @ law.learnt.covariance @ basis.T
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    x, y, std = curve_of(law).T
     return LawAnswer(
         variable=str(dependence.variable),
         partner=str(dependence.partner),
@@ -106,7 +112,7 @@ def law_answer(law: Law, channel: str, nearest: tuple[str, float] | None) -> Law
         period=knots.period or None,
         unit_x=dependence.unit_x,
         unit_y=dependence.unit_y,
-        curve=np.stack([x, y, std], axis=1),
+        curve=curve_of(law),
         formula=formula_of(x, y, std, knots.period),
         nearest=None if nearest is None else nearest[0],
         distance=None if nearest is None else math.sqrt(max(1 - nearest[1] ** 2, 0.0)),

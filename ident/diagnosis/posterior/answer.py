@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.findings import LAW, Cause, Findings, ordered
 from ident.diagnosis.fitted import Fitted, Taken
-from ident.diagnosis.law.answer import LawAnswer, channel_of, law_answer, same_laws, same_names
+from ident.diagnosis.law.answer import LawAnswer, channel_of, curve_of, law_answer, same_laws, same_names
 from ident.diagnosis.law.law import Law
 from ident.diagnosis.law.reach import told_samples
 from ident.diagnosis.orders import with_orders
@@ -25,8 +25,8 @@ from ident.diagnosis.posterior.slots import slot_of
 from ident.diagnosis.posterior.state import State
 from ident.diagnosis.posterior.taken import as_variants
 from ident.diagnosis.problem import Problem
-from ident.diagnosis.remainder import repeated, shares
-from ident.diagnosis.sized import is_foreign, is_nothing, is_sizeless
+from ident.diagnosis.remainder import mostly_tolerated, repeated, shares
+from ident.diagnosis.sized import SURELY, is_foreign, is_nothing, is_sizeless
 from ident.stages import Stage, untold
 
 Array = NDArray[np.float64]
@@ -127,7 +127,7 @@ class _Answer:
         Less likely there than nothing or than a rival, of no size, widening the held-out gap, or making no difference.
         """
         # The search, in whose other places something else stood, would take again what is doubted.
-        if doubted := self._doubted():
+        if doubted := self._doubted() or self._trifling():
             return self._without(doubted, passed_over=doubted)
         if (corrected := self._corrected()) is not None:
             return corrected
@@ -167,6 +167,25 @@ class _Answer:
     def _sizeless(self) -> list[int]:
         """All members that are of no size of their own."""
         return [index for place, index in enumerate(self.taken.variants) if not self._has_size(place)]
+
+    def _trifling(self) -> list[int]:
+        """All members that are no more than what is tolerated, or laws that are nowhere surely not zero."""
+        taken = enumerate(self.taken.variants)
+        return [index for place, index in taken if self._is_tolerated(place) or not self._is_bent(index)]
+
+    def _is_bent(self, index: int) -> bool:
+        """Whether a law is surely not zero somewhere; a name says so by its size."""
+        law = self.taken.laws.get(index)
+        if law is None:
+            return True
+        _, y, std = curve_of(law).T
+        return bool(np.any(np.abs(y) > SURELY * std))
+
+    def _is_tolerated(self, place: int) -> bool:
+        """Whether a member is no more than what a model may have wrong in all rows in which it acts."""
+        reached, blocks = self.fitted.reached_by(place), [block for block, _ in self.fitted.rows.blocks]
+        acting = [pair for pair in zip(blocks, self.fitted.floors.tolist(), strict=True) if pair[0].label in reached]
+        return self.fitted.lacking[place] <= 0 and all(mostly_tolerated(*pair) for pair in acting)
 
     def _widening(self) -> list[int]:
         """The member that widens the held-out gap most, if any does."""

@@ -164,3 +164,11 @@ def test_slow_noise_of_the_effort_is_no_law_of_time(machine: Make) -> None:
         plain = machine()
         records = [plain.drive(seed), plain.drive(seed + 1)]
         assert diagnose_axis(records[:1], records[1:], seed=1).verdict is Verdict.NONE
+
+
+def test_what_is_within_what_a_model_may_have_wrong_is_no_law(machine: Make) -> None:
+    """A friction over the position of a hundredth of the noise is told by its repeats, and by nothing that counts."""
+    force = _LAWS["friction over the position"][0]
+    faint = machine(law=lambda t, x, v: 0.002 * force(t, x, v))
+    findings = diagnose_axis([faint.drive(11)], [faint.drive(12)], seed=1)
+    assert findings.verdict is Verdict.NONE
