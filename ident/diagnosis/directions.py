@@ -91,11 +91,8 @@ class Directions:
 
     def ratios(self, amplitudes: Array) -> Array:
         """Sums of squared amplitudes (..., D) over the directions of every variant, (..., V)."""
-        return self.lengths(np.where(self.possible(amplitudes), amplitudes, 0.0))
-
-    def lengths(self, amplitudes: Array) -> Array:
-        """The same whatever the amplitudes are."""
-        squares = np.concatenate([np.zeros((*amplitudes.shape[:-1], 1)), np.cumsum(amplitudes**2, axis=-1)], axis=-1)
+        counted = np.where(self.possible(amplitudes), amplitudes, 0.0)
+        squares = np.concatenate([np.zeros((*amplitudes.shape[:-1], 1)), np.cumsum(counted**2, axis=-1)], axis=-1)
         starts = [place.start for place in self.places]
         stops = [place.stop for place in self.places]
         return np.asarray(squares[..., stops] - squares[..., starts])

@@ -181,9 +181,9 @@ class _Model:
         for variant in variants:
             column = self.rows.layout[variant]
             width, first = column.width, sum(len(one) for one, _ in starts)
-            unknown, *own = _unknown(problems, column, linear[taken : taken + width], first, exact)
+            unknown, by_columns, found = _unknown(problems, column, linear[taken : taken + width], first, exact)
             self.unknowns.append(unknown)
-            starts.append((own[0], own[1]))
+            starts.append((by_columns, found))
             taken += width
         self._kept: dict[int, tuple[bytes, Array]] = {}
         self.start = self._better(*(np.concatenate(one) for one in zip(*starts, strict=True)))

@@ -74,10 +74,7 @@ def law_points(findings: Findings, cause: Cause) -> Points | None:
     """Of a law without a name; None where too few rows are at one value of its variable."""
     if cause.law is None:
         return None
-    problems = (findings.problem, findings.held_out.problem)
-    fitted, confirming = (_named(problem, cause.law.dependence.key) for problem in problems)
-    if fitted is None or confirming is None:
-        return None
+    fitted, confirming = (one.dependences[cause.law.index] for one in (findings.problem, findings.held_out.problem))
     return _points(findings, cause, (fitted, confirming))
 
 
@@ -130,10 +127,6 @@ def _joints(where: str) -> tuple[str, ...]:
     """Where the function of an effect stands: a drive turns its wheel."""
     joint = joint_of(where)
     return joint, joint.replace("drive", "wheel")
-
-
-def _named(problem: Problem, key: str) -> Dependence | None:
-    return next((one for one in problem.dependences if one.key == key), None)
 
 
 def _rows(*problems: Problem) -> Rows:

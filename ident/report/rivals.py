@@ -87,7 +87,7 @@ def rival_charts(findings: Findings) -> list[Chart]:
 
 
 def _in_the_place_of(cause: Cause, findings: Findings) -> Chart | None:
-    taken, laws = cause.candidate.key, _laws(cause, findings)
+    taken, laws = cause.candidate.key, _laws(findings)
     same = frozenset(cause.ranked.alike) - {taken}
     values = {key: value for key, value in cause.ranked.log_odds.items() if math.isfinite(value)}
     ordered = sorted(values.items(), key=lambda entry: -entry[1])[:MOST]
@@ -154,10 +154,9 @@ def _doubtful(findings: Findings) -> Chart | None:
     return Chart(title, PROBABILITY, bars, said)
 
 
-def _laws(cause: Cause, findings: Findings) -> Mapping[str, str]:
+def _laws(findings: Findings) -> Mapping[str, str]:
     """Laws in words, without their places, by key."""
-    known = [*findings.problem.dependences, *([cause.law.dependence] if cause.law is not None else [])]
-    return {one.key: law_kind(one.partner, one.variable, one.of) for one in known}
+    return {one.key: law_kind(one.partner, one.variable, one.of) for one in findings.problem.dependences}
 
 
 def _name(key: str, laws: Mapping[str, str]) -> str:

@@ -103,7 +103,8 @@ def law_answer(law: Law, channel: str, nearest: tuple[str, float] | None) -> Law
         nearest: key of the nearest effect of the library, and the cosine of what both add.
     """
     dependence, knots = law.dependence, law.learnt.knots
-    x, y, std = curve_of(law).T
+    curve = curve_of(law)
+    x, y, std = curve.T
     return LawAnswer(
         variable=str(dependence.variable),
         partner=str(dependence.partner),
@@ -112,7 +113,7 @@ def law_answer(law: Law, channel: str, nearest: tuple[str, float] | None) -> Law
         period=knots.period or None,
         unit_x=dependence.unit_x,
         unit_y=dependence.unit_y,
-        curve=curve_of(law),
+        curve=curve,
         formula=formula_of(x, y, std, knots.period),
         nearest=None if nearest is None else nearest[0],
         distance=None if nearest is None else math.sqrt(max(1 - nearest[1] ** 2, 0.0)),

@@ -124,13 +124,17 @@ class _Answer:
     def better(self) -> tuple[Search, State] | None:
         """The search and its set without members that are no answer; None: all are.
 
-        Less likely there than nothing or than a rival, of no size, widening the held-out gap, or making no difference.
+        Less likely there than nothing or than a rival, a trifle, of no size, widening the held-out gap, or making no
+        difference.
         """
         # The search, in whose other places something else stood, would take again what is doubted.
-        if doubted := self._doubted() or self._trifling():
+        if doubted := self._doubted():
             return self._without(doubted, passed_over=doubted)
         if (corrected := self._corrected()) is not None:
             return corrected
+        # What follows asks for exact refits, which a set that loses a member before is not worth.
+        if trifling := self._trifling():
+            return self._without(trifling, passed_over=trifling)
         refuted = self._sizeless() or self._widening() or self._needless()
         return self._without(refuted, refuted=refuted) if refuted else None
 
@@ -171,9 +175,9 @@ class _Answer:
     def _trifling(self) -> list[int]:
         """All members that are no more than what is tolerated, or laws that are nowhere surely not zero."""
         taken = enumerate(self.taken.variants)
-        return [index for place, index in taken if self._is_tolerated(place) or not self._is_bent(index)]
+        return [index for place, index in taken if self._is_tolerated(place) or not self._is_sure(index)]
 
-    def _is_bent(self, index: int) -> bool:
+    def _is_sure(self, index: int) -> bool:
         """Whether a law is surely not zero somewhere; a name says so by its size."""
         law = self.taken.laws.get(index)
         if law is None:
@@ -185,7 +189,7 @@ class _Answer:
         """Whether a member is no more than what a model may have wrong in all rows in which it acts."""
         reached, blocks = self.fitted.reached_by(place), [block for block, _ in self.fitted.rows.blocks]
         acting = [pair for pair in zip(blocks, self.fitted.floors.tolist(), strict=True) if pair[0].label in reached]
-        return self.fitted.lacking[place] <= 0 and all(mostly_tolerated(*pair) for pair in acting)
+        return all(mostly_tolerated(*pair) for pair in acting) and self.fitted.lacking[place] <= 0
 
     def _widening(self) -> list[int]:
         """The member that widens the held-out gap most, if any does."""
