@@ -79,7 +79,7 @@ def _columns(
         inputs = context.inputs(source)
         bent = cause.bent(inputs, angle)
         torques = np.einsum("nj,njr->nr", bent, lever[:, list(cause.joints)][:, :, rows])
-        for row, column in zip(rows.tolist(), context.filtered(torques, source).T, strict=True):
+        for row, column in zip(rows.tolist(), context.in_rows(torques, source, rows.tolist()).T, strict=True):
             found[row] = column
     return found
 

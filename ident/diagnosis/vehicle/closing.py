@@ -191,7 +191,7 @@ def _series(
 ) -> Iterable[Series]:
     context = make_context(sources, vehicle, model.parameters, model.effects, processing)
     for source in sources:
-        residual = context.filtered(context.plain(source)[..., 0], source)
+        residual = context.in_rows(context.plain(source)[..., 0], source, range(len(source.coordinates)))
         least = _creep(source, vehicle) if source.channel is Channel.KINEMATIC else 0.0
         for row, name in enumerate(source.coordinates):
             rows = _folded(residual[:, row], source.moving[row][:: source.factor], source.period[:: source.factor])

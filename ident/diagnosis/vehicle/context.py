@@ -109,6 +109,19 @@ class Context:
         ]
         return np.hstack(thinned).reshape(-1, *values.shape[1:])
 
+    def in_rows(self, terms: Array, source: Source, rows: Sequence[int]) -> Array:
+        """Terms (M, k) of the equations of a source through the filter, as `filtered`.
+
+        What sticks takes any force, and the filter would spread by how much over the rows beside it: where an equation
+        does not hold, all of its terms are zero.
+
+        Args:
+            terms: before the filter.
+            source: that they belong to.
+            rows: (k,) number of the coordinate that each stands in.
+        """
+        return self.filtered(np.where(source.holds[:, list(rows)], terms, 0.0), source)
+
 
 def make_context(
     sources: Sequence[Source],
@@ -157,7 +170,7 @@ def table_of(source: Source, context: Context, units: Sequence[rows.UnitTerm]) -
         return np.concatenate([plain, np.zeros((*plain.shape[:2], MODEL_COLUMNS - 1 + len(units)))], axis=2)
     function = context.formulas.linearised(source.channel, source.spec, units)
     entries = function.entries(context.inputs(source), *context.constants, context.asked)
-    return function.matrices(context.filtered(entries.T, source).T)
+    return function.matrices(context.in_rows(entries.T, source, function.places[0].tolist()).T)
 
 
 _FrozenTerm = tuple[str, str, tuple[tuple[str, float], ...]]

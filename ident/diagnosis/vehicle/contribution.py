@@ -91,7 +91,7 @@ def _term_contribution(
 def _columns(change: Array, rows: Sequence[int], source: Source, context: Context) -> list[Array | None]:
     """Every row of a source, filtered, of the change (M, k) of some of them; None where it is zero."""
     found: list[Array | None] = [None] * len(source.coordinates)
-    for row, column in zip(rows, context.filtered(change, source).T, strict=True):
+    for row, column in zip(rows, context.in_rows(change, source, rows).T, strict=True):
         found[row] = column if np.any(column) else None
     return found
 

@@ -143,20 +143,23 @@ def _acting(lever: Array | None, joints: Sequence[int]) -> list[int]:
 
 
 def levers_of(source: Source, context: Context) -> Array | None:
-    """What a torque at each joint, and a force ahead, is in the rows of a source (M, 7, rows); None: nothing."""
+    """What a torque at each joint, and a force ahead, is in the rows of a source (M, 7, rows); None: nothing.
+
+    Where the equation of a row does not hold, it is nothing there.
+    """
     if source.channel is not Channel.DYNAMIC or source.own is not None:
         return None
     inputs, spec = context.inputs(source), source.spec
     if spec.mode is None:
         found = np.zeros((len(inputs), FORWARD + 1, len(source.coordinates)))
         for row, name in enumerate(source.coordinates):
-            found[:, 2 + WHEELS.index(name.removeprefix("beta_")), row] = 1.0
+            found[:, 2 + WHEELS.index(name.removeprefix("beta_")), row] = source.holds[:, row]
         return found
     names = GENERALIZED_VELOCITIES[spec.mode]
     columns = [names.index(name) for name in source.coordinates]
     complement = kinematics.complement(spec.mode, inputs[:, SLICES["alpha"]], context.geometry)
     rows = [*range(FIRST_JOINT, FIRST_JOINT + FORWARD), 0]
-    return np.asarray(complement[:, rows][:, :, columns])
+    return np.asarray(complement[:, rows][:, :, columns] * source.holds[:, None, :])
 
 
 def rolling_levers_of(source: Source, context: Context) -> Array | None:

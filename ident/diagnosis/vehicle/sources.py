@@ -19,7 +19,7 @@ from ident.diagnosis.vehicle.signals import Signals, decimation, signals_of
 from ident.diagnosis.vehicle.wandering import wanders
 from ident.errors import RecordError
 from ident.estimate.equations import ROWS, RowsOfStep
-from ident.estimate.filters import Processing, moving_rows, zero_phase
+from ident.estimate.filters import Processing, moving_rows, sliding_samples, zero_phase
 from ident.plant.modes import Mode
 from ident.records.record import Record, Step, base_step
 from ident.vehicle.geometry import Geometry
@@ -51,6 +51,7 @@ class Source:
         sample_time: of them [s].
         factor: every how manieth becomes a row of a block.
         moving: rows to be used (M,), a mask for each of its coordinates.
+        holds: (M, rows) samples in which the equation of each holds: none of its joints sticks.
         period: (M,).
         record: for messages.
         time: (M,) since the record began [s].
@@ -65,6 +66,7 @@ class Source:
     sample_time: float
     factor: int
     moving: tuple[NDArray[np.bool_], ...]
+    holds: NDArray[np.bool_]
     period: NDArray[np.int64]
     record: str
     time: Array
@@ -169,15 +171,17 @@ def _sources(
         "time": segment.time[::stride],
         "rattles": loose.rattles[::stride],
     }
-    dynamic = tuple(_moving(signals, spec, name, processing)[::stride] for name in spec.coordinates)
-    yield Source(channel=Channel.DYNAMIC, moving=dynamic, **common)  # type: ignore[arg-type]
+    rates = [signals.joint_rates[:, _joints(spec, name)] for name in spec.coordinates]
+    dynamic = tuple(moving_rows(of_joints, processing, segment.sample_time)[::stride] for of_joints in rates)
+    slides = [sliding_samples(of_joints, processing, segment.sample_time)[::stride] for of_joints in rates]
+    yield Source(channel=Channel.DYNAMIC, moving=dynamic, holds=np.stack(slides, axis=1), **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
     if names and loose.rolls:
         kinematic = (_rolling(signals, spec, processing)[::stride],) * len(names)
-        yield Source(channel=Channel.KINEMATIC, moving=kinematic, **common)  # type: ignore[arg-type]
+        yield Source(channel=Channel.KINEMATIC, moving=kinematic, holds=_throughout(kinematic), **common)  # type: ignore[arg-type]
     for own, masks in loose.own:
         moving = tuple(mask[::stride] for mask in masks)
-        yield Source(channel=Channel.KINEMATIC, moving=moving, own=own, **common)  # type: ignore[arg-type]
+        yield Source(channel=Channel.KINEMATIC, moving=moving, holds=_throughout(moving), own=own, **common)  # type: ignore[arg-type]
 
 
 def _judged_by_others(sources: Sequence[Source]) -> Sequence[Source]:
@@ -208,13 +212,16 @@ def _wandering(sources: Sequence[Source]) -> Iterator[Source]:
             yield source
 
 
-def _moving(signals: Signals, spec: RowsOfStep, coordinate: str, processing: Processing) -> NDArray[np.bool_]:
-    joints = [joint - 3 for joint in spec.joints]
+def _throughout(moving: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    """What rolls, or is loose, has equations that hold at rest as well."""
+    return np.ones((len(moving[0]), len(moving)), dtype=bool)
+
+
+def _joints(spec: RowsOfStep, coordinate: str) -> list[int]:
+    """Columns of `Signals.joint_rates` whose friction is in the dynamic row of a coordinate."""
     if spec.mode is None:
-        joints = [2 + spec.coordinates.index(coordinate)]
-    elif coordinate == "x":
-        joints = [2, 3, 4, 5]
-    return moving_rows(signals.joint_rates[:, joints], processing, signals.segment.sample_time)
+        return [2 + spec.coordinates.index(coordinate)]
+    return [2, 3, 4, 5] if coordinate == "x" else [joint - 3 for joint in spec.joints]
 
 
 def _rolling(signals: Signals, spec: RowsOfStep, processing: Processing) -> NDArray[np.bool_]:

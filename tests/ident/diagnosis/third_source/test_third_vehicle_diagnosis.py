@@ -41,8 +41,7 @@ def test_of_the_plain_vehicle_no_cause_is_named_and_its_parameters_come_out(
     for side in "lr":
         coulomb = p[f"d_c{side}"] + 2 * g.lever_ratio * p["d_cw"]
         expected = plain_truth[f"d_c{side}"] + 2 * g.lever_ratio * plain_truth["d_cw"]
-        # Rows within 0.2 s of rest have a tail of what sticks in them: 0.5 to 1.7 % too little (docs/gap.md).
-        assert coulomb == pytest.approx(expected, rel=0.02)
+        assert coulomb == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.slow
@@ -63,10 +62,8 @@ def test_two_masses_and_a_spring_come_out_as_elasticity_of_that_drive_and_close_
     """Of the outcome, of which noise and contacts leave little to close, more than the true numbers do."""
     fit, confirm = drives(compliance=5e-4)
     found = diagnose_vehicle([fit], [confirm], prototype)
-    effect, *others = found.diagnosis.effects
+    (effect,) = found.diagnosis.effects
     assert (effect.name, effect.where) == ("elasticity", "drive_fl")
-    # Rows within 0.2 s of rest have a tail of what sticks in them, which may pass for bristles (docs/gap.md).
-    assert all(other.name == "presliding" and other.probability < 0.9 for other in others)
     assert effect.parameters["compliance"].value == pytest.approx(5e-4, rel=0.01)
     models: list[Any] = [make(found.findings, prototype.prior) for make in (plain_model, extended_model)]
     gaps = channel_gaps([confirm], prototype, *models)

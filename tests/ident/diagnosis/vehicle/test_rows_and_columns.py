@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Block, Channel, Problem
@@ -79,11 +78,6 @@ def test_a_load_that_the_record_does_not_state_is_found_as_a_payload(vehicle: Ve
     assert mass == pytest.approx(LOADED[0].payload, rel=0.01)
 
 
-def _far_from_rest(moving: NDArray[np.bool_], samples: int) -> NDArray[np.bool_]:
-    """Rows that the filter's memory of a rest does not reach: the estimator has nothing there, the diagnosis has."""
-    return np.asarray(ndimage.binary_erosion(moving, np.ones(2 * samples + 1, dtype=bool)))
-
-
 def test_dynamic_rows_are_those_of_the_estimator(vehicle: VehicleDescription) -> None:
     record = ideal_record(FOUR, vehicle)
     blocks = [block for block in problem_of(record, vehicle).blocks if block.channel is Channel.DYNAMIC]
@@ -92,7 +86,7 @@ def test_dynamic_rows_are_those_of_the_estimator(vehicle: VehicleDescription) ->
     ):
         step = round(block.sample_time / equations.sample_time)
         scale = np.abs(equations.regressor).max(axis=0) + 1e-12
-        kept = _far_from_rest(block.moving, round(0.2 / block.sample_time))
+        kept = block.moving
         assert np.allclose((of_the_model(block) / scale)[kept], (equations.regressor[::step] / scale)[kept], atol=5e-3)
         loudest = np.abs(equations.torque).max()
         assert np.allclose(block.target[kept], equations.torque[::step][kept], atol=2e-3 * loudest)
