@@ -2,23 +2,44 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from ident.diagnosis.findings import Findings
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.vehicle.ideal import DIAGNOSTIC, Drive, Experiment
+from ident.diagnosis.vehicle.information import NOTHING, Imagined
 from ident.diagnosis.vehicle.library import DRIFTS
-from ident.diagnosis.vehicle.visibility import Sight, Visibility
+from ident.diagnosis.vehicle.visibility import FORETOLD, Sight, Visibility
 from ident.effects import Effect
 from ident.records.record import Record, base_step
+
+Array = NDArray[np.float64]
 
 LIGHTEST: Final = 0.09
 """Difference of known loads, over the vehicle's mass, that counts as the tenth that the experiment asks for [-]."""
 
 SMALLEST: Final = 0.5
 """Size of an effect that the model has, over the one that the experiment asks for, from which it counts [-]."""
+
+LEAST: Final = 0.05
+"""Information from which an experiment is worth while [bit]."""
+
+AS_MUCH: Final = 0.1
+"""Share of the information within which two experiments tell as much."""
+
+UNLIKELY: Final = 0.01
+"""Probability up to which nothing is asked of what may stand in a place."""
+
+FEW: Final = 3
+"""Rivals that advice names."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +68,7 @@ def driven_steps(records: Iterable[Record], mass: float, given: Sequence[Effect]
 
 
 def next_experiment(findings: Findings, driven: Driven, visibility: Visibility) -> str | None:
-    """Advice to a person.
+    """Advice to a person: of what is not driven yet, what is expected to tell most.
 
     Args:
         findings: of a diagnosis.
@@ -57,13 +78,21 @@ def next_experiment(findings: Findings, driven: Driven, visibility: Visibility) 
     Returns:
         None where nothing is in doubt that another experiment would clear up.
     """
-    diagnosis = findings.diagnosis()
-    for effect in diagnosis.effects:
-        rivals = [name for name in effect.ambiguity_set if name != effect.name]
-        advice = _splitting(f"{effect.name}@{effect.where}", rivals, driven, visibility) if rivals else None
-        if advice is not None:
-            return f"To tell {effect.name} from {' and '.join(rivals)}: {advice}."
-    return _showing(diagnosis.invisible, driven, visibility)
+    doubts = [doubt for cause in findings.causes if (doubt := _doubt_of(cause)) is not None]
+    hidden = frozenset(findings.invisible) & FORETOLD
+    if not doubts and not hidden:
+        return None
+    told = {name: _told_by(name, doubts, hidden, visibility) for name in _open(driven)}
+    most = max((sum(each) for each in told.values()), default=0.0)
+    if most < LEAST:
+        return None
+    # Of those that tell as much, the easiest.
+    best = next(name for name, each in told.items() if sum(each) > (1 - AS_MUCH) * most)
+    aims = [doubt.aim for doubt, bits in zip(doubts, told[best], strict=False) if bits > AS_MUCH * most]
+    seen = [name for name in sorted(hidden) if _seen(name, visibility.of(best, hidden))]
+    aims += [f"to see {' and '.join(seen)} as well"] if seen else []
+    aim = " and ".join(aims or [doubts[int(np.argmax(told[best][: len(doubts)]))].aim])
+    return f"{aim[0].upper()}{aim[1:]}: {DIAGNOSTIC[best].advice} (expected to tell {most:.2g} bit)."
 
 
 def hidden_effects(driven: Driven, visibility: Visibility) -> frozenset[EffectName]:
@@ -79,28 +108,73 @@ def hidden_effects(driven: Driven, visibility: Visibility) -> frozenset[EffectNa
     )
 
 
-def _splitting(key: str, rivals: Sequence[str], driven: Driven, visibility: Visibility) -> str | None:
-    """Of the experiments not driven yet, the first that leaves none of the rivals alike."""
-    effect = key.partition("@")[0]
-    for name in _open(driven):
-        sight = visibility.of(name, (effect, *rivals)).get(key)
-        if sight is not None and sight.visible and not set(sight.alike_effects(effect)) & set(rivals):
-            return DIAGNOSTIC[name].advice
-    return None
+@dataclass(frozen=True)
+class _Doubt:
+    """What may stand in the place of a cause.
+
+    Attributes:
+        key, values: of the cause.
+        probabilities: of all that may be there, by key, and of nothing.
+    """
+
+    key: str
+    values: Array
+    probabilities: Mapping[str, float]
+
+    @property
+    def aim(self) -> str:
+        """What an experiment is for that splits it."""
+        likely = sorted((key for key in self.probabilities if key not in (self.key, NOTHING)), key=self._rank)
+        own, rivals = self.key.partition("@")[0], likely[:FEW]
+        names = dict.fromkeys(key.partition("@")[0] for key in rivals)
+        if not rivals:
+            return f"to tell {own} from nothing"
+        if own not in names:
+            return f"to tell {own} from {' and '.join(names)}"
+        return f"to tell {self.key} from {' and '.join(rivals)}"
+
+    def _rank(self, key: str) -> float:
+        return -self.probabilities[key]
 
 
-def _showing(invisible: Sequence[str], driven: Driven, visibility: Visibility) -> str | None:
-    """Of the experiments not driven yet, the one that shows most of what is invisible."""
-    if not invisible:
+def _doubt_of(cause: Cause) -> _Doubt | None:
+    """None of a law: what its function does in another experiment is not known."""
+    key = cause.candidate.key
+    known = {one: log for one, log in cause.ranked.log_odds.items() if one.partition("@")[0] in FORETOLD}
+    if cause.law is not None or key not in known:
         return None
-    shown = {
-        name: [effect for effect in invisible if _seen(effect, visibility.of(name, invisible))]
-        for name in _open(driven)
-    }
-    best = max(shown, key=lambda name: len(shown[name]), default=None)
-    if best is None or not shown[best]:
-        return None
-    return f"To see {' and '.join(shown[best])} as well: {DIAGNOSTIC[best].advice}."
+    odds = {NOTHING: 0.0, **known}
+    whole = float(logsumexp(list(odds.values())))
+    probabilities = {one: math.exp(log - whole) for one, log in odds.items()}
+    kept = {one: p for one, p in probabilities.items() if p > UNLIKELY or one == key}
+    return _Doubt(key, cause.part.values, {one: p / sum(kept.values()) for one, p in kept.items()})
+
+
+def _told_by(
+    experiment: str, doubts: Sequence[_Doubt], hidden: frozenset[str], visibility: Visibility
+) -> Sequence[float]:
+    """Information that an experiment is expected to bring on every doubt, and on hidden effects [bit]."""
+    asked = {key.partition("@")[0] for doubt in doubts for key in doubt.probabilities if key != NOTHING}
+    four, further = visibility.imagined(experiment, frozenset(asked | hidden))
+    assert further is not None
+    values = visibility.vehicle.prior.values
+    imagined = Imagined(four, further, np.append(values, np.zeros(len(four.names) - len(values))))
+    found = []
+    for doubt in doubts:
+        mean = imagined.exactly(doubt.key, doubt.values)
+        others = {key: imagined.like(mean, key) for key in doubt.probabilities if key != doubt.key}
+        found.append(imagined.information(doubt.probabilities, {doubt.key: mean, **others}))
+    if hidden:
+        prior = _prior([candidate.key for candidate in four.candidates if candidate.effect in hidden])
+        found.append(imagined.information(prior, {key: imagined.usual(key) for key in prior}))
+    return found
+
+
+def _prior(keys: Sequence[str]) -> dict[str, float]:
+    """Of some causes and of nothing: every name as likely, of a name every place (`posterior.hypotheses`)."""
+    places = Counter(key.partition("@")[0] for key in keys)
+    odds = {NOTHING: 1.0, **{key: 1 / (len(EffectName) * places[key.partition("@")[0]]) for key in keys}}
+    return {key: one / sum(odds.values()) for key, one in odds.items()}
 
 
 def _open(driven: Driven) -> list[str]:

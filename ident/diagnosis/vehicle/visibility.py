@@ -111,7 +111,7 @@ def _are_alike(first: Array, second: Array) -> bool:
     return bool(np.linalg.norm(cosines) > ALIKE and np.linalg.norm(cosines, 2) > ALIKE)
 
 
-_FORETOLD: Final = frozenset(EffectName) - {EffectName.PARAMETER_CHANGE, EffectName.SLIP}
+FORETOLD: Final = frozenset(EffectName) - {EffectName.PARAMETER_CHANGE, EffectName.SLIP}
 """Effects that the equations say something of before a record is there: sliding is found in records."""
 
 
@@ -129,18 +129,20 @@ class Visibility:
 
     def __getitem__(self, experiment: str) -> Mapping[str, Sight]:
         """What the four steps show together with one diagnostic experiment; without any for the name `four steps`."""
-        return self.of(experiment, _FORETOLD)
+        return self.of(experiment, FORETOLD)
 
     def of(self, experiment: str, effects: Collection[str]) -> Mapping[str, Sight]:
         """The same as if there were only some effects, by name."""
         asked = experiment, frozenset(map(str, effects))
         if asked not in self._found:
-            extra, four = DIAGNOSTIC.get(experiment), self._four(asked[1])
-            joined = (
-                four if extra is None else _joined(four, _problem(extra.drives, extra.given, self.vehicle, asked[1]))
-            )
-            self._found[asked] = sights(joined)
+            four, further = self.imagined(*asked)
+            self._found[asked] = sights(four if further is None else _joined(four, further))
         return self._found[asked]
+
+    def imagined(self, experiment: str, effects: frozenset[str]) -> tuple[Problem, Problem | None]:
+        """Ideal rows of the four steps, and those that one diagnostic experiment adds; None for the four alone."""
+        extra, four = DIAGNOSTIC.get(experiment), self._four(effects)
+        return four, None if extra is None else _problem(extra.drives, extra.given, self.vehicle, effects)
 
     def _four(self, effects: frozenset[str]) -> Problem:
         """Of what has been made for more effects already, the part that is asked for."""
@@ -154,7 +156,7 @@ def _problem(
     drives: Sequence[Drive], given: Sequence[Effect], vehicle: VehicleDescription, effects: Collection[str]
 ) -> Problem:
     # At the vehicle file's parameters: an experiment of few steps does not show all of them.
-    names = [name for name in EffectName if name in effects and name in _FORETOLD]
+    names = [name for name in EffectName if name in effects and name in FORETOLD]
     problem = build_problem(
         [ideal_record(drives, vehicle, periods=1)], vehicle, vehicle.prior, given=given, effects=names
     )
