@@ -24,7 +24,7 @@ import numpy as np
 from hil.exam.sources.axes import DrawnAxis, Lacking, draw_axis
 from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.diagnosis import Verdict
-from ident.diagnosis.findings import LAW
+from ident.diagnosis.names import LAW
 from ident.errors import UserError
 from ident.records.axis_record import AxisRecord
 

@@ -39,7 +39,7 @@ from published_outcomes import (
 from published_records import MACHINES, record
 
 from ident.diagnosis.axis.diagnose import diagnose_axis
-from ident.diagnosis.findings import HeldOut
+from ident.diagnosis.check.fitted import HeldOut
 from ident.errors import UserError
 from ident.records.axis_record import AxisRecord
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from ident.axis_file import AxisEffectEntry, AxisModelEntry, write_axis_models
-from ident.diagnosis.findings import Cause, Findings
+from ident.diagnosis.answer.findings import Cause, Findings
 from ident.estimate.axis import AxisIdentification, identify_axis
 from ident.estimate.axis.processing import PARAMETERS, AxisProcessing, processing_for
 from ident.records.axis_record import AxisKind, AxisRecord, read_axis_record

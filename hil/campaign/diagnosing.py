@@ -16,9 +16,9 @@ from hil.campaign.folder import describe, sources_of
 from hil.campaign.reading import first_run, read_of, whole_records
 from hil.network.described import told_differences
 from ident.axis_file import AxisModelEntry, write_axis_models
+from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.diagnosis import Diagnosis, faulty, write_diagnosis
-from ident.diagnosis.findings import Findings
 from ident.diagnosis.vehicle.closing import extended_model
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.diagnosis.vehicle.unseen import unseen_gaps

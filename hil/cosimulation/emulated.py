@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from emulator.engine.choice import ENGINES
 from emulator.prototype import Prototype
 from emulator.replay import Guide, ReplayedVehicle, Start
-from ident.diagnosis.vehicle.following import Following
+from ident.diagnosis.vehicle.records.following import Following
 from ident.effects import Effect
 from ident.extras import EngineName
 from ident.plant import kinematics

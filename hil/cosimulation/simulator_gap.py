@@ -13,7 +13,7 @@ from hil.campaign.reading import read_as
 from hil.cosimulation.emulated import forces_of
 from hil.network import network_file_of
 from hil.network.described import Described
-from ident.diagnosis.vehicle.following import Difference, Following, all_differences, followings_of
+from ident.diagnosis.vehicle.records.following import Difference, Following, all_differences, followings_of
 from ident.diagnosis.vehicle.simulator_gap import simulator_gap
 from ident.effects.extended import ExtendedModel
 from ident.errors import RecordError

@@ -13,9 +13,9 @@ from hil.exam.cases import Case, Injected, Kind
 from hil.exam.identity import Identity
 from hil.exam.said import Said
 from hil.exam.statistics import Z95
-from ident.diagnosis.findings import LAW
-from ident.diagnosis.functions import function_of
-from ident.diagnosis.vehicle.library import DRIFTS, SHAPES
+from ident.diagnosis.axis.functions import function_of
+from ident.diagnosis.names import LAW
+from ident.diagnosis.vehicle.causes.library import DRIFTS, SHAPES
 from ident.plant.places import OF_PARAMETERS
 
 CONFIDENT: Final = 0.5

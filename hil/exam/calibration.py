@@ -18,7 +18,7 @@ from hil.exam.workers import run_all
 from hil.exam.world import World
 from hil.network import load_network
 from ident.campaign.plan import Plan
-from ident.diagnosis.vehicle.library import DRIFTS
+from ident.diagnosis.vehicle.causes.library import DRIFTS
 from ident.errors import UserError
 from ident.records.record import Record
 from ident.vehicle.description import load_vehicle

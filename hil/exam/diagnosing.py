@@ -18,10 +18,10 @@ from hil.exam.axes.record_bytes import axis_record_of
 from hil.exam.folder import RECORDS, ExamFolder, read_exam
 from hil.exam.record_bytes import record_from_bytes
 from hil.exam.workers import run_all
-from ident.diagnosis.alone import closed_alone
+from ident.diagnosis.answer.alone import closed_alone
+from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.diagnosis import faulty
-from ident.diagnosis.findings import Findings
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Problem
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle

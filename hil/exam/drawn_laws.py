@@ -18,7 +18,7 @@ from hil.exam.cases import Injected
 from hil.exam.sizes import SizeTable
 from hil.exam.smooth import draw_length, smooth_values
 from ident.diagnosis.law.spline import Knots
-from ident.diagnosis.linear import least_squares, rms
+from ident.diagnosis.observations.linear import least_squares, rms
 from ident.effects import Effect, make_effect
 from ident.effects.laws import COUNT, coefficient
 from ident.plant.places import STEERING, WHEEL_PLACES, rows_of

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.campaign.steps import EXCITATIONS
-from ident.diagnosis.linear import rms
-from ident.diagnosis.vehicle.creep import granted_creep
+from ident.diagnosis.observations.linear import rms
+from ident.diagnosis.vehicle.causes.creep import granted_creep
 from ident.estimate.equations import Equations, motion_of, usable_equations
 from ident.estimate.filters import Processing, moving_rows, zero_phase
 from ident.estimate.noise import noise_floor

@@ -29,8 +29,8 @@ from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.statistics import Rate, rate
 from ident.diagnosis.axis.diagnose import pose_axis
 from ident.diagnosis.axis.reference import axis_reference
-from ident.diagnosis.known import NOTHING, log_evidence_of
 from ident.diagnosis.problem import Problem
+from ident.diagnosis.search.known import NOTHING, log_evidence_of
 from ident.diagnosis.vehicle.diagnose import pose_vehicle
 from ident.errors import UserError
 

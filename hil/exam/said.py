@@ -13,7 +13,7 @@ FAILED: Final = "failed"
 
 @dataclass(frozen=True)
 class Alone:
-    """What a name closes of the removable held-out gap in place of the answer: `ident.diagnosis.alone`.
+    """What a name closes of the removable held-out gap in place of the answer: `ident.diagnosis.answer.alone`.
 
     Attributes:
         name: of the effect.

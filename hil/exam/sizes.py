@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ident.diagnosis.delays import HELD
 from ident.diagnosis.names import LATE
+from ident.diagnosis.observations.delays import HELD
 from ident.errors import DataFileError
 
 EVERYWHERE: Final = "drives"

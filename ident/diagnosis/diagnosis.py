@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ident.diagnosis.law.answer import Alternative, LawAnswer
+import numpy as np
+from numpy.typing import NDArray
+
 from ident.faults import Fault
 from ident.vehicle.quantities import Quantity
 from ident.writing import json_number, write_whole
@@ -29,6 +31,66 @@ class Verdict(enum.StrEnum):
     def explains(self) -> bool:
         """Whether causes are part of the answer."""
         return self in (Verdict.EFFECT, Verdict.LAW)
+
+
+@dataclass(frozen=True)
+class LawAnswer:
+    """A law as it is written down.
+
+    Attributes:
+        variable: what it is a function of.
+        partner: what the function is multiplied with: `direction`, `rate`, `acceleration`; empty: nothing.
+        of: whose motion, where that is not the place's own.
+        channel: of the rows in which it was found.
+        period: after which it comes around, in `unit_x`; None where it does not.
+        unit_x, unit_y: of the variable and of the function.
+        curve: (k, 3) variable, function, standard deviation.
+        formula: one that does as well as the curve; None where none that is short does.
+        nearest: effect of the library that comes nearest, with its place; None where none is near.
+        distance: share of what the law adds that the nearest effect cannot, as an rms.
+    """
+
+    variable: str
+    partner: str
+    of: str
+    channel: str
+    period: float | None
+    unit_x: str
+    unit_y: str
+    curve: NDArray[np.float64]
+    formula: str | None
+    nearest: str | None
+    distance: float | None
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values; what does not apply is null."""
+        return {
+            "variable": self.variable,
+            "with": self.partner or None,
+            "of": self.of or None,
+            "channel": self.channel,
+            "period": json_number(self.period) if self.period is not None else None,
+            "unit_x": self.unit_x,
+            "unit_y": self.unit_y,
+            "curve": [[json_number(value) for value in point] for point in self.curve.tolist()],
+            "formula": self.formula,
+            "nearest": self.nearest,
+            "distance": json_number(self.distance) if self.distance is not None else None,
+        }
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """What these records do not tell from a cause: an effect by name, or a law by variable, and where."""
+
+    name: str | None
+    variable: str | None
+    where: str
+
+    def as_json(self) -> dict[str, str]:
+        """The name or the variable, and the place."""
+        what = {"name": self.name} if self.name is not None else {"variable": self.variable or ""}
+        return {**what, "where": self.where}
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,9 @@ from ident.effects import EFFECTS, LAWS, Effect
 from ident.errors import UserError
 from ident.plant.places import GROUPS
 
+LAW: Final = "law"
+"""Name of a cause that has none."""
+
 
 class EffectName(enum.StrEnum):
     """Effects of the library that the diagnosis tells from each other."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.law.dependence import Dependence
+from ident.diagnosis.dependence import Dependence
 from ident.effects import EffectParameter
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
-from ident.diagnosis.vehicle.ideal import FOUR, Drive, ideal_record
+from ident.diagnosis.vehicle.experiment.ideal import FOUR, Drive, ideal_record
 from ident.faults.channels import GROUPS, pairs, single, whole
 from ident.faults.evidence import Evidence
 from ident.faults.fault import FaultName

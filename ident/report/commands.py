@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from ident.diagnosis.diagnosis import Diagnosis, Verdict
-from ident.diagnosis.vehicle.ideal import DIAGNOSTIC, Experiment
+from ident.diagnosis.vehicle.experiment.ideal import DIAGNOSTIC, Experiment
 
 PROGRAM: Final = "quasiomni"
 EXTENDED: Final = "extended.toml"

@@ -10,9 +10,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.findings import Cause, Findings
-from ident.diagnosis.law.answer import LawAnswer
-from ident.diagnosis.law.dependence import Partner, Variable
+from ident.diagnosis.answer.findings import Cause, Findings
+from ident.diagnosis.dependence import Partner, Variable
+from ident.diagnosis.diagnosis import LawAnswer
 from ident.report.digits import plain, unit_text
 from ident.report.figures import MEASURED, MODELLED, TRUTH, packed
 from ident.report.headline import place_words

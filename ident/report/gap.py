@@ -10,8 +10,8 @@ from typing import Any, Final
 from markupsafe import Markup
 from plotly import offline
 
+from ident.diagnosis.answer.findings import Cause, Findings
 from ident.diagnosis.diagnosis import Diagnosis
-from ident.diagnosis.findings import Cause, Findings
 from ident.diagnosis.vehicle.outcome import HORIZON
 from ident.report import digits
 from ident.report.commands import Asked, next_commands

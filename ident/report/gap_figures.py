@@ -10,11 +10,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.answer.findings import Findings
+from ident.diagnosis.check.remainder import ALL, noise_floors
 from ident.diagnosis.diagnosis import Share
-from ident.diagnosis.findings import Findings
+from ident.diagnosis.observations.rows import kept_rows, make_rows
 from ident.diagnosis.problem import Block, Channel
-from ident.diagnosis.remainder import ALL, noise_floors
-from ident.diagnosis.rows import kept_rows, make_rows
 from ident.report.digits import percent, significant, unit_text
 from ident.report.figures import MODELLED, RESIDUAL, STUCK, packed
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Share, Verdict
-from ident.diagnosis.findings import Findings
 from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.report.digits import percent, plain, significant, unit_text, with_std
 from ident.report.headline import headline

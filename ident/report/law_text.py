@@ -7,8 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ident.diagnosis.diagnosis import NamedEffect
-from ident.diagnosis.law.answer import LawAnswer
+from ident.diagnosis.diagnosis import LawAnswer, NamedEffect
 from ident.report.digits import percent, plain, significant, unit_text
 
 _FORCES: Final = MappingProxyType(

@@ -12,12 +12,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.findings import Cause, Findings
-from ident.diagnosis.functions import function_of
-from ident.diagnosis.law.dependence import Basis, Dependence
+from ident.diagnosis.answer.findings import Cause, Findings
+from ident.diagnosis.axis.functions import function_of
+from ident.diagnosis.check.remainder import noise_floors
+from ident.diagnosis.dependence import Basis, Dependence
+from ident.diagnosis.observations.rows import Rows, make_rows
 from ident.diagnosis.problem import Block, Problem
-from ident.diagnosis.remainder import noise_floors
-from ident.diagnosis.rows import Rows, make_rows
 from ident.report.sketch import joint_of
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Final
 
-from ident.diagnosis.findings import Cause, Findings
-from ident.diagnosis.law.dependence import Partner, law_name
+from ident.diagnosis.answer.findings import Cause, Findings
+from ident.diagnosis.dependence import Partner, law_name
 from ident.report.digits import percent, plain, significant
 from ident.report.headline import place_words
 from ident.report.law_text import VARIABLES, law_kind

@@ -15,7 +15,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from plotly import offline
 
-from ident.diagnosis.vehicle.following import Difference
+from ident.diagnosis.vehicle.records.following import Difference
 from ident.diagnosis.vehicle.simulator_gap import SimulatorGap, StepGap
 from ident.report import digits
 from ident.report.digits import percent, significant, unit_text

@@ -11,7 +11,7 @@ import pytest
 import typer
 
 from ident.diagnosis.diagnosis import Diagnosis, Gap, Verdict
-from ident.diagnosis.vehicle.ideal import DIAGNOSTIC
+from ident.diagnosis.vehicle.experiment.ideal import DIAGNOSTIC
 from ident.report.commands import EXTENDED, Asked, Command, next_commands
 from quasiomni import load_commands
 from quasiomni.application import app

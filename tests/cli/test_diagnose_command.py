@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from ident.diagnosis.vehicle.ideal import FOUR, ideal_record
+from ident.diagnosis.vehicle.experiment.ideal import FOUR, ideal_record
 from ident.parameters_file import read_model
 from ident.records.channels import Channels, write_channels
 from ident.records.files import write_record

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ident.diagnosis.vehicle.ideal import FOUR, ideal_record
+from ident.diagnosis.vehicle.experiment.ideal import FOUR, ideal_record
 from ident.records.files import write_record
 from ident.records.record import Record, Segment
 from ident.vehicle.description import load_vehicle

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import quasiomni
-from ident.diagnosis.vehicle.ideal import DIAGNOSTIC, FOUR, ideal_record
+from ident.diagnosis.vehicle.experiment.ideal import DIAGNOSTIC, FOUR, ideal_record
 from ident.records.files import write_record
 from ident.vehicle.description import load_vehicle
 

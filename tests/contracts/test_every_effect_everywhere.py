@@ -26,11 +26,11 @@ from hil.exam.sealing import effect_of
 from ident.campaign.feed_forward import Course, feed_forward
 from ident.diagnosis.names import MEMORIES, EffectName, places_of, refuse_strangers
 from ident.diagnosis.problem import Channel
-from ident.diagnosis.vehicle.bending import BristleCause
-from ident.diagnosis.vehicle.inputs import INPUTS
-from ident.diagnosis.vehicle.rows import Formulas, kinematic_coordinates
-from ident.diagnosis.vehicle.sliding import sliding_cause
-from ident.diagnosis.vehicle.transforms import transform_cause
+from ident.diagnosis.vehicle.causes.bending import BristleCause
+from ident.diagnosis.vehicle.records.inputs import INPUTS
+from ident.diagnosis.vehicle.records.rows import Formulas, kinematic_coordinates
+from ident.diagnosis.vehicle.records.sliding import sliding_cause
+from ident.diagnosis.vehicle.records.transforms import transform_cause
 from ident.effects import EFFECTS, Effect, at_single_places, make_effect
 from ident.effects.combining import combined
 from ident.effects.extended import ExtendedModel, simulation_of

@@ -10,8 +10,8 @@ import pytest
 from scipy import io
 
 from ident.diagnosis.axis.model import AxisEffect
+from ident.diagnosis.dependence import Partner, Variable
 from ident.diagnosis.diagnosis import Diagnosis, Gap, NamedEffect, Verdict
-from ident.diagnosis.law.dependence import Partner, Variable
 from ident.diagnosis.names import EffectName
 from ident.records.axis_record import AxisKind, AxisRecord, AxisSignals
 

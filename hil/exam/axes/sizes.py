@@ -15,7 +15,7 @@ from hil.exam.axes.effects import MISSING
 from hil.exam.sources.machine import Machine
 from ident.diagnosis.axis.problem import axis_problem
 from ident.diagnosis.axis.reference import axis_reference
-from ident.diagnosis.linear import least_squares, rms
+from ident.diagnosis.observations.linear import least_squares, rms
 from ident.errors import UserError
 from ident.estimate.filters import SEVEN, differentiate, zero_phase
 from ident.records.axis_record import AxisRecord

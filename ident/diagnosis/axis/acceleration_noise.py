@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from ident.diagnosis.axis.motion import FEWEST_ROWS, LARGEST_ROWS_CUTOFF, noise_power, sample_noise
-from ident.diagnosis.rows import ROWS_PER_CUTOFF
+from ident.diagnosis.observations.rows import ROWS_PER_CUTOFF
 from ident.errors import EstimationError
 from ident.records.axis_record import AxisRecord, AxisSignals
 

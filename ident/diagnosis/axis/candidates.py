@@ -18,9 +18,9 @@ from ident.diagnosis.axis.memories import friction_load, friction_warming, presl
 from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
 from ident.diagnosis.axis.motion import AxisMotion
 from ident.diagnosis.axis.positional import friction_position, gravity_loads, inertia_position
-from ident.diagnosis.delays import DAMPING, HELD, delayed, sprung
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.orders import FEWEST
+from ident.diagnosis.observations.delays import DAMPING, HELD, delayed, sprung
+from ident.diagnosis.observations.orders import FEWEST
 from ident.diagnosis.problem import Candidate, Periodic, Variant
 from ident.effects import EffectParameter
 from ident.estimate.filters import SEVEN, differentiate

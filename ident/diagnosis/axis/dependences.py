@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.model import AxisModel
-from ident.diagnosis.law.dependence import Basis, Dependence, Partner, Variable, path_since_reversal
+from ident.diagnosis.dependence import Basis, Dependence, Partner, Variable, path_since_reversal
 from ident.estimate.filters import SEVEN, differentiate
 
 Array = NDArray[np.float64]

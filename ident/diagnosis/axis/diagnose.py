@@ -7,14 +7,14 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
+from ident.diagnosis.answer.findings import Findings
+from ident.diagnosis.answer.judge import judge
 from ident.diagnosis.axis.problem import axis_problem, delayed_axes
 from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_other_axes
 from ident.diagnosis.axis.scale import Scale
-from ident.diagnosis.findings import Findings
 from ident.diagnosis.names import LATE
-from ident.diagnosis.posterior.answer import judge
+from ident.diagnosis.observations.split import split_problem
 from ident.diagnosis.problem import Problem
-from ident.diagnosis.split import split_problem
 from ident.records.axis_record import AxisRecord, AxisSignals
 from ident.stages import Stage, untold
 

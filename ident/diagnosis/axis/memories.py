@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
-from ident.diagnosis.delays import HELD, RARER, led
-from ident.diagnosis.law.dependence import path_since_reversal
+from ident.diagnosis.dependence import path_since_reversal
 from ident.diagnosis.names import EffectName
+from ident.diagnosis.observations.delays import HELD, RARER, led
 from ident.diagnosis.problem import Candidate, Variant
 from ident.effects import EffectParameter
 from ident.estimate.filters import SEVEN, differentiate

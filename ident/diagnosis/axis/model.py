@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.axis.motion import AxisMotion
-from ident.diagnosis.law.dependence import Partner, Variable
+from ident.diagnosis.dependence import Partner, Variable
 from ident.diagnosis.problem import Candidate, Contribution, Series, Turned, Variant
 from ident.effects import EffectParameter
 from ident.records.axis_record import AxisKind

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, signal
 
-from ident.diagnosis.rows import ROWS_PER_CUTOFF
+from ident.diagnosis.observations.rows import ROWS_PER_CUTOFF
 from ident.errors import EstimationError
 from ident.estimate.axis.cutoff import SPECTRUM_SEGMENTS
 from ident.estimate.axis.processing import smoothed

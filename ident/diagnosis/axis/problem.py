@@ -22,11 +22,11 @@ from ident.diagnosis.axis.reference import (
     refuse_other_axes,
 )
 from ident.diagnosis.axis.scale import Scale, nominal
-from ident.diagnosis.delays import HELD
-from ident.diagnosis.law.dependence import Dependence, across
+from ident.diagnosis.check.refit import Refit
+from ident.diagnosis.dependence import Dependence, across
 from ident.diagnosis.names import EffectName
+from ident.diagnosis.observations.delays import HELD
 from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant, contributions_of, forces_of, turned_by
-from ident.diagnosis.refit import Refit
 from ident.estimate.axis.identify import PARAMETER_UNITS
 from ident.estimate.axis.processing import PARAMETERS
 from ident.estimate.filters import SEVEN, differentiate

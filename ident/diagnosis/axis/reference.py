@@ -24,8 +24,8 @@ from ident.diagnosis.axis.motion import (
 )
 from ident.diagnosis.axis.reversals import Sticking, Untold, turned_round, untold_while_sticking
 from ident.diagnosis.axis.scale import LARGEST_HOLD, Scale, nominal
-from ident.diagnosis.delays import delayed
-from ident.diagnosis.law.dependence import path_since_reversal
+from ident.diagnosis.dependence import path_since_reversal
+from ident.diagnosis.observations.delays import delayed
 from ident.errors import EstimationError, RecordError
 from ident.estimate.axis.cutoff import LARGEST_CUTOFF, position_cutoff
 from ident.estimate.axis.processing import BUTTERWORTH_ORDER, PARAMETERS

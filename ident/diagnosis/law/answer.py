@@ -4,85 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.law.dependence import Dependence, law_name
+from ident.diagnosis.dependence import Dependence, law_name
+from ident.diagnosis.diagnosis import Alternative, LawAnswer
 from ident.diagnosis.law.formula import formula_of
 from ident.diagnosis.law.law import Law
+from ident.diagnosis.observations.rows import Column
 from ident.diagnosis.problem import Problem
-from ident.diagnosis.rows import Column
 from ident.effects import Effect, make_effect
 from ident.effects.laws import COUNT, LAWS, coefficient
-from ident.writing import json_number
 
 Array = NDArray[np.float64]
 
 POINTS: Final = 2 * (COUNT - 3) + 1
 """Of a curve: two for every step between its knots."""
-
-
-@dataclass(frozen=True)
-class LawAnswer:
-    """A law as it is written down.
-
-    Attributes:
-        variable: what it is a function of.
-        partner: what the function is multiplied with: `direction`, `rate`, `acceleration`; empty: nothing.
-        of: whose motion, where that is not the place's own.
-        channel: of the rows in which it was found.
-        period: after which it comes around, in `unit_x`; None where it does not.
-        unit_x, unit_y: of the variable and of the function.
-        curve: (POINTS, 3) variable, function, standard deviation.
-        formula: one that does as well as the curve; None where none that is short does.
-        nearest: effect of the library that comes nearest, with its place; None where none is near.
-        distance: share of what the law adds that the nearest effect cannot, as an rms.
-    """
-
-    variable: str
-    partner: str
-    of: str
-    channel: str
-    period: float | None
-    unit_x: str
-    unit_y: str
-    curve: Array
-    formula: str | None
-    nearest: str | None
-    distance: float | None
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain values; what does not apply is null."""
-        return {
-            "variable": self.variable,
-            "with": self.partner or None,
-            "of": self.of or None,
-            "channel": self.channel,
-            "period": json_number(self.period) if self.period is not None else None,
-            "unit_x": self.unit_x,
-            "unit_y": self.unit_y,
-            "curve": [[json_number(value) for value in point] for point in self.curve.tolist()],
-            "formula": self.formula,
-            "nearest": self.nearest,
-            "distance": json_number(self.distance) if self.distance is not None else None,
-        }
-
-
-@dataclass(frozen=True)
-class Alternative:
-    """What these records do not tell from a cause: an effect by name, or a law by variable, and where."""
-
-    name: str | None
-    variable: str | None
-    where: str
-
-    def as_json(self) -> dict[str, str]:
-        """The name or the variable, and the place."""
-        what = {"name": self.name} if self.name is not None else {"variable": self.variable or ""}
-        return {**what, "where": self.where}
 
 
 def curve_of(law: Law) -> Array:

@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.law.dependence import Dependence
+from ident.diagnosis.dependence import Dependence
 from ident.diagnosis.law.learning import Learnt
+from ident.diagnosis.observations.regression import Regression
+from ident.diagnosis.observations.rows import Column
 from ident.diagnosis.problem import Candidate, Problem, Variant
-from ident.diagnosis.regression import Regression
-from ident.diagnosis.rows import Column
 from ident.effects import EffectParameter
 
 Array = NDArray[np.float64]

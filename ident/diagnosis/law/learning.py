@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ident.diagnosis.directions import VISIBLE
-from ident.diagnosis.law.dependence import Dependence, Variable
+from ident.diagnosis.dependence import Dependence, Variable
 from ident.diagnosis.law.spline import Knots, knots_around, knots_over
-from ident.diagnosis.linear import orthonormal
+from ident.diagnosis.observations.directions import VISIBLE
+from ident.diagnosis.observations.linear import orthonormal
+from ident.diagnosis.observations.regression import Regression
+from ident.diagnosis.observations.rows import Rows
+from ident.diagnosis.observations.whitening import Whitening
 from ident.diagnosis.problem import Problem
-from ident.diagnosis.regression import Regression
-from ident.diagnosis.rows import Rows
-from ident.diagnosis.whitening import Whitening
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

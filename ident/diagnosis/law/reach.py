@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.law.dependence import Dependence
+from ident.diagnosis.dependence import Dependence
+from ident.diagnosis.observations.rows import Rows
 from ident.diagnosis.problem import Problem
-from ident.diagnosis.rows import Rows
 
 Mask = NDArray[np.bool_]
 

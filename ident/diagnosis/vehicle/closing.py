@@ -9,16 +9,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.answer.findings import Findings
+from ident.diagnosis.check.refit import Refit
 from ident.diagnosis.diagnosis import Gap
-from ident.diagnosis.findings import Findings
 from ident.diagnosis.law.answer import law_effect
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel, Problem
-from ident.diagnosis.refit import Refit
-from ident.diagnosis.vehicle.context import PRIOR_WEIGHT, make_context
-from ident.diagnosis.vehicle.creep import contact_speeds, granted_creep
+from ident.diagnosis.vehicle.causes.context import PRIOR_WEIGHT, make_context
+from ident.diagnosis.vehicle.causes.creep import contact_speeds, granted_creep
 from ident.diagnosis.vehicle.outcome import outcomes
-from ident.diagnosis.vehicle.sources import Source, sources_of
+from ident.diagnosis.vehicle.records.sources import Source, sources_of
 from ident.effects import Effect, make_effect
 from ident.effects.combining import combined
 from ident.effects.extended import ExtendedModel

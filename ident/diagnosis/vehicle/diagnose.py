@@ -9,16 +9,16 @@ from typing import Final
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from ident.diagnosis.answer.findings import Findings
+from ident.diagnosis.answer.judge import judge
 from ident.diagnosis.diagnosis import Diagnosis
-from ident.diagnosis.findings import Findings
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.posterior.answer import judge
+from ident.diagnosis.observations.split import split_problem
 from ident.diagnosis.problem import Problem
-from ident.diagnosis.split import split_problem
-from ident.diagnosis.vehicle.belonging import refuse_other_vehicle
 from ident.diagnosis.vehicle.build import build_problem
-from ident.diagnosis.vehicle.experiments import Driven, driven_steps, hidden_effects, next_experiment
-from ident.diagnosis.vehicle.visibility import Visibility
+from ident.diagnosis.vehicle.causes.belonging import refuse_other_vehicle
+from ident.diagnosis.vehicle.experiment.advice import Driven, driven_steps, hidden_effects, next_experiment
+from ident.diagnosis.vehicle.experiment.visibility import Visibility
 from ident.effects.extended import ExtendedModel
 from ident.errors import DataFileError, RecordError
 from ident.records.record import Record

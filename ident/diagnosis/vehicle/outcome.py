@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel
-from ident.diagnosis.vehicle.inputs import SLICES
-from ident.diagnosis.vehicle.signals import shifted
-from ident.diagnosis.vehicle.sources import Source
+from ident.diagnosis.vehicle.records.inputs import SLICES
+from ident.diagnosis.vehicle.records.signals import shifted
+from ident.diagnosis.vehicle.records.sources import Source
 from ident.effects import make_effect
 from ident.effects.extended import ExtendedModel, simulation_of
 from ident.plant import kinematics

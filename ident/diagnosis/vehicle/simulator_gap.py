@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ident.diagnosis.diagnosis import Gap
-from ident.diagnosis.vehicle.following import Difference
+from ident.diagnosis.vehicle.records.following import Difference
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,11 @@ from typing import Final
 
 import numpy as np
 
+from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.diagnosis import Unseen
-from ident.diagnosis.findings import Findings
-from ident.diagnosis.split import guard_of, part_of
+from ident.diagnosis.observations.split import guard_of, part_of
 from ident.diagnosis.vehicle.closing import compared, extended_model, plain_model
-from ident.diagnosis.vehicle.sources import Source
+from ident.diagnosis.vehicle.records.sources import Source
 from ident.effects import Effect
 from ident.estimate.filters import Processing
 from ident.records.record import Record, Step, base_step

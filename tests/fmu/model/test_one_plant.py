@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from fmu.table import variable_table
 from fmu.variables import Block, Inputs
 from ident.diagnosis.problem import Channel
-from ident.diagnosis.vehicle.inputs import INPUTS, SLICES
-from ident.diagnosis.vehicle.rows import Formulas
+from ident.diagnosis.vehicle.records.inputs import INPUTS, SLICES
+from ident.diagnosis.vehicle.records.rows import Formulas
 from ident.effects import Effect, EffectTerm, make_effect, terms_of
 from ident.estimate.equations import ROWS
 from ident.plant import creeping, dynamics, kinematics, symbolic

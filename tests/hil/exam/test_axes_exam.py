@@ -23,7 +23,7 @@ from hil.exam.sources import Source
 from hil.exam.sources.machine import Machine
 from ident.diagnosis.axis.diagnose import pose_axis
 from ident.diagnosis.axis.reference import axis_reference
-from ident.diagnosis.known import NOTHING, log_evidence_of
+from ident.diagnosis.search.known import NOTHING, log_evidence_of
 from ident.errors import UserError
 
 SEED = 6100001

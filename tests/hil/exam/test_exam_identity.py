@@ -14,7 +14,7 @@ from hil.exam.plans import CONFIRMING
 from ident.campaign.plan import make_plan
 from ident.campaign.steps import PERIODS
 from ident.diagnosis.vehicle.build import build_problem
-from ident.diagnosis.vehicle.ideal import FOUR, ideal_record
+from ident.diagnosis.vehicle.experiment.ideal import FOUR, ideal_record
 from ident.effects import EFFECTS
 from ident.vehicle.description import load_vehicle
 

@@ -15,7 +15,13 @@ from scipy import signal
 from threadpoolctl import threadpool_limits
 
 from hil.exam.sources.machine import Machine
+from ident.diagnosis.hypotheses.hypotheses import Design
+from ident.diagnosis.hypotheses.products import Products
+from ident.diagnosis.noise.colours import Colours
+from ident.diagnosis.observations.regression import Regression
 from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant
+from ident.diagnosis.search.asked import asked_of
+from ident.diagnosis.search.search import Search
 from ident.effects import EffectParameter
 
 Array = NDArray[np.float64]
@@ -99,3 +105,29 @@ def world() -> type[World]:
 @pytest.fixture
 def machine() -> Callable[..., Machine]:
     return Machine
+
+
+@dataclass(frozen=True)
+class Question:
+    """What the posterior is computed from."""
+
+    regression: Regression
+    colours: Colours
+    design: Design
+    products: Products
+    search: Search
+
+    def number(self, key: str) -> int:
+        """Of a hypothesis."""
+        return next(index for index, one in enumerate(self.design.hypotheses) if one.key == key)
+
+
+def _asked(fit: Problem, confirm: Problem) -> Question:
+    made = asked_of((fit, confirm))
+    colours, every = Colours(made.regression), np.arange(made.design.columns.shape[1])
+    return Question(made.regression, colours, made.design, Products(made.design, colours, every), Search(made.fitter))
+
+
+@pytest.fixture
+def asked() -> Callable[[Problem, Problem], Question]:
+    return _asked

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from ident.diagnosis.answer.findings import Findings
+from ident.diagnosis.answer.judge import judge
+from ident.diagnosis.dependence import Basis, Dependence, Partner, Variable
 from ident.diagnosis.diagnosis import Diagnosis, Gap, Unseen, Verdict
-from ident.diagnosis.findings import Findings
-from ident.diagnosis.law.dependence import Basis, Dependence, Partner, Variable
-from ident.diagnosis.posterior.answer import judge
 from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant
 from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.effects import EffectParameter

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from ident.diagnosis.answer.findings import Findings
+from ident.diagnosis.answer.judge import judge
 from ident.diagnosis.diagnosis import Diagnosis, Gap, NamedEffect, Share, Unseen, Verdict
-from ident.diagnosis.findings import Findings
-from ident.diagnosis.posterior.answer import judge
 from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant
 from ident.effects import EffectParameter
 from ident.report.commands import Asked

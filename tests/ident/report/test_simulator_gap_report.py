@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ident.diagnosis.vehicle.following import Difference
+from ident.diagnosis.vehicle.records.following import Difference
 from ident.diagnosis.vehicle.simulator_gap import simulator_gap
 from ident.report.simulator_gap import (
     SimulatorReport,

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
-from ident.diagnosis.vehicle.ideal import FOUR, Drive, ideal_record
+from ident.diagnosis.vehicle.experiment.ideal import FOUR, Drive, ideal_record
 from ident.records.record import Record, Segment
 from ident.vehicle.description import VehicleDescription, load_vehicle
 

@@ -9,7 +9,7 @@ import pytest
 
 from ident.diagnosis.vehicle.closing import extended_model, plain_model
 from ident.diagnosis.vehicle.diagnose import VehicleDiagnosis, diagnose_vehicle
-from ident.diagnosis.vehicle.ideal import FOUR, ideal_record
+from ident.diagnosis.vehicle.experiment.ideal import FOUR, ideal_record
 from ident.errors import DataFileError, RecordError
 from ident.records.record import Record
 from ident.vehicle.description import VehicleDescription, load_vehicle

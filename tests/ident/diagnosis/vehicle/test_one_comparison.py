@@ -8,8 +8,8 @@ from functools import partial
 
 import pytest
 
+from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.diagnosis import Verdict
-from ident.diagnosis.findings import Findings
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.effects.extended import ExtendedModel
 from ident.records.record import Record, Segment

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Block, Channel, Problem
 from ident.diagnosis.vehicle.build import build_problem
-from ident.diagnosis.vehicle.context import make_context
-from ident.diagnosis.vehicle.ideal import DIAGNOSTIC, FOUR, Drive, ideal_record
-from ident.diagnosis.vehicle.sources import DIAGNOSED, sources_of
+from ident.diagnosis.vehicle.causes.context import make_context
+from ident.diagnosis.vehicle.experiment.ideal import DIAGNOSTIC, FOUR, Drive, ideal_record
+from ident.diagnosis.vehicle.records.sources import DIAGNOSED, sources_of
 from ident.effects import make_effect
 from ident.estimate.equations import usable_equations
 from ident.estimate.filters import Processing

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ident.diagnosis.vehicle.following import Difference, Following, all_differences, followings_of
+from ident.diagnosis.vehicle.records.following import Difference, Following, all_differences, followings_of
 from ident.diagnosis.vehicle.simulator_gap import simulator_gap
 from ident.errors import RecordError
 from ident.estimate.equations import equations_of

@@ -13,7 +13,7 @@ from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.vehicle.closing import channel_gaps, extended_model
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
-from ident.diagnosis.vehicle.ideal import DIAGNOSTIC
+from ident.diagnosis.vehicle.experiment.ideal import DIAGNOSTIC
 from ident.effects import EFFECTS, Effect, make_effect
 from ident.effects.extended import ExtendedModel
 from ident.records.record import Record, Segment

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ident.diagnosis.findings import Findings
+from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.vehicle.closing import extended_model
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
-from ident.diagnosis.vehicle.ideal import DIAGNOSTIC, Drive, ideal_record
+from ident.diagnosis.vehicle.experiment.ideal import DIAGNOSTIC, Drive, ideal_record
 from ident.diagnosis.vehicle.outcome import outcomes
-from ident.diagnosis.vehicle.sources import DIAGNOSED, Source, sources_of
+from ident.diagnosis.vehicle.records.sources import DIAGNOSED, Source, sources_of
 from ident.diagnosis.vehicle.unseen import later_part, unseen_gaps
 from ident.effects import make_effect
 from ident.effects.extended import ExtendedModel

@@ -1,0 +1,1 @@
+"""The answer: who keeps a place, the verdict, and what is found."""

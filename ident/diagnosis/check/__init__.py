@@ -1,0 +1,1 @@
+"""What a set says of rows that it was not fitted to: exact refits, the gap held out, sizes."""

@@ -1,0 +1,44 @@
+"""Whether a cause that was refitted has a size of its own."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from ident.diagnosis.check.refit import Part
+from ident.diagnosis.problem import Candidate
+
+SURELY: Final = 2.0
+"""Standard deviations from which a number is not zero."""
+
+ITS_OWN: Final = 3.0
+"""The same, by the scatter of rows, of a size beside what comes along: in thousands of rows a number is worth that."""
+
+
+def is_sizeless(candidate: Candidate, part: Part) -> bool:
+    """Whether an effect may be of no size itself, and what comes along with it is the explanation."""
+    along = slice(len(part.values), None)
+    accompanied = np.abs(part.numbers[along]) > SURELY * part.scatter[along]
+    size = np.abs(part.values) if candidate.least is None else part.values - candidate.least
+    least = np.maximum(SURELY * part.std, ITS_OWN * part.scatter[: len(size)])
+    return bool(np.any(accompanied) and np.all(size < least))
+
+
+def is_foreign(candidate: Candidate, part: Part) -> bool:
+    """Whether the refit has made something else of an effect, of parameters that it does not have."""
+    return bool(candidate.lowest) and bool(np.any(np.abs(part.values) < candidate.lowest))
+
+
+def is_nothing(candidate: Candidate, part: Part) -> bool:
+    """Whether the refit has made something else of an effect, or of a size that may be zero.
+
+    Something else has parameters that the effect does not have. Of linear ones any is a size, or else the first.
+    Beside what comes along, `is_sizeless` says.
+    """
+    if is_foreign(candidate, part):
+        return True
+    sizes = slice(None) if candidate.contribution is None else slice(1)
+    alone = len(part.numbers) == len(part.values)
+    small = np.abs(part.values[sizes]) < SURELY * part.scatter[: len(part.values)][sizes]
+    return alone and bool(np.all(small))

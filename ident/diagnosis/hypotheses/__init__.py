@@ -1,0 +1,1 @@
+"""Everything that may be there: columns in the rows with a prior each, and exact forms."""

@@ -1,0 +1,1 @@
+"""The noise of rows: its colour, and what may be lacking beside."""

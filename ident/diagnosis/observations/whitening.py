@@ -1,0 +1,224 @@
+"""Whitening of coloured residuals: an autoregression for every group of rows, restarted at every interruption.
+
+Where steps repeat, the colour is that of what differs between the repeats: what repeats is not in it, so that no effect
+can be taken for noise. It counts as long as what the best candidates leave is about as small; where model errors
+prevail, and where nothing repeats, the colour is that of what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.observations.rows import Rows
+
+Array = NDArray[np.float64]
+
+ORDER: Final = 20
+"""Of the autoregression: slow noise hides below fast noise, and shows only over many rows."""
+TOLERATED_MEMORY: Final = 0.5
+"""Correlation time of what is tolerated [s]: it is model error, and as slow as the motion."""
+PREVAILING: Final = 2.0
+"""Power of what is left, over that of the noise in the mean of the repeats, from which model errors prevail."""
+STRIDE: Final = 128
+"""Rows that are whitened at once."""
+TAPER: Final = 1e-4
+"""White share added to the variance, so that a band without any power is not blown up."""
+
+
+@dataclass(frozen=True)
+class Predictor:
+    """Best linear predictions from 0 to ORDER rows back (Levinson and Durbin).
+
+    Attributes:
+        weights: row i (i,) predicts from the i rows before, newest first.
+        deviations: of the prediction error, (ORDER + 1,).
+    """
+
+    weights: tuple[Array, ...]
+    deviations: Array
+
+    @cached_property
+    def matrix(self) -> Array:
+        """What turns the first rows of a run into white ones: (m, m) lower triangular, a band from its order on."""
+        order = len(self.weights) - 1
+        found = np.zeros((order + STRIDE, order + STRIDE))
+        for row, weights in enumerate(self.weights):
+            found[row, : row + 1] = np.append(-weights[::-1], 1.0) / self.deviations[row]
+        below = np.arange(STRIDE)[:, None]
+        found[order + below, below + np.arange(order + 1)] = found[order, : order + 1]
+        return found
+
+    def apply(self, run: Array) -> Array:
+        """White rows of an uninterrupted run (m, k)."""
+        order, matrix = len(self.weights) - 1, self.matrix
+        first = matrix[: len(run), : len(run)] @ run[: len(matrix)]
+        rest = [
+            matrix[order : order + len(run) - start, : order + len(run) - start] @ run[start - order : start + STRIDE]
+            for start in range(len(matrix), len(run), STRIDE)
+        ]
+        return np.concatenate([first, *rest])
+
+
+class Whitening(Protocol):
+    """What turns rows of coloured noise into rows of white noise of unit variance."""
+
+    def apply(self, rows: Rows, values: Array) -> Array:
+        """Whitened copy of (n,) or (n, k)."""
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """Turns rows of coloured noise into rows of white noise of unit variance."""
+
+    predictors: tuple[Predictor, ...]
+
+    def apply(self, rows: Rows, values: Array) -> Array:
+        """Whitened copy of (n,) or (n, k)."""
+        whole = np.asarray(values, dtype=float)[:, None] if np.ndim(values) == 1 else np.asarray(values, dtype=float)
+        white, ends = np.empty_like(whole), np.flatnonzero(np.diff(rows.run, append=-1) != 0) + 1
+        for start, end in pairwise([0, *ends.tolist()]):
+            white[start:end] = self.predictors[rows.group[start]].apply(whole[start:end])
+        return white.reshape(np.shape(values))
+
+
+def row_ages(rows: Rows) -> NDArray[np.int64]:
+    """How many rows of the same run lie before each row (n,)."""
+    number = np.arange(len(rows))
+    starts = np.flatnonzero(np.diff(rows.run, prepend=-1) != 0)
+    lengths = np.diff(np.append(starts, len(rows)))
+    return np.asarray(number - np.repeat(starts, lengths))
+
+
+@dataclass(frozen=True)
+class Colour:
+    """Autocovariance of a group of rows, and how many rows it was taken from; no rows where it is not known."""
+
+    covariance: Array
+    count: int
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a model leaves of the rows.
+
+    Attributes:
+        residual: (n,).
+        fitted: how many coefficients were, what is known of them beforehand taken off.
+    """
+
+    residual: Array
+    fitted: float
+
+
+Autocovariance = Callable[[Array, NDArray[np.int64]], Array]
+"""Of a residual (n,), runs behind each other, and how many rows of its run lie before each: (ORDER + 1,)."""
+
+
+def colours_of_repeats(rows: Rows, residuals: Sequence[Array]) -> tuple[Colour, ...]:
+    """Colour of the noise in the mean over the repeats, by group, from what differs between them.
+
+    Args:
+        rows: of all blocks.
+        residuals: of every block, (N,), of any model: what repeats in them cancels.
+    """
+    groups = int(rows.group.max(initial=-1)) + 1
+    ages = row_ages(rows)
+    sums, counts, means = np.zeros((groups, ORDER + 1)), np.zeros(groups, dtype=int), np.zeros(groups)
+    for (_, kept), place, residual in zip(rows.blocks, rows.block_slices, residuals, strict=True):
+        repeats, length = kept.samples.shape
+        if repeats < 2 or length == 0:
+            continue
+        group, age = rows.group[place.start], ages[place]
+        deviations = residual[kept.samples] - residual[kept.samples].mean(axis=0)
+        for lag in range(ORDER + 1):
+            later = np.flatnonzero(age >= lag)
+            sums[group, lag] += np.sum(deviations[:, later] * deviations[:, later - lag]) / repeats
+        counts[group] += (repeats - 1) * length
+        means[group] += length
+    complete = means == np.bincount(rows.group, minlength=groups)
+    return tuple(
+        Colour(total / max(count, 1), int(count) if whole else 0)
+        for total, count, whole in zip(sums, counts, complete, strict=True)
+    )
+
+
+def fit_whitener(
+    rows: Rows,
+    residual: Array,
+    freedom_lost: float = 0.0,
+    order: int = ORDER,
+    repeats: Sequence[Colour] | None = None,
+) -> Whitener:
+    """Whitener of a residual (n,); `freedom_lost` parameters were fitted to it. Of order 0, it only scales.
+
+    `repeats` are the colours of `colours_of_repeats`; without them, only what is left has one.
+    """
+    colours = colours_of(rows, Left(residual, freedom_lost), _through_window)
+    if repeats is not None:
+        colours = [
+            known if known.count and own.covariance[0] <= PREVAILING * known.covariance[0] else own
+            for own, known in zip(colours, repeats, strict=True)
+        ]
+    return whitener_of(rows, colours, order)
+
+
+def colours_of(rows: Rows, left: Left, autocovariance: Autocovariance) -> Sequence[Colour]:
+    """Colour of what is left of every group of rows, by an estimate of the autocovariance of its runs."""
+    inflation, age = len(rows) / max(len(rows) - left.fitted, 1.0), row_ages(rows)
+    places = [np.flatnonzero(rows.group == group) for group in range(int(rows.group.max(initial=-1)) + 1)]
+    return [Colour(inflation * autocovariance(left.residual[own], age[own]), len(own)) for own in places]
+
+
+def whitener_of(rows: Rows, colours: Sequence[Colour], order: int = ORDER) -> Whitener:
+    """Whitener of noise of a colour for every group, and of what is tolerated there."""
+    tolerated = _tolerated(rows)
+    return Whitener(tuple(_predictor(one, own, order) for one, own in zip(colours, tolerated, strict=True)))
+
+
+def _tolerated(rows: Rows) -> Array:
+    """Autocovariance (G, ORDER + 1) of what is tolerated in every group: a slow process of the tolerance's variance."""
+    found = np.zeros((int(rows.group.max(initial=-1)) + 1, ORDER + 1))
+    for (block, kept), place in zip(rows.blocks, rows.block_slices, strict=True):
+        if place.stop > place.start:
+            memory = np.arange(ORDER + 1) / (kept.rate * TOLERATED_MEMORY)
+            group = rows.group[place.start]
+            found[group] = np.maximum(found[group], block.tolerance**2 * np.exp(-memory))
+    return found
+
+
+def _through_window(residual: Array, age: NDArray[np.int64]) -> Array:
+    covariance = np.empty(ORDER + 1)
+    for lag in range(ORDER + 1):
+        later = np.flatnonzero(age >= lag)
+        covariance[lag] = residual[later] @ residual[later - lag]
+    return covariance / max(len(residual), 1)
+
+
+def predictor_of(colour: Colour) -> Predictor:
+    """Of noise that has a colour."""
+    return _predictor(colour, np.zeros(ORDER + 1), ORDER)
+
+
+def _predictor(colour: Colour, tolerated: Array, order: int) -> Predictor:
+    depth = min(order, colour.count // 20)
+    covariance = colour.covariance[: depth + 1] + tolerated[: depth + 1]
+    covariance[0] = max(covariance[0] * (1 + TAPER), np.finfo(float).tiny)
+    return _levinson(covariance)
+
+
+def _levinson(covariance: Array) -> Predictor:
+    weights, variance = [np.zeros(0)], [covariance[0]]
+    for order in range(1, len(covariance)):
+        before = weights[-1]
+        reflection = (covariance[order] - before @ covariance[order - 1 : 0 : -1]) / variance[-1]
+        reflection = float(np.clip(reflection, -0.999, 0.999))
+        weights.append(np.append(before - reflection * before[::-1], reflection))
+        variance.append(variance[-1] * (1 - reflection**2))
+    return Predictor(tuple(weights), np.sqrt(np.array(variance)))

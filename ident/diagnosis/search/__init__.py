@@ -1,0 +1,1 @@
+"""The search for the set with the largest posterior, and what may stand in its places."""

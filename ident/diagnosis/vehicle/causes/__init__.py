@@ -1,0 +1,1 @@
+"""What each cause adds to the rows of the platform."""

@@ -1,0 +1,174 @@
+"""Wheels that stand askew: how much of it each kind of drive shows is decided by the contacts, not by geometry.
+
+Two sides that point to different centres cannot both roll. Where contacts give way in proportion to their slip, the
+vehicle takes the middle; where they slide with all their grip any centre between the two balances the forces across
+the wheels, and the next smaller moments decide: a side that slides also drags, and turns the vehicle towards itself.
+So in one drive it follows the side that is askew and in another the side that is not: of what the middle would be,
+it shows twice in one and not at all in the other. Every kind of drive therefore has a share of its own; over driving
+straight and turning on the spot, in which the same side drags the other way, shares are one on average.
+
+That is so of an angle that stays. What a coupling gives way by follows the traction, and has no share.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.problem import Candidate, Contribution, Variant
+from ident.plant.modes import Mode
+from ident.vehicle.geometry import Geometry
+
+Array = NDArray[np.float64]
+
+SHARE_STD: Final = 1.0
+"""Of the share of a kind of drive about one: it is between none and two [-]."""
+
+ADHESION: Final = 0.5
+"""Of the friction of the floor, and its deviation: what wheels that slide aside drag with is between none of it and dry
+concrete's [-]."""
+
+MEAN_STD: Final = 0.05
+"""Of the mean share of driving straight and turning on the spot about one [-].
+
+Dry contacts, integrated for offsets of 1 to 5 mrad of either side and sign and slips from 0.01 to 10 mm/s, have 0.93 to
+1.06 (`tests/ident/diagnosis/vehicle/causes/test_shares_of_an_askew_wheel.py`).
+"""
+
+MODES: Final = (Mode.STEERED, Mode.ROTATION, Mode.LATERAL)
+"""In which wheels roll; the shares of the first two are one on average."""
+
+APART: Final = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]])
+"""How shares of those may be apart."""
+
+RATE: Final = 4.0
+"""Rate of the wheels for which their drag is told [rad/s]."""
+
+SLOW: Final = 0.2
+"""Rate from which a dry drag is taken to be there where it is first looked for [rad/s]."""
+
+NONE: Final = float(np.finfo(float).eps)
+"""Of an offset, or of the bend of a drag, which is in proportion to the rate then: not zero, to divide by."""
+
+
+@dataclass(frozen=True)
+class Travelling:
+    """A block of a drive in which wheels roll.
+
+    Attributes:
+        mode: number of its mode in `MODES`.
+        friction: (N,) what wheels that drag as a friction of 1 Nm at each does in straight drives add to it; None for
+            rolling rows.
+        rate: (N,) of the wheels in a straight drive in which their axes are as fast [rad/s].
+    """
+
+    mode: int
+    friction: Array | None
+    rate: Array
+
+
+Blocks = Sequence[Travelling | None]
+"""What each block is of drives in which wheels roll; None for others."""
+
+
+def sliding_aside(mode: Mode, geometry: Geometry) -> float:
+    """Speed of the steering axes in a mode, over that at which the contacts roll: wheels turned aside slide with those.
+
+    Contacts stand beside the axes, and roll faster in turns.
+    """
+    if mode is not Mode.ROTATION:
+        return 1.0
+    axis = math.hypot(geometry.wheelbase, geometry.track_width) / 2
+    return axis / (axis + geometry.wheel_offset)
+
+
+def with_shares(candidate: Candidate, blocks: Blocks, dragging: float) -> Candidate:
+    """An offset of the steering that may have a share in the rolling rows of every mode, its wheels then dragging.
+
+    Behind the offset come the friction at every wheel that drags as much at `RATE` [Nm], how it bends up to that [-],
+    and by how much the share of every mode is above one.
+
+    Args:
+        candidate: linear in its one number.
+        blocks: of the drives.
+        dragging: friction at every wheel that drags as wheels do on a floor of unit friction, by the offset [Nm/rad].
+    """
+    (plain,) = candidate.variants
+    return replace(
+        candidate,
+        variants=(plain, _shared(plain, blocks)),
+        contribution=_contribution(plain, blocks),
+        expected=lambda values: _expected(values, dragging),
+    )
+
+
+def _shared(variant: Variant, blocks: Blocks) -> Variant:
+    """Its column; what drags, at any rate and by the rate; how the column is apart between the modes."""
+    if all(column is None for column in variant.columns):
+        return variant
+
+    def numbers(found: Array) -> Array:
+        offset, line, apart = found[0], found[1:3], found[3:]
+        above = APART @ apart / offset if offset else np.zeros(len(MODES))
+        return np.concatenate([[offset], _bent(*line.tolist()), above])
+
+    columns = [_joined(column, block) for column, block in zip(variant.columns, blocks, strict=True)]
+    return Variant(tuple(columns), numbers, beside=2 + APART.shape[1], itself=False)
+
+
+def _bent(dry: float, viscous: float) -> Array:
+    """Drag and bend that are about a line over the rate."""
+    drag = dry + viscous * RATE
+    part = float(np.clip(viscous * RATE / drag, 0.0, 1.0)) if drag else 0.0
+    return np.array([drag, RATE / (SLOW + 2 * part * RATE)])
+
+
+def _joined(column: Array | None, block: Travelling | None) -> Array | None:
+    there = column if column is not None or block is None else block.friction
+    if there is None:
+        return None
+    joined = np.zeros((len(there), 3 + APART.shape[1]))
+    if column is not None:
+        joined[:, :1] = column
+    if block is None:
+        return joined
+    if block.friction is not None:
+        joined[:, 1:3] = block.friction[:, None] * np.stack([np.ones_like(block.rate), block.rate], axis=1)
+    elif column is not None:
+        joined[:, 3:] = column * APART[block.mode]
+    return joined
+
+
+def _contribution(variant: Variant, blocks: Blocks) -> Contribution:
+    def contribution(values: Array, _parameters: Array) -> Sequence[Array | None]:
+        found = [None if column is None else values[0] * column[:, 0] for column in variant.columns]
+        if len(values) == 1:
+            return found
+        return [_with_share(series, block, values[1:]) for series, block in zip(found, blocks, strict=True)]
+
+    return contribution
+
+
+def _with_share(series: Array | None, block: Travelling | None, along: Array) -> Array | None:
+    drag, bend, *above = (float(number) for number in along)
+    if block is None:
+        return series
+    if block.friction is None:
+        return None if series is None else (1 + above[block.mode]) * series
+    bend = max(abs(bend), NONE)
+    dragged = drag / math.tanh(bend) * block.friction * np.tanh(bend * block.rate / RATE)
+    return dragged if series is None else series + dragged
+
+
+def _expected(values: Array, dragging: float) -> Array:
+    """How far a drag is from what wheels at that angle drag, and shares from one, in standard deviations."""
+    if len(values) == 1:
+        return np.zeros(0)
+    offset, drag, above = float(values[0]), float(values[1]), values[3:]
+    whole = ADHESION * dragging * max(abs(offset), NONE)
+    return np.concatenate([[drag / whole - 1], above / SHARE_STD, [above[:2].mean() / MEAN_STD]])

@@ -1,0 +1,40 @@
+"""Lag: by how much of a sample all torques act later, or earlier, than they are reported, as no cause explains.
+
+Torques are held over a sample, or ramp to the next one; angles are read anywhere within it; contacts yield. Which it is
+no record says, so that a part of a sample, the same at all drives, is fitted with everything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.names import EffectName
+from ident.diagnosis.vehicle.causes.context import Context
+from ident.diagnosis.vehicle.causes.contribution import contribution_of
+from ident.diagnosis.vehicle.records.sources import Source
+from ident.diagnosis.vehicle.records.transforms import transform_cause
+
+Array = NDArray[np.float64]
+
+LAG_NAME: Final = "lag"
+
+LAG_STD: Final = 0.25
+"""Standard deviation of it beforehand [samples]: a torque that is held acts half a sample late."""
+
+
+def lag_columns(sources: Sequence[Source], context: Context) -> list[Array]:
+    """What a lag of one sample adds to the rows of every block, (N,) to first order."""
+    late = contribution_of(transform_cause(EffectName.TIME_DELAY, "drives"), [True] * len(sources), sources, context)
+    probe = min(source.sample_time for source in sources) / 2
+    found: list[Array] = []
+    series = iter(late(np.array([probe]), context.parameters))
+    for source in sources:
+        for _ in source.coordinates:
+            column = next(series)
+            length = len(source.inputs[:: source.factor])
+            found.append(np.zeros(length) if column is None else column * source.sample_time / probe)
+    return found

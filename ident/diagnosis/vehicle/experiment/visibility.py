@@ -1,0 +1,180 @@
+"""What an experiment can see, split and place: rank of the causes' columns beside the baseline, from the equations."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.diagnosis.names import EffectName
+from ident.diagnosis.observations.linear import orthonormal
+from ident.diagnosis.observations.rows import Rows, make_rows
+from ident.diagnosis.problem import Channel, Problem, Variant
+from ident.diagnosis.vehicle.build import build_problem
+from ident.diagnosis.vehicle.causes.lag import LAG_NAME
+from ident.diagnosis.vehicle.experiment.ideal import DIAGNOSTIC, FOUR, Drive, ideal_record
+from ident.effects import Effect
+from ident.vehicle.description import VehicleDescription
+
+Array = NDArray[np.float64]
+
+VISIBLE: Final = 0.02
+"""Part of a column that the baseline must leave."""
+
+ALIKE: Final = 0.98
+"""Cosine of the angle between what two causes leave, from which they count as one."""
+
+RANK: Final = 1e-6
+"""Smallest singular value, relative to the largest, of a baseline column that counts."""
+
+NEGLIGIBLE: Final = 1e-3
+"""Norm of a column, over the largest one of the same cause, that means nothing."""
+
+NOISE: Final = 0.01
+"""Noise of a generalized torque, in units of its rms; that of the rolling rows is what they tolerate."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What an experiment shows of one cause.
+
+    Attributes:
+        visible: whether the baseline leaves anything of it.
+        alike: keys of other causes that look the same.
+    """
+
+    visible: bool
+    alike: tuple[str, ...]
+
+    def alike_effects(self, own: str) -> tuple[str, ...]:
+        """Names of other effects among them."""
+        return tuple(dict.fromkeys(name for key in self.alike if (name := key.partition("@")[0]) != own))
+
+
+def sights(problem: Problem) -> Mapping[str, Sight]:
+    """What the rows of a problem show of every candidate, by key; a lag absorbs no delay beyond a sample."""
+    rows = make_rows(problem)
+    scale = row_noise(rows)
+    free = [column for column, name in enumerate(problem.names) if name != LAG_NAME]
+    baseline = orthonormal(rows.baseline[:, free] / scale[:, None], RANK)
+    found = [_left(rows.columns[:, column.own] / scale[:, None], baseline) for column in rows.layout]
+    owners = [problem.candidates[column.candidate].key for column in rows.layout]
+    return {
+        candidate.key: Sight(
+            any(basis.shape[1] > 0 for basis, owner in zip(found, owners, strict=True) if owner == candidate.key),
+            _twins(candidate.key, found, owners),
+        )
+        for candidate in problem.candidates
+    }
+
+
+def row_noise(rows: Rows) -> Array:
+    """Noise (n,) of the rows, that of a vehicle that obeys the model: see NOISE."""
+    scale = np.ones(len(rows))
+    for (block, _), place in zip(rows.blocks, rows.block_slices, strict=True):
+        rms = float(np.sqrt(np.mean(rows.target[place] ** 2))) if place.stop > place.start else 1.0
+        scale[place] = block.tolerance if block.channel is Channel.KINEMATIC else NOISE * rms
+    return scale
+
+
+def _left(columns: Array, baseline: Array) -> Array:
+    """Orthonormal basis of what the baseline leaves of some columns."""
+    norms = np.linalg.norm(columns, axis=0)
+    kept = norms > NEGLIGIBLE * norms.max(initial=0.0)
+    used = columns[:, kept] / norms[kept]
+    left = used - baseline @ (baseline.T @ used)
+    # Eigenvectors of the few products: singular vectors of the many rows take ten times as long.
+    powers, turn = np.linalg.eigh(left.T @ left)
+    seen = powers > VISIBLE**2
+    return np.asarray(left @ (turn[:, seen] / np.sqrt(powers[seen])))
+
+
+def _twins(key: str, found: Sequence[Array], owners: Sequence[str]) -> tuple[str, ...]:
+    own = [basis for basis, owner in zip(found, owners, strict=True) if owner == key]
+    alike = {
+        owner
+        for basis, owner in zip(found, owners, strict=True)
+        if owner != key and any(_are_alike(mine, basis) for mine in own)
+    }
+    return tuple(sorted(alike))
+
+
+def _are_alike(first: Array, second: Array) -> bool:
+    """Whether the largest cosine of the principal angles between two spaces is near one; not where one is empty."""
+    if not (first.shape[1] and second.shape[1]):
+        return False
+    cosines = first.T @ second
+    # The Frobenius norm is no smaller, and takes no singular values.
+    return bool(np.linalg.norm(cosines) > ALIKE and np.linalg.norm(cosines, 2) > ALIKE)
+
+
+FORETOLD: Final = frozenset(EffectName) - {EffectName.PARAMETER_CHANGE, EffectName.SLIP}
+"""Effects that the equations say something of before a record is there: sliding is found in records."""
+
+
+@dataclass
+class Visibility:
+    """What every experiment shows of one vehicle, computed when it is first asked for: half a second for all effects.
+
+    Attributes:
+        vehicle: geometry is taken as true, parameters as its file guesses them.
+    """
+
+    vehicle: VehicleDescription
+    _found: dict[tuple[str, frozenset[str]], Mapping[str, Sight]] = field(default_factory=dict)
+    _plain: dict[frozenset[str], Problem] = field(default_factory=dict)
+
+    def __getitem__(self, experiment: str) -> Mapping[str, Sight]:
+        """What the four steps show together with one diagnostic experiment; without any for the name `four steps`."""
+        return self.of(experiment, FORETOLD)
+
+    def of(self, experiment: str, effects: Collection[str]) -> Mapping[str, Sight]:
+        """The same as if there were only some effects, by name."""
+        asked = experiment, frozenset(map(str, effects))
+        if asked not in self._found:
+            four, further = self.imagined(*asked)
+            self._found[asked] = sights(four if further is None else _joined(four, further))
+        return self._found[asked]
+
+    def imagined(self, experiment: str, effects: frozenset[str]) -> tuple[Problem, Problem | None]:
+        """Ideal rows of the four steps, and those that one diagnostic experiment adds; None for the four alone."""
+        extra, four = DIAGNOSTIC.get(experiment), self._four(effects)
+        return four, None if extra is None else _problem(extra.drives, extra.given, self.vehicle, effects)
+
+    def _four(self, effects: frozenset[str]) -> Problem:
+        """Of what has been made for more effects already, the part that is asked for."""
+        made = next((problem for more, problem in self._plain.items() if effects <= more), None)
+        if made is None:
+            made = self._plain[effects] = _problem(FOUR, (), self.vehicle, effects)
+        return replace(made, candidates=tuple(one for one in made.candidates if one.effect in effects))
+
+
+def _problem(
+    drives: Sequence[Drive], given: Sequence[Effect], vehicle: VehicleDescription, effects: Collection[str]
+) -> Problem:
+    # At the vehicle file's parameters: an experiment of few steps does not show all of them.
+    names = [name for name in EffectName if name in effects and name in FORETOLD]
+    problem = build_problem(
+        [ideal_record(drives, vehicle, periods=1)], vehicle, vehicle.prior, given=given, effects=names
+    )
+    return replace(problem, nominal=None)
+
+
+def _joined(first: Problem, second: Problem) -> Problem:
+    """The blocks of both, one candidate for both."""
+    candidates = tuple(
+        replace(one, variants=tuple(_behind(a, b) for a, b in zip(one.variants, other.variants, strict=True)))
+        for one, other in zip(first.candidates, second.candidates, strict=True)
+    )
+    return replace(first, blocks=(*first.blocks, *second.blocks), candidates=candidates)
+
+
+def _behind(first: Variant, second: Variant) -> Variant:
+    return replace(first, columns=(*first.columns, *second.columns))
+
+
+EXPERIMENTS: Final = ("four steps", *DIAGNOSTIC)
+"""Columns of the table: the four steps alone, then together with each diagnostic experiment."""

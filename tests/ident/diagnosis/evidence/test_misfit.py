@@ -1,0 +1,42 @@
+"""Evidence is divided by how far rows scatter beyond what their noise says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ident.diagnosis.evidence.misfit import excess_of_scatter
+
+NOTHING = np.zeros((0, 3)), np.zeros(0)
+STRETCHES = 3000
+
+
+def rows(copies: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """White columns, target and stretches, every row so many times: as if each copy had noise of its own."""
+    draw = np.random.default_rng(copies)
+    columns = draw.normal(size=(STRETCHES, 3))
+    target = columns @ [2.0, -1.0, 0.5] + draw.normal(size=STRETCHES)
+    repeated = [np.repeat(one, copies, axis=0) for one in (columns, target, np.arange(STRETCHES))]
+    return repeated[0], repeated[1], repeated[2]
+
+
+def test_rows_of_white_noise_are_taken_as_they_are() -> None:
+    white, target, stretch = rows(1)
+    ratios = excess_of_scatter(white, target, NOTHING, stretch, [slice(0, 1), slice(1, 3)])
+    assert ratios == pytest.approx([1.0, 1.0], abs=0.2)
+    assert min(ratios) >= 1.0
+
+
+@pytest.mark.parametrize("copies", [4, 10])
+def test_a_row_said_many_times_is_said_once(copies: int) -> None:
+    white, target, stretch = rows(copies)
+    ratios = excess_of_scatter(white, target, NOTHING, stretch, [slice(0, 1), slice(1, 3)])
+    assert ratios == pytest.approx([copies, copies], rel=0.25)
+
+
+def test_what_is_known_otherwise_does_not_scatter() -> None:
+    white, target, stretch = rows(10)
+    known = np.array([[1e4, 0.0, 0.0]]), np.array([2e4])
+    ratios = excess_of_scatter(white, target, known, stretch, [slice(0, 1), slice(1, 3)])
+    assert ratios[0] == pytest.approx(1.0, abs=0.01)
+    assert ratios[1] > 5
