@@ -126,6 +126,7 @@ class Share:
         channel, step, coordinate: which rows.
         region: `all`, or a part of those rows.
         share: of the power of the whole gap above the floor [-].
+        power: that is, over that of the noise of a sample, as far as it is known.
     """
 
     channel: str
@@ -133,6 +134,7 @@ class Share:
     coordinate: str
     region: str
     share: float
+    power: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -143,11 +145,13 @@ class Gap:
         before: of the model without the effects.
         after: with them, everything refitted jointly.
         floor: noise, which no model can remove.
+        samples: whose rms it is, as far as that is known.
     """
 
     before: float
     after: float
     floor: float
+    samples: int = 0
 
     @property
     def closed(self) -> float:
@@ -202,7 +206,7 @@ class Diagnosis:
         return {
             "verdict": str(self.verdict),
             "effects": [_effect(effect) for effect in self.effects],
-            "where": [vars(share) | {"share": json_number(share.share)} for share in self.where],
+            "where": [_share(share) for share in self.where],
             "gap": gap,
             "invisible": list(self.invisible),
             "next_experiment": self.next_experiment,
@@ -224,6 +228,11 @@ def write_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
         UserError: it cannot be written.
     """
     write_whole(json.dumps(diagnosis.as_json(), indent=2, allow_nan=False) + "\n", path)
+
+
+def _share(one: Share) -> dict[str, Any]:
+    places = {name: getattr(one, name) for name in ("channel", "step", "coordinate", "region")}
+    return {**places, "share": json_number(one.share)}
 
 
 def _unseen(one: Unseen) -> dict[str, Any]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +96,7 @@ def _gap(
         sums[2] += len(left)
         count += len(left)
     mean = np.sqrt(sums / count) if count else np.zeros(3)
-    return Gap(float(mean[0]), float(mean[1]), float(mean[2]))
+    return Gap(float(mean[0]), float(mean[1]), float(mean[2]), count)
 
 
 def _known(kept: Kept, told: Mask, means: bool) -> Mask:
@@ -122,12 +124,18 @@ def shares(rows: Rows, floors: Array, before: Series) -> tuple[Share, ...]:
             key = (str(block.channel), block.step, block.coordinate, region)
             # Where noise prevails, what is above it in a region can exceed what is above it in all of them.
             power[key] = power.get(key, 0.0) + min(max(float(excess[mask].sum()), 0.0), whole)
-    total = sum(value for key, value in power.items() if key[-1] == ALL)
-    found = [Share(*key, share=value / total if total > 0 else 0.0) for key, value in power.items()]
+    return shares_of([Share(*key, share=0.0, power=value) for key, value in power.items()])
+
+
+def shares_of(parts: Sequence[Share]) -> tuple[Share, ...]:
+    """Parts by their power, the largest first."""
+    total = sum(one.power for one in parts if one.region == ALL)
+    found = [replace(one, share=one.power / total if total > 0 else 0.0) for one in parts]
     return tuple(sorted(found, key=lambda share: -share.share))
 
 
-ALL = "all"
+ALL: Final = "all"
+"""Region that is all of a coordinate."""
 
 
 def repeated(rows: Rows, floors: Array, models: Series) -> Mapping[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from functools import cached_property, lru_cache, partial
 from typing import Final
@@ -49,7 +49,7 @@ class Fitter:
     def __init__(self, design: Design, colours: Colours, bends: Bends) -> None:
         self.design, self._colours, self._bends = design, colours, bends
         self._all = Products(design, colours, np.arange(design.columns.shape[1]))
-        self._kept: dict[frozenset[int], State] = {}
+        self._kept: dict[tuple[frozenset[int], frozenset[int]], State] = {}
         # The last one alone, beside that of a complete model: they are large.
         self._of_all = lru_cache(maxsize=1)(partial(Evidence, self._all))
 
@@ -86,24 +86,26 @@ class Fitter:
         hypothesis = self.design.hypotheses[index]
         return self._bends.is_bent(hypothesis, hypothesis.blocks[member.block])
 
-    def state(self, members: Members, before: State | None) -> State:
+    def state(self, members: Members, before: State | None, resting: Collection[int] = ()) -> State:
         """A set, its members' numbers fitted by turns, with the noise that they leave.
 
         Args:
             members: to begin with.
             before: a set that is nearly the same, whose noise is taken first.
+            resting: members whose held numbers stay where they were there.
         """
-        key = frozenset(members)
+        names, moved = frozenset(members), (frozenset(members), frozenset[int]())
+        key = moved if moved in self._kept else (names, names & frozenset(resting))
         if key not in self._kept:
             start = self._colours.usual if before is None else before.evidence.sizes
             products = self._products(members)
-            first = State(members, self._known(members, before), Evidence(products, start))
+            first = State(members, self._known(members, before), Evidence(products, start), key[1])
             found = self._from_both(first, any(bent.held.size for bent in first.bends.values()))
             for _ in range(SWEEPS):
                 noise = self._noise_beside(found)
                 if noise == found.evidence.sizes:
                     break
-                anew = replace(found, evidence=Evidence(products, noise), resting=frozenset())
+                anew = replace(found, evidence=Evidence(products, noise), resting=key[1])
                 found = self._from_both(anew, False)
             self._kept[key] = found
         return self._kept[key]

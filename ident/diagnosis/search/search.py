@@ -83,6 +83,7 @@ class Search:
             best = max(self._expanded(state, promises, doubted), key=lambda one: one.log_posterior, default=state)
             if best.log_posterior <= state.log_posterior:
                 return state
+            best = self.fitter.state(best.members, best)
             (index,) = best.members.keys() - state.members.keys()
             if self.fitter.odds(best, index, state) > 0:
                 return best
@@ -110,7 +111,7 @@ class Search:
                 # What is no more than its columns promises what it keeps.
                 if odds > (least if self.fitter.is_bent(index, member) else max(least, 0.0)):
                     found.setdefault(index, member)
-        return [self.fitter.state({**state.members, index: one}, state) for index, one in found.items()]
+        return [self.fitter.state({**state.members, index: one}, state, state.members) for index, one in found.items()]
 
     def _promises(self, state: State, named: bool) -> Sequence[Promises]:
         """Of all hypotheses, or of names, by the noise that is left, and by that of which nothing is lacking.
