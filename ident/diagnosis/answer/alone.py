@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.check.remainder import held_out_gap, noise_floors
-from ident.diagnosis.observations.linear import least_squares, rms
+from ident.diagnosis.observations.linear import least_squares
 from ident.diagnosis.observations.rows import Column, Rows, make_rows
 from ident.diagnosis.problem import Problem
 
@@ -69,7 +69,7 @@ class _Trial:
         left = self.rows.target - self.rows.stack(list(findings.after.blocks))
         self.floors = noise_floors(self.rows, findings.after.blocks, left)
         self.fitted = ~self.rows.confirming
-        self.weight = _weights(self.rows, left)[self.fitted]
+        self.weight = 1 / self.rows.levels(left)[self.fitted]
         self.nominal = problems[0].nominal
 
     def alone(self, columns: Sequence[Column]) -> Alone:
@@ -118,12 +118,3 @@ class _Trial:
             block.baseline @ parameters + (0.0 if part is None else part @ own)
             for (block, _), part in zip(self.rows.blocks, series, strict=True)
         ]
-
-
-def _weights(rows: Rows, left: Array) -> Array:
-    """One over the rms (n,) of what is left of the group of a row."""
-    weights = np.ones(len(rows))
-    for group in np.unique(rows.group):
-        place = rows.group == group
-        weights[place] = 1 / max(rms(left[place]), np.finfo(float).tiny)
-    return weights

@@ -15,7 +15,7 @@ from ident.diagnosis.check.generic import SmoothFunction
 from ident.diagnosis.check.refit import Refit, refit
 from ident.diagnosis.check.remainder import Told, held_out_gap, held_out_gap_of_means, noise_floors
 from ident.diagnosis.diagnosis import Gap
-from ident.diagnosis.observations.linear import least_squares, rms
+from ident.diagnosis.observations.linear import least_squares
 from ident.diagnosis.observations.regression import Regression
 from ident.diagnosis.observations.whitening import Predictor, Whitener, Whitening
 from ident.diagnosis.problem import Candidate, Problem
@@ -273,6 +273,5 @@ def _weights(regression: Regression, found: Taken) -> Whitener:
     design = np.hstack([rows.baseline, regression.columns_of(found.variants)])
     white = found.whitener.apply(rows, np.column_stack([design, rows.target]))
     residual = rows.target - design @ least_squares(white[:, :-1], white[:, -1])
-    deviations = [rms(residual[rows.group == group]) for group in np.unique(rows.group)]
-    tiny = np.finfo(float).tiny
-    return Whitener(tuple(Predictor((np.zeros(0),), np.array([max(one, tiny)])) for one in deviations))
+    _, first = np.unique(rows.group, return_index=True)
+    return Whitener(tuple(Predictor((np.zeros(0),), np.array([one])) for one in rows.levels(residual)[first]))

@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.observations.linear import rms
 from ident.diagnosis.problem import Block, Candidate, Problem
 from ident.records.repeats import repeats_of
 
@@ -109,6 +110,14 @@ class Rows:
         return [
             slice(int(end - kept.samples.shape[1]), int(end)) for end, (_, kept) in zip(ends, self.blocks, strict=True)
         ]
+
+    def levels(self, residual: Array) -> Array:
+        """Rms (n,) of what is left (n,) of the group of every row; one where nothing is."""
+        found = np.ones(len(self))
+        for group in np.unique(self.group):
+            place = self.group == group
+            found[place] = rms(residual[place]) or 1.0
+        return found
 
     def stack(self, series: Sequence[Array | None], width: int | None = None) -> Array:
         """Rows of one series a block, (N,) or (N, k); None stands for zeros."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.law.learning import Designs
-from ident.diagnosis.observations.linear import orthonormal, rms
+from ident.diagnosis.observations.linear import orthonormal
 from ident.diagnosis.observations.rows import Rows
 from ident.diagnosis.observations.whitening import Left
 from ident.diagnosis.problem import Problem
@@ -28,7 +28,7 @@ def beside_a_law(problem: Problem, rows: Rows, designs: Designs, left: Left) -> 
         designs: of its laws.
         left: what a set leaves of the rows.
     """
-    level = _levels(rows, left.residual)
+    level = rows.levels(left.residual)
     target, model = left.residual / level, orthonormal(rows.baseline / level[:, None])
     best, explained = None, 0.0
     for number, dependence in enumerate(problem.dependences):
@@ -43,12 +43,3 @@ def beside_a_law(problem: Problem, rows: Rows, designs: Designs, left: Left) -> 
     if best is None:
         return None
     return Left(level * (target - best @ (best.T @ target)), left.fitted + best.shape[1])
-
-
-def _levels(rows: Rows, residual: Array) -> Array:
-    """Rms (n,) of what is left of the group of a row."""
-    found = np.ones(len(rows))
-    for group in np.unique(rows.group):
-        place = rows.group == group
-        found[place] = rms(residual[place]) or 1.0
-    return found
