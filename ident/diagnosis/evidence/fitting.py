@@ -108,6 +108,8 @@ class Fitter:
                 anew = replace(found, evidence=Evidence(products, noise), resting=key[1])
                 found = self._from_both(anew, False)
             self._kept[key] = found
+            if not any(found.bends[index].held.size for index in key[1] & found.bends.keys()):
+                self._kept[moved] = found
         return self._kept[key]
 
     def _from_both(self, state: State, surely: bool) -> State:
