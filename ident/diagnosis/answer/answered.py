@@ -156,11 +156,17 @@ class _Answer:
     def _doubted(self) -> list[int]:
         """The member that is least likely to be there, if that is hardly.
 
-        Or a law that the fitted rows do not show by themselves, which is not among those taken.
+        Or what is hardly what stands there, whose likelier rivals have lost their places; or a law that the fitted rows
+        do not show by themselves, which is not among those taken.
         """
         nothing = {index: slot.nothing for index, slot in self.slots.items()}
-        doubted = [index for index in nothing if nothing[index] > DOUBTED or index not in self.taken.variants]
+        doubted = [index for index in nothing if self._is_doubted(index) or index not in self.taken.variants]
         return sorted(doubted, key=lambda index: -nothing[index])[:1]
+
+    def _is_doubted(self, index: int) -> bool:
+        slot = self.slots[index]
+        barred = slot.ahead(self.search.passed_over) is None
+        return slot.nothing > DOUBTED or (barred and slot.probability(self.design.hypotheses) < DOUBTED)
 
     def _sizeless(self) -> list[int]:
         """All members that are of no size of their own."""

@@ -9,10 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ident.diagnosis.answer.answered import _Answer
 from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.answer.judge import judge
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.problem import Nominal, Problem, Variant
+from ident.diagnosis.search.asked import asked_of
+from ident.diagnosis.search.search import Search
 from ident.diagnosis.search.slots import UNLISTED
 from ident.effects import EffectParameter
 
@@ -213,3 +216,25 @@ def test_what_is_known_to_come_and_go_stays_known_beside_a_cause(world: World) -
     assert named(findings) == ["a"]
     assert findings.causes[0].part.values[0] == pytest.approx(1.0, abs=0.1)
     assert findings.causes[0].part.std[0] < 0.1
+
+
+def test_what_is_hardly_what_stands_there_is_not_named_though_its_likelier_rival_has_lost_the_place(
+    world: World,
+) -> None:
+    """A column that is four fifths of the true one: much likelier than nothing, and than nothing alone."""
+
+    def blended(problem: Problem) -> Problem:
+        first, second, *rest = problem.candidates
+        (one,), (other,) = first.variants, second.variants
+        mixed = [0.6 * a + 0.8 * b for a, b in zip(one.columns, other.columns, strict=True)]
+        return replace(problem, candidates=(replace(first, variants=(Variant(tuple(mixed)),)), second, *rest))
+
+    made = world(7, true={"b": 0.5})
+    asked = asked_of((blended(made.problem(0)), blended(made.problem(1))))
+    lost = {index for index, one in enumerate(asked.design.hypotheses) if one.name == "b"}
+    search = Search(asked.fitter).without(passed_over=lost)
+    state = search.run()
+    assert [asked.design.hypotheses[index].name for index in state.members] == ["a"]
+    better = _Answer(asked, search, state, seed=1).better()
+    assert better is not None
+    assert not better[1].members

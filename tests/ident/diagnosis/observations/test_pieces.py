@@ -66,7 +66,9 @@ def test_what_two_worlds_lack_is_found_in_both_as_in_each(world: type[Any]) -> N
     found = judge(*whole, seed=1)
     each = [judge(one.problem(0), one.problem(1), seed=1) for one in (first, second)]
     assert {cause.candidate.key for cause in found.causes} == {"b@place", "d@elsewhere"}
-    np.testing.assert_allclose(found.after.baseline, np.concatenate([one.after.baseline for one in each]), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        found.after.baseline, np.concatenate([one.after.baseline for one in each]), rtol=1e-9, atol=1e-12
+    )
     np.testing.assert_allclose(found.after.blocks[2], each[1].after.blocks[0], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(found.held_out.after[3], each[1].held_out.after[1], rtol=1e-9, atol=1e-12)
     before = [one.gap.before for one in each]
