@@ -32,8 +32,8 @@ from ident.stages import Stage, untold
 
 Array = NDArray[np.float64]
 
-DOUBTED: Final = 0.05
-"""Probability of nothing in its place from which a member is none: so many false alarms are too many."""
+DOUBTED: Final = 0.5
+"""Probability of nothing in its place, or of what has lost it, from which a member is none."""
 
 EXACT: Final = 0.01
 """Share of the held-out gap that a member must close beside others, whose columns are exact to about as much."""
@@ -154,19 +154,13 @@ class _Answer:
         return search, search.further(self.slots[index].rivals[rival])
 
     def _doubted(self) -> list[int]:
-        """The member that is least likely to be there, if that is hardly.
+        """The member that is least likely to be there, if that is less likely than not.
 
-        Or what is hardly what stands there, whose likelier rivals have lost their places; or a law that the fitted rows
-        do not show by themselves, which is not among those taken.
+        Or a law that the fitted rows do not show by themselves, which is not among those taken.
         """
-        nothing = {index: slot.nothing for index, slot in self.slots.items()}
-        doubted = [index for index in nothing if self._is_doubted(index) or index not in self.taken.variants]
-        return sorted(doubted, key=lambda index: -nothing[index])[:1]
-
-    def _is_doubted(self, index: int) -> bool:
-        slot = self.slots[index]
-        barred = slot.ahead(self.search.passed_over) is None
-        return slot.nothing > DOUBTED or (barred and slot.probability(self.design.hypotheses) < DOUBTED)
+        lost = {index: slot.lost(self.search.passed_over) for index, slot in self.slots.items()}
+        doubted = [index for index in lost if lost[index] > DOUBTED or index not in self.taken.variants]
+        return sorted(doubted, key=lambda index: -lost[index])[:1]
 
     def _sizeless(self) -> list[int]:
         """All members that are of no size of their own."""
@@ -271,9 +265,10 @@ class _Answer:
 
         Of rows without repeats the noise is what the fitted ones leave: the confirming ones may say more.
         """
+        if any(SIZES[size] > MISTAKEN for size in self.state.evidence.sizes):
+            return True
         gap = self.fitted.beside_what_is_known
-        surely = any(SIZES[size] > MISTAKEN for size in self.state.evidence.sizes)
-        return surely or gap.after > math.hypot(1.0, MISTAKEN) * gap.floor
+        return not Colours.repeats(self.taken.regression) and gap.after > math.hypot(1.0, MISTAKEN) * gap.floor
 
     def _verdict(self) -> Verdict:
         if not self.taken.variants:

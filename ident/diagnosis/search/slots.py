@@ -78,6 +78,11 @@ class Slot:
         """Probability that there is nothing."""
         return math.exp(-self._whole)
 
+    def lost(self, barred: Collection[int]) -> float:
+        """Probability that there is nothing, or what may not stand there and does not add the same."""
+        others = [self.logs[one] for one in barred if one in self.logs and one not in self.alike]
+        return math.exp(float(logsumexp([0.0, *others])) - self._whole)
+
     def names(self, hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
         """Probability of every name, the most probable first."""
         found: dict[str, float] = {}
