@@ -1,7 +1,7 @@
 """Counts the constants of some packages, over syntax trees and data files: every one is a number that somebody set.
 
     python examples/counted_constants.py ident/diagnosis
-    python examples/counted_constants.py ident/diagnosis/posterior
+    python examples/counted_constants.py ident/diagnosis/search
 
 What counts, each number once wherever it stands:
 

@@ -5,8 +5,8 @@
     python examples/halved_and_doubled.py axes --cases 12 --into constants.jsonl
 
 A constant is a number, or a tuple of numbers, in capitals at the top of a module of the diagnosis. Whatever module has
-taken it from there gets the other value as well. What is computed from it when modules are imported does not follow.
-Lines that stand in the file already are not computed again.
+taken it from there gets the other value as well. What is computed from it when modules are imported, or is the default
+of an argument, does not follow. Lines that stand in the file already are not computed again.
 """
 
 from __future__ import annotations
@@ -80,15 +80,25 @@ def changed(constant: Constant, factor: float) -> Iterator[None]:
     ]
     for module in holders:
         setattr(module, constant.name, constant.times(factor))
+    _forget()
     try:
         yield
     finally:
         for module in holders:
             setattr(module, constant.name, constant.value)
+        _forget()
+
+
+def _forget() -> None:
+    """What functions of the diagnosis have kept, by the constants that were."""
+    for name, module in list(sys.modules.items()):
+        if name.startswith(ident.diagnosis.__name__):
+            for value in vars(module).values():
+                getattr(value, "cache_clear", lambda: None)()
 
 
 def first_name(findings: Findings) -> str:
-    """The first of the answer: verdict, name and place."""
+    """Name and place of the first of the answer, or the verdict where there is none."""
     if not findings.causes or not findings.verdict.explains:
         return str(findings.verdict)
     first = findings.causes[0]
@@ -102,7 +112,7 @@ def names_by(identifiers: Sequence[str], cases: Path) -> dict[str, str]:
         fit, confirm = axis_records(*((cases / f"{one}.{which}.parquet").read_bytes() for which in ("fit", "confirm")))
         try:
             found[one] = first_name(diagnose_axis([fit], [confirm], seed=1))
-        except (ArithmeticError, ValueError, IndexError, AssertionError) as error:
+        except (ArithmeticError, AssertionError, LookupError, TypeError, ValueError) as error:
             found[one] = type(error).__name__
     return found
 
@@ -130,6 +140,8 @@ def main() -> None:
     cases = asked.exam / "cases"
     identifiers = sorted({path.name.split(".")[0] for path in cases.glob("*.fit.parquet")})[: asked.cases]
     done = [json.loads(line) for line in asked.into.read_text().splitlines()] if asked.into.exists() else []
+    if any(set(line["names"]) != set(identifiers) for line in done):
+        parser.error(f"{asked.into} holds other cases: name another file, or as many cases as before.")
     usual = _kept(done, lambda: names_by(identifiers, cases), asked.into, "", 1.0, None)
     for constant in [one for one in constants_of() if asked.only in one.key]:
         for factor in FACTORS:

@@ -122,13 +122,18 @@ def _named(cause: Cause) -> NamedEffect:
     )
 
 
+def by_need(causes: Sequence[Cause]) -> list[Cause]:
+    """By the share of the held-out gap that needs them, to a half, then by evidence."""
+    return sorted(causes, key=lambda cause: (-round(2 * cause.needed), -cause.log_odds))
+
+
 def ordered(causes: Sequence[Cause]) -> tuple[Cause, ...]:
     """By the share of the held-out gap that needs them, to a half, then by evidence; none surer than those before it.
 
     What is found beside another cause is right only as far as that one is.
     """
     found: list[Cause] = []
-    for cause in sorted(causes, key=lambda cause: (-round(2 * cause.needed), -cause.log_odds)):
+    for cause in by_need(causes):
         surest = min([cause.probability, *(other.probability for other in found[-1:])])
         found.append(replace(cause, probability=surest))
     return tuple(found)

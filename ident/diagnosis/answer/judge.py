@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from ident.diagnosis.answer.answered import answer_of
-from ident.diagnosis.answer.findings import Cause, Findings, ordered
+from ident.diagnosis.answer.findings import Cause, Findings, by_need
 from ident.diagnosis.check.fitted import HeldOut
-from ident.diagnosis.check.generic import Generic
 from ident.diagnosis.check.refit import Part, Refit
 from ident.diagnosis.check.remainder import shares_of
 from ident.diagnosis.diagnosis import Gap, Verdict
@@ -23,7 +22,7 @@ from ident.stages import Stage, untold
 
 Array = NDArray[np.float64]
 
-_STRONGEST = (Verdict.LAW, Verdict.EFFECT, Verdict.UNKNOWN, Verdict.NONE)
+_STRONGEST: Final = (Verdict.LAW, Verdict.EFFECT, Verdict.UNKNOWN, Verdict.NONE)
 """Verdicts, of which that of all pieces is the first that any has."""
 
 
@@ -53,36 +52,46 @@ class _Together:
     """
 
     def __init__(self, problems: Sequence[Problem], pieces: Sequence[Piece], found: Sequence[Findings]) -> None:
-        self._problems, self._pieces, self._found = problems, pieces, found
+        self._problems, self._pieces, self._found = problems, pieces, [_as_answered(one) for one in found]
 
     def findings(self) -> Findings:
-        """Of the whole: a piece whose gap nothing explains has no causes, and its share of the gap stays."""
+        """Of the whole: a piece whose gap nothing explains has no causes, and its gap stays."""
+        explained = [one for one in self._found if one.verdict.explains]
         verdicts = {one.verdict for one in self._found}
-        causes = [
-            self._cause(piece, cause)
-            for piece, one in zip(self._pieces, self._found, strict=True)
-            if one.verdict.explains
-            for cause in one.causes
-        ]
         doubtful = {key: value for one in self._found for key, value in one.doubtful.items()}
-        names = [set(one.invisible) for one in self._found]
         return Findings(
             verdict=next(one for one in _STRONGEST if one in verdicts),
-            causes=ordered(causes),
+            causes=tuple(by_need(list(self._causes()))),
             doubtful=dict(sorted(doubtful.items(), key=lambda entry: -entry[1])),
             gap=_pooled([one.gap for one in self._found]),
             where=shares_of([share for one in self._found for share in one.where]),
-            invisible=tuple(name for name in self._found[0].invisible if all(name in each for each in names)),
+            invisible=self._invisible(),
             before=self._refit([one.before for one in self._found]),
             after=self._refit([one.after for one in self._found]),
-            nothing=max((one.nothing for one in self._found if one.nothing is not None), default=None),
-            remainder=self._remainder(),
+            nothing=max((one.nothing for one in explained if one.nothing is not None), default=None),
+            remainder=max((one.remainder for one in self._found), key=lambda rest: rest.deviations),
             lacking=any(one.lacking for one in self._found),
             repeated_before={label: value for one in self._found for label, value in one.repeated_before.items()},
             repeated_after={label: value for one in self._found for label, value in one.repeated_after.items()},
             problem=self._problems[0],
             held_out=self._held_out(),
         )
+
+    def _causes(self) -> Iterator[Cause]:
+        """Of the pieces that have some; what each closes, and is needed for, as a share of the gap of the whole."""
+        removable = [one.gap.samples * max(one.gap.before**2 - one.gap.floor**2, 0.0) for one in self._found]
+        whole = sum(removable)
+        for piece, one, part in zip(self._pieces, self._found, removable, strict=True):
+            share = part / whole if whole > 0 else 0.0
+            for cause in one.causes if one.verdict.explains else ():
+                yield replace(self._cause(piece, cause), closed=share * cause.closed, needed=share * cause.needed)
+
+    def _invisible(self) -> tuple[str, ...]:
+        """Names of candidates that no piece shows."""
+        names = [{str(one.effect) for one in piece.problems[0].candidates} for piece in self._pieces]
+        shown = set().union(*(own - set(one.invisible) for own, one in zip(names, self._found, strict=True)))
+        every = dict.fromkeys(str(one.effect) for one in self._problems[0].candidates)
+        return tuple(name for name in every if name not in shown)
 
     def _cause(self, piece: Piece, cause: Cause) -> Cause:
         """Among the dependences, and in the blocks, of the whole."""
@@ -133,11 +142,18 @@ class _Together:
             after=self._models([(place, one.after) for place, one in zip(places, held, strict=True)]),
         )
 
-    def _remainder(self) -> Generic:
-        """Deviations of independent pieces add up like their noise; rows of the pieces one after the other."""
-        rest = [one.remainder for one in self._found]
-        deviations = sum(one.deviations for one in rest) / math.sqrt(len(rest))
-        return Generic(deviations, np.concatenate([one.prediction for one in rest]))
+
+def _as_answered(found: Findings) -> Findings:
+    """What nothing explains is left as it was without its causes, which are not believed."""
+    if found.verdict.explains:
+        return found
+    held = found.held_out
+    return replace(
+        found,
+        gap=replace(found.gap, after=found.gap.before),
+        after=found.before,
+        held_out=replace(held, extended=held.plain, after=held.before),
+    )
 
 
 def _pooled(gaps: Sequence[Gap]) -> Gap:

@@ -92,7 +92,7 @@ class Fitter:
         Args:
             members: to begin with.
             before: a set that is nearly the same, whose noise is taken first.
-            resting: members whose held numbers stay where they were there.
+            resting: members whose held numbers are not moved from where they were there, or from those of the columns.
         """
         names, moved = frozenset(members), (frozenset(members), frozenset[int]())
         key = moved if moved in self._kept else (names, names & frozenset(resting))
@@ -108,7 +108,7 @@ class Fitter:
                 anew = replace(found, evidence=Evidence(products, noise), resting=key[1])
                 found = self._from_both(anew, False)
             self._kept[key] = found
-            if not any(found.bends[index].held.size for index in key[1] & found.bends.keys()):
+            if not any(self.is_bent(index, found.members[index]) for index in key[1]):
                 self._kept[moved] = found
         return self._kept[key]
 

@@ -29,7 +29,7 @@ class State:
         members: by number.
         bends: what the columns of a member miss of it, by number.
         evidence: with the noise that is most likely beside them.
-        resting: members whose held numbers are where the rows want them.
+        resting: members whose held numbers are where the rows want them, or are not to be moved.
     """
 
     members: Members

@@ -90,8 +90,9 @@ def next_experiment(findings: Findings, driven: Driven, visibility: Visibility) 
     best = next(name for name, each in told.items() if sum(each) > (1 - AS_MUCH) * most)
     aims = [doubt.aim for doubt, bits in zip(doubts, told[best], strict=False) if bits > AS_MUCH * most]
     seen = [name for name in sorted(hidden) if _seen(name, visibility.of(best, hidden))]
-    aims += [f"to see {' and '.join(seen)} as well"] if seen else []
-    aim = " and ".join(aims or [doubts[int(np.argmax(told[best][: len(doubts)]))].aim])
+    if seen or not aims:
+        aims.append(f"to see {' and '.join(seen or sorted(hidden))} as well" if hidden else doubts[0].aim)
+    aim = " and ".join(aims)
     return f"{aim[0].upper()}{aim[1:]}: {DIAGNOSTIC[best].advice} (expected to tell {most:.2g} bit)."
 
 
@@ -161,7 +162,7 @@ def _told_by(
     imagined = Imagined(four, further, np.append(values, np.zeros(len(four.names) - len(values))))
     found = []
     for doubt in doubts:
-        mean = imagined.exactly(doubt.key, doubt.values)
+        mean = imagined.found(doubt.key, doubt.values)
         others = {key: imagined.like(mean, key) for key in doubt.probabilities if key != doubt.key}
         found.append(imagined.information(doubt.probabilities, {doubt.key: mean, **others}))
     if hidden:
@@ -171,7 +172,7 @@ def _told_by(
 
 
 def _prior(keys: Sequence[str]) -> dict[str, float]:
-    """Of some causes and of nothing: every name as likely, of a name every place (`posterior.hypotheses`)."""
+    """Of some causes and of nothing: every name as likely, of a name every place (`hypotheses`)."""
     places = Counter(key.partition("@")[0] for key in keys)
     odds = {NOTHING: 1.0, **{key: 1 / (len(EffectName) * places[key.partition("@")[0]]) for key in keys}}
     return {key: one / sum(odds.values()) for key, one in odds.items()}

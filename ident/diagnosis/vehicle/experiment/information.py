@@ -77,8 +77,14 @@ class Imagined:
         unit = abs(float(candidate.variants[column.variant].numbers(np.eye(column.width)[0])[0]))
         return self._over_noise(self._rows.columns[:, column.place.start] * candidate.usual / unit)
 
-    def exactly(self, key: str, values: Array) -> Array:
-        """(n + m,) what a cause adds, by its parameters (k,)."""
+    def found(self, key: str, values: Array) -> Array:
+        """(n + m,) what the columns of a cause add that is as like as can be to it, by its parameters (k,).
+
+        What these miss of its exact form would tell the cause from itself.
+        """
+        return self.like(self._exactly(key, values), key)
+
+    def _exactly(self, key: str, values: Array) -> Array:
         both = [problem.candidate(key) for problem in (self.four, self.further)]
         if all(one.contribution is not None for one in both):
             return self._over_noise(self._rows.stack(contributions_of(both, values, self.parameters)))
@@ -90,21 +96,24 @@ class Imagined:
         """(n + m,) what a cause adds that is, in the four steps, as like a mean (n + m,) as it can be."""
         best, least = np.zeros(len(mean)), np.inf
         for own in self._spaces(key):
-            beside = np.hstack([self._baseline, own])[self._old]
+            # Of what the four steps do not show they say nothing.
+            norms = np.linalg.norm(own[self._old], axis=0), np.linalg.norm(own, axis=0)
+            shown = own[:, norms[0] > NEGLIGIBLE * norms[1]]
+            beside = np.hstack([self._baseline, shown])[self._old]
             scale = np.maximum(np.linalg.norm(beside, axis=0), np.finfo(float).tiny)
             found = np.linalg.lstsq(beside / scale, mean[self._old], rcond=None)[0] / scale
             left = float(np.sum((mean[self._old] - beside @ found) ** 2))
             if left < least:
-                best, least = own @ found[self._baseline.shape[1] :], left
+                best, least = shown @ found[self._baseline.shape[1] :], left
         return best
 
     def _separations(self, means: Array, key: str) -> Array:
         """(k,) what the further rows leave of means (n + m, k) by another cause, beyond what the four steps leave."""
-        left = []
-        for own in self._spaces(key) or [np.zeros((len(means), 0))]:
-            columns = np.hstack([self._baseline, own])
-            left.append(_left_of(means, columns) - _left_of(means[self._old], columns[self._old]))
-        return np.asarray(np.maximum(np.min(left, axis=0), 0.0))
+        spaces = self._spaces(key) or [np.zeros((len(means), 0))]
+        columns = [np.hstack([self._baseline, own]) for own in spaces]
+        whole = np.min([_left_of(means, each) for each in columns], axis=0)
+        old = np.min([_left_of(means[self._old], each[self._old]) for each in columns], axis=0)
+        return np.asarray(np.maximum(whole - old, 0.0))
 
     def _spaces(self, key: str) -> list[Array]:
         """Columns (n + m, k) of every variant of a cause, without those that are rounding."""

@@ -87,16 +87,53 @@ def test_a_piece_that_nothing_explains_does_not_take_the_causes_of_another(world
     assert found.lacking
 
 
-def test_every_axis_of_a_robot_is_a_piece_whatever_moves_in_its_rows(machine: Make) -> None:
+def test_of_two_records_of_two_axes_everything_stands_in_its_own_block(machine: Make) -> None:
+    """Blocks of the pieces lie between each other, and parameters of the baseline as well."""
+    made = machine(follower=(15.0, 3.0))
+    fit, confirm = [made.drive(11), made.drive(13)], [made.drive(12)]
+    problems = pose_axis(fit, confirm, axis_reference(fit, None, confirm))
+    pieces = pieces_of(problems)
+    assert [piece.blocks for piece in pieces] == [((0, 2), (0,)), ((1, 3), (1,))]
+    assert "coupled_friction@axis_1<2" in {one.key for one in pieces[0].problems[0].candidates}
+    found = judge(*problems, seed=1)
+    assert "coupled_friction@axis_1<2" in {cause.candidate.key for cause in found.causes}
+    blocks = [block for problem in problems for block in problem.blocks]
+    for block, model in zip(blocks, found.after.blocks, strict=True):
+        left = (block.target - model)[block.moving]
+        assert np.std(left) < 0.1 * np.std(block.target[block.moving])
+    for block, model in zip(problems[1].blocks, found.held_out.after, strict=True):
+        assert np.std((block.target - model)[block.moving]) < 0.1 * np.std(block.target[block.moving])
+    for block, before in zip(blocks, found.before.blocks, strict=True):
+        # Causes of a piece are in its blocks alone, so that without them the model is its own baseline.
+        assert np.allclose(before, block.baseline @ found.before.baseline)
+    for cause in found.causes:
+        axis = int(cause.candidate.where.removeprefix("axis_")[0]) - 1
+        assert all(added is None for added in cause.part.added[1 - axis :: 2])
+
+
+def test_what_a_cause_adds_in_its_piece_is_what_it_adds_in_the_whole(machine: Make) -> None:
     made = machine(follower=(15.0, 3.0))
     fit, confirm = [made.drive(11)], [made.drive(12)]
-    pieces = pieces_of(pose_axis(fit, confirm, axis_reference(fit, None, confirm)))
-    assert len(pieces) == len(fit[0].axes) == 2
-    assert "coupled_friction@axis_1<2" in {one.key for one in pieces[0].problems[0].candidates}
-    for piece in pieces:
-        (block,) = piece.problems[0].blocks
+    problems = pose_axis(fit, confirm, axis_reference(fit, None, confirm))
+    for piece in pieces_of(problems):
+        (number,) = piece.blocks[0]
         for candidate in piece.problems[0].candidates:
-            if candidate.contribution is not None:
-                values = candidate.variants[0].numbers(np.full(np.shape(candidate.variants[0].columns[0])[1], 1e-3))
+            if candidate.contribution is not None and candidate.variants[0].columns[0] is not None:
+                values = candidate.variants[0].numbers(np.full(candidate.variants[0].columns[0].shape[1], 1e-3))
+                whole = problems[0].candidate(candidate.key).contribution
+                assert whole is not None
                 (added,) = candidate.contribution(values, np.ones(len(piece.parameters)))
-                assert added is None or len(added) == len(block.target)
+                expected = whole(values, np.ones(len(problems[0].names)))[number]
+                np.testing.assert_array_equal(added, expected)
+
+
+def test_a_name_is_invisible_if_no_piece_that_has_it_shows_it(world: type[Any]) -> None:
+    first, second = world(seed=2), world(seed=3, names=("a", "b", "gone"))
+
+    def absorbed(problem: Problem) -> Problem:
+        columns = tuple(block.baseline[:, :1] for block in problem.blocks)
+        hidden = [replace(one, variants=(Variant(columns),)) for one in problem.candidates if one.effect == "gone"]
+        return replace(problem, candidates=(*(one for one in problem.candidates if one.effect != "gone"), *hidden))
+
+    whole = [beside(first.problem(part), absorbed(second.problem(part))) for part in (0, 1)]
+    assert judge(*whole, seed=1).invisible == ("gone",)

@@ -58,7 +58,7 @@ def told(experiment: str, key: str, values: list[float], other: str) -> float:
     assert further is not None
     parameters = np.append(VISIBILITY.vehicle.prior.values, np.zeros(len(four.names) - 11))
     imagined = Imagined(four, further, parameters)
-    mean = imagined.exactly(key, np.array(values))
+    mean = imagined.found(key, np.array(values))
     return imagined.information({key: 0.5, other: 0.5}, {key: mean, other: imagined.like(mean, other)})
 
 
@@ -83,3 +83,18 @@ def test_a_bias_of_a_motor_is_nowhere_told_from_asymmetric_friction_of_its_wheel
 def test_a_smaller_effect_is_told_less() -> None:
     large, small = (told("torque dither", "torque_gain@drive_fl", [gain], NOTHING) for gain in (0.05, 0.002))
     assert 0 <= small < large
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("elasticity@drive_fl", [3e-4]),
+        ("time_delay@drive_fl", [0.01]),
+        ("torque_filter@drive_fl", [0.01]),
+        ("stribeck@steering_left", [3.0, 0.3]),
+    ],
+)
+def test_a_cause_whose_columns_are_not_all_of_it_is_not_told_from_itself(key: str, values: list[float]) -> None:
+    """No experiment tells more than what is not known: a bit, of two that are as likely."""
+    for experiment in ("wheels lifted", "torque dither", "several speeds"):
+        assert told(experiment, key, values, NOTHING) <= 1 + 1e-9
