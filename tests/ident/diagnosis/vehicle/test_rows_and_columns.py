@@ -92,6 +92,31 @@ def test_dynamic_rows_are_those_of_the_estimator(vehicle: VehicleDescription) ->
         assert np.allclose(block.target[kept], equations.torque[::step][kept], atol=2e-3 * loudest)
 
 
+def test_what_holds_a_joint_that_sticks_is_in_no_row_beside_it(vehicle: VehicleDescription) -> None:
+    """A jerk of one motor where the steering turns round, and where it moves; a 23rd was left before it was taken out."""
+    record = ideal_record(FOUR, vehicle)
+
+    def jerked(after: int) -> Flaw:
+        def flaw(segment: Segment) -> Segment:
+            if segment.step != Step.STEERING_LEFT:
+                return segment
+            rate = np.gradient(segment.steering_angles[:, 0], segment.time)
+            turns = np.flatnonzero(np.diff(np.sign(rate)) != 0) + after
+            torques = segment.motor_torques.copy()
+            torques[turns[turns < len(torques)], 0] += 1.0
+            return replace(segment, motor_torques=torques)
+
+        return flaw
+
+    def change(after: int) -> float:
+        made = [problem_of(one, vehicle).blocks for one in (record, flawed(record, jerked(after)))]
+        pairs = zip(*made, strict=True)
+        of_step = [pair for pair in pairs if (pair[0].channel, pair[0].step) == (Channel.DYNAMIC, "steering_left")]
+        return max(float(np.abs(one.target - other.target)[one.moving].max()) for one, other in of_step)
+
+    assert change(0) < 0.002 * change(60)
+
+
 def test_a_bias_of_one_motor_is_found_at_its_drive(vehicle: VehicleDescription) -> None:
     def flaw(segment: Segment) -> Segment:
         return replace(segment, motor_torques=segment.motor_torques - np.array([0, 0.05, 0, 0]))
