@@ -93,7 +93,7 @@ def test_dynamic_rows_are_those_of_the_estimator(vehicle: VehicleDescription) ->
 
 
 def test_what_holds_a_joint_that_sticks_is_in_no_row_beside_it(vehicle: VehicleDescription) -> None:
-    """A jerk of one motor where the steering turns round, and where it moves; a 23rd was left before it was taken out."""
+    """A jerk of one motor where the steering turns round, and where it moves."""
     record = ideal_record(FOUR, vehicle)
 
     def jerked(after: int) -> Flaw:
