@@ -78,13 +78,16 @@ class _Together:
         )
 
     def _causes(self) -> Iterator[Cause]:
-        """Of the pieces that have some; what each closes, and is needed for, as a share of the gap of the whole."""
+        """Of the pieces that have some; how much each is needed is a share of the gap of the whole.
+
+        What it closes is one of the gap where it acts, as of any cause.
+        """
         removable = [one.gap.samples * max(one.gap.before**2 - one.gap.floor**2, 0.0) for one in self._found]
         whole = sum(removable)
         for piece, one, part in zip(self._pieces, self._found, removable, strict=True):
             share = part / whole if whole > 0 else 0.0
             for cause in one.causes if one.verdict.explains else ():
-                yield replace(self._cause(piece, cause), closed=share * cause.closed, needed=share * cause.needed)
+                yield replace(self._cause(piece, cause), needed=share * cause.needed)
 
     def _invisible(self) -> tuple[str, ...]:
         """Names of candidates that no piece shows."""
