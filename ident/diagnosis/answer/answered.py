@@ -191,7 +191,7 @@ class _Answer:
         return self._closing_least(widened) if self._measurable() else []
 
     def _needless(self) -> list[int]:
-        """The member that closes least of the held-out gap, if that is next to nothing beside others, or of a gap."""
+        """The member that closes least, if that is next to nothing beside others, or where there is a gap to close."""
         trifles = [place for place in range(self.fitted.count) if not self._pays(place)]
         return self._closing_least(trifles) if self.fitted.count > 1 or self._measurable() else []
 

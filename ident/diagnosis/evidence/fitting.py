@@ -94,8 +94,8 @@ class Fitter:
             before: a set that is nearly the same, whose noise is taken first.
             resting: members whose held numbers are not moved from where they were there, or from those of the columns.
         """
-        names, moved = frozenset(members), (frozenset(members), frozenset[int]())
-        key = moved if moved in self._kept else (names, names & frozenset(resting))
+        numbers, moved = frozenset(members), (frozenset(members), frozenset[int]())
+        key = moved if moved in self._kept else (numbers, numbers & frozenset(resting))
         if key not in self._kept:
             start = self._colours.usual if before is None else before.evidence.sizes
             products = self._products(members)

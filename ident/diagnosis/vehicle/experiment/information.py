@@ -20,6 +20,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.observations.linear import least_squares
 from ident.diagnosis.observations.rows import Column, Rows, make_rows
 from ident.diagnosis.problem import Problem, contributions_of
 from ident.diagnosis.vehicle.experiment.visibility import NEGLIGIBLE, RANK, row_noise
@@ -70,7 +71,7 @@ class Imagined:
 
     def usual(self, key: str) -> Array:
         """(n + m,) what a cause of the size that it has in practice adds."""
-        shown = [] if key == NOTHING else [column for column in self._columns(key) if column.width]
+        shown = [column for column in self._columns(key) if column.width]
         if not shown:
             return np.zeros(len(self._baseline))
         candidate, column = self.four.candidate(key), shown[0]
@@ -100,8 +101,7 @@ class Imagined:
             norms = np.linalg.norm(own[self._old], axis=0), np.linalg.norm(own, axis=0)
             shown = own[:, norms[0] > NEGLIGIBLE * norms[1]]
             beside = np.hstack([self._baseline, shown])[self._old]
-            scale = np.maximum(np.linalg.norm(beside, axis=0), np.finfo(float).tiny)
-            found = np.linalg.lstsq(beside / scale, mean[self._old], rcond=None)[0] / scale
+            found = least_squares(beside, mean[self._old])
             left = float(np.sum((mean[self._old] - beside @ found) ** 2))
             if left < least:
                 best, least = shown @ found[self._baseline.shape[1] :], left
@@ -117,14 +117,13 @@ class Imagined:
 
     def _spaces(self, key: str) -> list[Array]:
         """Columns (n + m, k) of every variant of a cause, without those that are rounding."""
-        columns = [] if key == NOTHING else self._columns(key)
-        made = [self._over_noise(self._rows.columns[:, column.own]) for column in columns]
+        made = [self._over_noise(self._rows.columns[:, column.own]) for column in self._columns(key)]
         norms = [np.linalg.norm(own, axis=0) for own in made]
         return [own[:, norm > NEGLIGIBLE * norm.max(initial=0.0)] for own, norm in zip(made, norms, strict=True)]
 
     def _columns(self, key: str) -> list[Column]:
-        keys = [candidate.key for candidate in self.four.candidates]
-        return [column for column in self._rows.layout if column.candidate == keys.index(key)]
+        """Of every variant of a cause; of nothing there are none."""
+        return [column for column in self._rows.layout if self.four.candidates[column.candidate].key == key]
 
     def _over_noise(self, series: Array) -> Array:
         """Series (n, ...) in units of the noise, of which nothing is known beside the rows."""

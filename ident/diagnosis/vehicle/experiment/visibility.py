@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.observations.linear import orthonormal
 from ident.diagnosis.observations.rows import Rows, make_rows
-from ident.diagnosis.problem import Channel, Problem, Variant
+from ident.diagnosis.problem import Channel, Problem
 from ident.diagnosis.vehicle.build import build_problem
 from ident.diagnosis.vehicle.causes.lag import LAG_NAME
 from ident.diagnosis.vehicle.experiment.ideal import DIAGNOSTIC, FOUR, Drive, ideal_record
@@ -54,9 +54,9 @@ class Sight:
         return tuple(dict.fromkeys(name for key in self.alike if (name := key.partition("@")[0]) != own))
 
 
-def sights(problem: Problem) -> Mapping[str, Sight]:
-    """What the rows of a problem show of every candidate, by key; a lag absorbs no delay beyond a sample."""
-    rows = make_rows(problem)
+def sights(problem: Problem, further: Problem | None = None) -> Mapping[str, Sight]:
+    """What rows of one problem, or two, show of every candidate, by key; a lag absorbs no delay beyond a sample."""
+    rows = make_rows(problem, further)
     scale = row_noise(rows)
     free = [column for column, name in enumerate(problem.names) if name != LAG_NAME]
     baseline = orthonormal(rows.baseline[:, free] / scale[:, None], RANK)
@@ -125,7 +125,7 @@ class Visibility:
 
     vehicle: VehicleDescription
     _found: dict[tuple[str, frozenset[str]], Mapping[str, Sight]] = field(default_factory=dict)
-    _plain: dict[frozenset[str], Problem] = field(default_factory=dict)
+    _plain: dict[tuple[Drive, ...], dict[frozenset[str], Problem]] = field(default_factory=dict)
 
     def __getitem__(self, experiment: str) -> Mapping[str, Sight]:
         """What the four steps show together with one diagnostic experiment; without any for the name `four steps`."""
@@ -135,21 +135,21 @@ class Visibility:
         """The same as if there were only some effects, by name."""
         asked = experiment, frozenset(map(str, effects))
         if asked not in self._found:
-            four, further = self.imagined(*asked)
-            self._found[asked] = sights(four if further is None else _joined(four, further))
+            self._found[asked] = sights(*self.imagined(*asked))
         return self._found[asked]
 
     def imagined(self, experiment: str, effects: frozenset[str]) -> tuple[Problem, Problem | None]:
         """Ideal rows of the four steps, and those that one diagnostic experiment adds; None for the four alone."""
-        extra, four = DIAGNOSTIC.get(experiment), self._four(effects)
-        return four, None if extra is None else _problem(extra.drives, extra.given, self.vehicle, effects)
+        four, further = self._made(FOUR, (), effects), DIAGNOSTIC.get(experiment)
+        return four, None if further is None else self._made(further.drives, further.given, effects)
 
-    def _four(self, effects: frozenset[str]) -> Problem:
+    def _made(self, drives: Sequence[Drive], given: Sequence[Effect], effects: frozenset[str]) -> Problem:
         """Of what has been made for more effects already, the part that is asked for."""
-        made = next((problem for more, problem in self._plain.items() if effects <= more), None)
-        if made is None:
-            made = self._plain[effects] = _problem(FOUR, (), self.vehicle, effects)
-        return replace(made, candidates=tuple(one for one in made.candidates if one.effect in effects))
+        made = self._plain.setdefault(tuple(drives), {})
+        more = next((problem for names, problem in made.items() if effects <= names), None)
+        if more is None:
+            more = made[effects] = _problem(drives, given, self.vehicle, effects)
+        return replace(more, candidates=tuple(one for one in more.candidates if one.effect in effects))
 
 
 def _problem(
@@ -161,19 +161,6 @@ def _problem(
         [ideal_record(drives, vehicle, periods=1)], vehicle, vehicle.prior, given=given, effects=names
     )
     return replace(problem, nominal=None)
-
-
-def _joined(first: Problem, second: Problem) -> Problem:
-    """The blocks of both, one candidate for both."""
-    candidates = tuple(
-        replace(one, variants=tuple(_behind(a, b) for a, b in zip(one.variants, other.variants, strict=True)))
-        for one, other in zip(first.candidates, second.candidates, strict=True)
-    )
-    return replace(first, blocks=(*first.blocks, *second.blocks), candidates=candidates)
-
-
-def _behind(first: Variant, second: Variant) -> Variant:
-    return replace(first, columns=(*first.columns, *second.columns))
 
 
 EXPERIMENTS: Final = ("four steps", *DIAGNOSTIC)
