@@ -8,16 +8,15 @@ cause is unknown by a factor: every one between what the rows could just show an
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
-from scipy.special import logsumexp
 
+from ident.diagnosis.evidence.tables import Member, Members, Table, tables_of
 from ident.diagnosis.hypotheses.bends import Bent
 from ident.diagnosis.hypotheses.gram import Beside, Gram
 from ident.diagnosis.hypotheses.hypotheses import Block
@@ -31,70 +30,6 @@ OCTAVES: Final = 1.0
 
 LARGEST: Final = 100.0
 """Scale, in units of the noise, that is tried at most."""
-
-
-@dataclass(frozen=True)
-class Member:
-    """A hypothesis that is taken, at the numbers that make its evidence largest: its block, and its scale."""
-
-    block: int
-    scale: float
-
-
-Members = Mapping[int, Member]
-"""By number of the hypothesis."""
-
-
-@dataclass(frozen=True)
-class Table:
-    """Evidence of one hypothesis, beside others.
-
-    Attributes:
-        scales: (S,) tried.
-        logs: (G, S) log evidence against its absence, by its numbers and scale, the prior mass of each included.
-        occam: (G, S) of those, what integrating the coefficients costs.
-        masses: (G,) log of the prior masses.
-        blocks: (G,) numbers of the blocks.
-    """
-
-    scales: Array
-    logs: Array
-    occam: Array
-    masses: Array
-    blocks: Sequence[int]
-
-    @property
-    def total(self) -> float:
-        """Log evidence, numbers and scale integrated."""
-        return float(logsumexp(self.logs)) if self.is_there else -math.inf
-
-    @property
-    def is_there(self) -> bool:
-        """Whether it can be there at all."""
-        return bool(np.isfinite(self.logs).any())
-
-    @cached_property
-    def _peak(self) -> tuple[int, int]:
-        row, column = np.unravel_index(int(np.argmax(self.logs)), self.logs.shape)
-        return int(row), int(column)
-
-    @property
-    def best(self) -> Member:
-        """The numbers with the largest evidence."""
-        row, column = self._peak
-        return Member(self.blocks[row], float(self.scales[column]))
-
-    @property
-    def inside(self) -> float:
-        """What integrating adds to the log likelihood at the best numbers, and what those cost."""
-        if not self.is_there:
-            return -math.inf
-        return self.total - float(self.logs[self._peak]) + float(self.masses[self._peak[0]])
-
-    @property
-    def cost(self) -> float:
-        """What the log evidence is below the log likelihood ratio at the best numbers."""
-        return float(self.occam[self._peak]) - self.inside
 
 
 class Evidence:
@@ -136,7 +71,7 @@ class Evidence:
         """Log evidence of a hypothesis beside nothing, and beside what acts in other rows."""
         if hypothesis not in self._alone:
             blocks, target = self.design.hypotheses[hypothesis].blocks, self.target_beside(())
-            self._alone[hypothesis] = target.table_by(blocks, target.beside({}), range(len(blocks)))
+            (self._alone[hypothesis],) = target.tables_by([blocks], target.beside({}))
         return self._alone[hypothesis]
 
     def parameters(self, added: Array) -> Array:
@@ -222,54 +157,27 @@ class Target:
             return self.table(hypothesis, self.beside(others))
         # What is expected of it stands in its products already.
         block = replace(self.evidence.design.hypotheses[hypothesis].blocks[only], expected=None)
-        return self.table_by([block], self.beside(others), (only,))
+        (table,) = self.tables_by([[block]], self.beside(others))
+        return replace(table, blocks=(only,))
 
     def table(self, hypothesis: int, products: Beside) -> Table:
         """The same, by the products of all columns beside the others."""
-        blocks, at = self.evidence.design.hypotheses[hypothesis].blocks, self.evidence.products.at
-        if all(products.untouched[at(block.place)].all() for block in blocks):
-            return self.evidence.alone(hypothesis)
-        return self.table_by(blocks, products, range(len(blocks)))
+        return self.tables([hypothesis], products)[hypothesis]
 
-    def table_by(self, blocks: Sequence[Block], products: Beside, numbers: Sequence[int]) -> Table:
-        """The same of some blocks with these numbers."""
-        masses = np.array([self._mass(block) for block in blocks])
-        made = [self._logs(block, self.evidence.products.at(block.place), products) for block in blocks]
-        logs, occam = (np.stack(parts) for parts in zip(*made, strict=True))
-        return Table(self.evidence.scales, logs + masses[:, None], occam, masses, numbers)
+    def tables(self, hypotheses: Sequence[int], products: Beside) -> dict[int, Table]:
+        """Of some hypotheses, all together; what the others do not touch has been looked at before."""
+        at, every = self.evidence.products.at, self.evidence.design.hypotheses
+        alone = {
+            one for one in hypotheses if all(products.untouched[at(block.place)].all() for block in every[one].blocks)
+        }
+        made = self.tables_by([every[one].blocks for one in hypotheses if one not in alone], products)
+        rest = iter(made)
+        return {one: self.evidence.alone(one) if one in alone else next(rest) for one in hypotheses}
 
-    def _mass(self, block: Block) -> float:
-        """Log of the prior mass of a block at one scale."""
-        count = max(int(np.sum(self.evidence.scales <= block.largest)), 1)
-        return block.weight - math.log(count) + (math.log(2) if block.least == 0 else 0.0)
-
-    def _logs(self, block: Block, place: slice, products: Beside) -> tuple[Array, Array]:
-        """(S,) of one block, whose columns stand at a place of the products, and what integrating costs."""
-        squares = self.evidence.scales[:, None] ** 2
-        impossible, beyond = (np.full(len(squares), -math.inf), np.zeros(len(squares))), 0.0
-        inner, along = products.of(place, place), products.with_target(place)
-        if block.factor.shape == (1, 1):
-            power, amplitude = max(float(inner[0, 0]), 0.0), float(along[0])
-            nothing = power <= np.finfo(float).eps * len(self.evidence.design.target)
-            if nothing or _is_refused(block, power, amplitude):
-                return impossible
-            slope, expected, beyond = block.expected_of(amplitude)
-            powers, amplitudes = np.array([power + slope**2]), np.array([amplitude + slope * expected])
-        else:
-            powers, turn = np.linalg.eigh(block.factor.T @ inner @ block.factor)
-            powers, amplitudes = np.maximum(powers, 0.0), turn.T @ (block.factor.T @ along)
-            if block.least == 0 and self._is_negative(turn, powers, amplitudes):
-                return impossible
-        ratios = 0.5 * np.sum(squares / (1 + squares * powers) * amplitudes**2, axis=1)
-        occam = 0.5 * np.sum(np.log1p(squares * powers), axis=1)
-        allowed = self.evidence.scales <= max(block.largest, self.evidence.scales[0])
-        return np.where(allowed, ratios - occam - beyond, -math.inf), occam
-
-    @staticmethod
-    def _is_negative(turn: Array, powers: Array, amplitudes: Array) -> bool:
-        """Whether the first of some coefficients, which is the effect's own, is below zero, by rows alone."""
-        told = powers > np.finfo(float).eps * powers.max(initial=0.0)
-        return float(turn[0, told] @ (amplitudes[told] / powers[told])) <= 0
+    def tables_by(self, blocks: Sequence[Sequence[Block]], products: Beside) -> list[Table]:
+        """The same by some blocks of each."""
+        evidence = self.evidence
+        return tables_of(blocks, evidence.products.at, products, evidence.scales, len(evidence.design.target))
 
     def _block(self, index: int, member: Member) -> Block:
         return self.evidence.design.hypotheses[index].blocks[member.block]
@@ -288,10 +196,3 @@ class Target:
             part[among(columns, place)] = one.scale * factor
             parts.append(part)
         return np.hstack(parts), columns
-
-
-def _is_refused(block: Block, power: float, amplitude: float) -> bool:
-    """Whether a single coefficient is what the hypothesis is not: of the other sign, or too small to mean it."""
-    size = amplitude / power / float(block.sizes[0])
-    negative, positive = block.negligible
-    return size <= block.least or -negative <= size < 0 or 0 < size <= positive

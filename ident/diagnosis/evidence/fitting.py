@@ -11,9 +11,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.evidence.evidence import Evidence, Member, Members
+from ident.diagnosis.evidence.evidence import Evidence
 from ident.diagnosis.evidence.misfit import excess_of_scatter, tempered
 from ident.diagnosis.evidence.state import State
+from ident.diagnosis.evidence.tables import Member, Members
 from ident.diagnosis.hypotheses.bends import Bends, Bent, Form
 from ident.diagnosis.hypotheses.hypotheses import Block, Design
 from ident.diagnosis.hypotheses.products import Products, numbers_of

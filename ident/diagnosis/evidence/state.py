@@ -11,7 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.evidence.evidence import Evidence, Member, Members, Table, Target
+from ident.diagnosis.evidence.evidence import Evidence, Target
+from ident.diagnosis.evidence.tables import Member, Members, Table
 from ident.diagnosis.hypotheses.bends import Bent
 from ident.diagnosis.noise.colours import price_of
 
@@ -56,7 +57,7 @@ class State:
     def with_members(self, members: Members) -> State:
         """Other numbers of the same hypotheses, beside the same exact forms."""
         found = replace(self, members=members)
-        found.__dict__["target"] = self.target
+        found.__dict__["target"], found.__dict__["_made"] = self.target, self._made
         return found
 
     @property
@@ -67,7 +68,16 @@ class State:
     def table(self, hypothesis: int) -> Table:
         """Evidence of a member beside the others, by its slopes where it has them: those are of one block."""
         only = self.members[hypothesis].block if hypothesis in self.bends else None
-        return self.target.table_of(hypothesis, self.without(hypothesis), only)
+        others = self.without(hypothesis)
+        key = hypothesis, only, tuple(others.items())
+        if key not in self._made:
+            self._made[key] = self.target.table_of(hypothesis, others, only)
+        return self._made[key]
+
+    @cached_property
+    def _made(self) -> dict[tuple[int, int | None, tuple[tuple[int, Member], ...]], Table]:
+        """Tables of members beside others, as long as the exact forms are the same."""
+        return {}
 
     def cost(self, hypothesis: int) -> float:
         """What integrating the numbers of a member costs, and its choice."""
@@ -80,11 +90,12 @@ class State:
         """
         beside, hypotheses = self.target.beside(self.members), self.evidence.design.hypotheses
         left = beside.diagonal / np.maximum(self.target.products.diagonal, np.finfo(float).tiny)
-        return {
-            index: self.target.table(index, beside)
+        others = [
+            index
             for index, one in enumerate(hypotheses)
             if index not in self.members and any(left[block.place].max() > DISTINCT for block in one.blocks)
-        }
+        ]
+        return self.target.tables(others, beside)
 
     def without(self, hypothesis: int) -> dict[int, Member]:
         """The other members."""

@@ -102,9 +102,10 @@ class Beside:
         """Products of the columns of one place with those of another."""
         return np.asarray(self.gram.of(place, other) - (self.across[place] / (1 + self.powers)) @ self.across[other].T)
 
-    def with_target(self, place: slice) -> Array:
-        """Products of the columns of a place with the target."""
-        return np.asarray(self.gram.target[place] - (self.across[place] / (1 + self.powers)) @ self.across[-1])
+    @cached_property
+    def along(self) -> Array:
+        """(K + 1,) products of all columns with the target."""
+        return np.asarray(self.gram.target - (self.across / (1 + self.powers)) @ self.across[-1])
 
     @cached_property
     def untouched(self) -> NDArray[np.bool_]:
@@ -113,7 +114,7 @@ class Beside:
         found[self.gram.replaced] = False
         return np.asarray(found)
 
-    @property
+    @cached_property
     def diagonal(self) -> Array:
         """(K + 1,) powers."""
         return np.asarray(self.gram.diagonal - np.sum(self.across**2 / (1 + self.powers), axis=1))

@@ -226,7 +226,7 @@ class _Builder:
         directions = unit @ turn
         nothing, weight = np.zeros(0, dtype=bool), -math.log(len(made))
         return tuple(
-            Block(place, directions.T @ one / size / count, weight, None, nothing, np.zeros(0))
+            Block(place, _thin(directions.T @ one / size / count), weight, None, nothing, np.zeros(0))
             for one, size in zip(made, sizes, strict=True)
         )
 
@@ -234,6 +234,14 @@ class _Builder:
         self.columns.append(columns)
         self._end += columns.shape[1]
         return slice(self._end - columns.shape[1], self._end)
+
+
+def _thin(factor: Array) -> Array:
+    """Of the same covariance, with no more columns (K, R) than rows."""
+    if factor.shape[1] <= factor.shape[0]:
+        return factor
+    turned, sizes, _ = np.linalg.svd(factor, full_matrices=False)
+    return np.asarray(turned * sizes)
 
 
 def _expected(candidate: Candidate, variant: Variant, sizes: Array) -> tuple[Array, Array] | None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
-from ident.diagnosis.evidence.evidence import Member
 from ident.diagnosis.evidence.fitting import Fitter
 from ident.diagnosis.evidence.state import State
+from ident.diagnosis.evidence.tables import Member
 
 MOST: Final = 4
 """Members of a set."""

@@ -149,12 +149,12 @@ class _Place:
         # Without it the rows may have another noise.
         base = without.log_posterior - self._bare if math.isfinite(without.log_posterior) else 0.0
         self.logs, self._costs, self.rivals = dict[int, float](), dict[int, float](), dict[int, State]()
-        for number, hypothesis in enumerate(search.design.hypotheses):
-            if number not in others and number not in search.refuted:
-                table = self._target.table(number, self._beside)
-                if table.is_there:
-                    self.logs[number] = base + table.total - hypothesis.price
-                    self._costs[number] = table.cost + hypothesis.price
+        hypotheses = search.design.hypotheses
+        possible = [one for one in range(len(hypotheses)) if one not in others and one not in search.refuted]
+        for number, table in self._target.tables(possible, self._beside).items():
+            if table.is_there:
+                self.logs[number] = base + table.total - hypotheses[number].price
+                self._costs[number] = table.cost + hypotheses[number].price
         self._excess, self._own = excess, dict[int, float]()
         self._keep(index, state, excess)
 

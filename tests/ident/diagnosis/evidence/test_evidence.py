@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from ident.diagnosis.evidence.evidence import Evidence, Member
+from ident.diagnosis.evidence.evidence import Evidence
+from ident.diagnosis.evidence.tables import Member
 from ident.diagnosis.hypotheses.gram import Beside, Gram
 from ident.diagnosis.noise.colours import SIZES
 from ident.diagnosis.problem import Problem, Variant
@@ -122,7 +123,8 @@ def test_a_tempered_likelihood_is_that_of_rows_of_so_much_more_variance(
     alone = whole.target.table(number, whole.target.beside({}))
     blocks = question.design.hypotheses[number].blocks
     products = diluted_by(excess, whole.target.beside({}))
-    diluted = whole.target.table_by(blocks, products, range(len(blocks))).total - price
+    (table,) = whole.target.tables_by([blocks], products)
+    diluted = table.total - price
     slot = slot_of(question.search, whole, number, excess)
     bare = state.log_posterior - question.search.fitter.nothing.log_posterior
     noise = bare + price - alone.total

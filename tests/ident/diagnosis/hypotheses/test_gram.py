@@ -50,7 +50,7 @@ def test_beside_integrated_directions_products_are_by_the_covariance_that_those_
     expected = own.T @ np.linalg.solve(covariance, own)
     beside = Beside(Gram.of_all(own.T @ own), own.T @ directions, np.sum(directions**2, axis=0))
     assert beside.of(PLACES[1], PLACES[3]) == pytest.approx(expected[PLACES[1], PLACES[3]])
-    assert beside.with_target(PLACES[2]) == pytest.approx(expected[PLACES[2], -1])
+    assert beside.along[PLACES[2]] == pytest.approx(expected[PLACES[2], -1])
     assert beside.diagonal == pytest.approx(np.diag(expected))
 
 
@@ -71,4 +71,4 @@ def test_what_acts_in_other_rows_is_untouched(seed: int, bent: bool) -> None:
     for place in (slice(3, 5), slice(5, COLUMNS)):
         assert beside.untouched[place].all()
         assert beside.of(place, place) == pytest.approx(whole[place, place])
-        assert beside.with_target(place) == pytest.approx(whole[place, -1])
+        assert beside.along[place] == pytest.approx(whole[place, -1])
