@@ -8,7 +8,6 @@ an increment of the way alone, so that friction depends on where a joint has bee
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 
 import casadi as ca
@@ -66,9 +65,15 @@ def bent_along(angles: Array, angle: float) -> Array:
         angle: θ [rad].
     """
     turned = np.diff(angles)
-    kept, towards = np.exp(-np.abs(turned) / angle).tolist(), np.sign(turned).tolist()
-    steps = zip(kept, towards, strict=True)
-    return np.array(list(itertools.accumulate(steps, lambda z, step: step[1] + (z - step[1]) * step[0], initial=0.0)))
+    # z after a step is kept z + added; of two steps one after the other, kept k l z + (l a + b): a scan by doubling.
+    kept = np.append(0.0, np.exp(-np.abs(turned) / angle))
+    added = np.append(0.0, np.sign(turned) * -np.expm1(-np.abs(turned) / angle))
+    steps = 1
+    while steps < len(angles) and kept[steps:].any():
+        added[steps:] += kept[steps:] * added[:-steps]
+        kept[steps:] *= kept[:-steps]
+        steps *= 2
+    return added
 
 
 def all_bent_along(terms: Sequence[Term], angles: Array) -> Array:

@@ -24,6 +24,7 @@ from ident.diagnosis.observations.orders import FEWEST
 from ident.diagnosis.problem import Candidate, Periodic, Variant
 from ident.effects import EffectParameter
 from ident.estimate.filters import SEVEN, differentiate
+from ident.plant.play import behind_play
 from ident.records.axis_record import AxisKind
 
 Array = NDArray[np.float64]
@@ -201,11 +202,9 @@ def _backlash(axis: AxisModel) -> Candidate:
 
 def in_gap(position: Array, gap: float) -> Array:
     """1 where a position (N,) is on its way across a gap after a reversal, 0 where it pushes one of its sides."""
-    inside, centre = np.zeros(len(position)), position[0]
-    for index, value in enumerate(position):
-        centre = min(max(centre, value - gap / 2), value + gap / 2)
-        inside[index] = abs(value - centre) < 0.499 * gap
-    return inside
+    behind = behind_play(position, gap / 2, float(position[0]))
+    pushed = (behind == position - gap / 2) | (behind == position + gap / 2)
+    return np.where(pushed, 0.0, 1.0)
 
 
 def _torque_ripple(axis: AxisModel) -> Candidate:

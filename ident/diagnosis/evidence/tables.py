@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -123,20 +123,12 @@ def logs_of(
         products, scales, count: as of `tables_of`.
     """
     logs, occam = np.full((len(blocks), len(scales)), -math.inf), np.zeros((len(blocks), len(scales)))
-    single, several = list[int](), defaultdict[int, list[int]](list)
-    for number, block in enumerate(blocks):
-        if len(block.sizes) == 1:
-            single.append(number)
-        else:
-            several[places[number].start].append(number)
+    single = [number for number, block in enumerate(blocks) if len(block.sizes) == 1]
     if single:
         starts = np.array([places[number].start for number in single])
         logs[single], occam[single] = _of_single([blocks[number] for number in single], starts, products, scales, count)
-    for numbers in several.values():
-        place = places[numbers[0]]
-        inner, along = products.of(place, place), products.along[place]
-        for number in numbers:
-            logs[number], occam[number] = _of_several(blocks[number], inner, along, scales)
+    for alike in _of_one_size(blocks, places, products):
+        logs[list(alike)], occam[list(alike)] = _of_several(blocks, alike, scales)
     largest = np.maximum([block.largest for block in blocks], scales[0])
     logs[scales > largest[:, None]] = -math.inf
     return logs, occam
@@ -171,16 +163,36 @@ def _are_refused(blocks: Sequence[Block], sizes: Array) -> NDArray[np.bool_]:
     return np.asarray((sizes <= least) | small)
 
 
-def _of_several(block: Block, inner: Array, along: Array, scales: Array) -> tuple[Array, Array]:
-    """Of a block of several columns, by their products with each other and with the target."""
-    powers, turn = np.linalg.eigh(block.factor.T @ inner @ block.factor)
-    powers, amplitudes = np.maximum(powers, 0.0), turn.T @ (block.factor.T @ along)
-    if block.least == 0 and _is_negative(turn, powers, amplitudes):
-        return np.full(len(scales), -math.inf), np.zeros(len(scales))
+def _of_one_size(
+    blocks: Sequence[Block], places: Sequence[slice], products: Beside
+) -> Iterable[Mapping[int, tuple[Array, Array]]]:
+    """Products (R, R) and (R,) of blocks of several columns, by number, those together that have as many directions."""
+    found = defaultdict[int, dict[int, tuple[Array, Array]]](dict)
+    inner = dict[int, Array]()
+    for number, (block, place) in enumerate(zip(blocks, places, strict=True)):
+        if len(block.sizes) != 1:
+            if place.start not in inner:
+                inner[place.start] = products.of(place, place)
+            turned = block.factor.T @ inner[place.start] @ block.factor
+            found[len(turned)][number] = turned, block.factor.T @ products.along[place]
+    return found.values()
+
+
+def _of_several(
+    blocks: Sequence[Block], alike: Mapping[int, tuple[Array, Array]], scales: Array
+) -> tuple[Array, Array]:
+    """Of blocks of several columns, by their products with each other and with the target."""
+    powers, turn = np.linalg.eigh(np.stack([inner for inner, _ in alike.values()]))
+    powers = np.maximum(powers, 0.0)
+    amplitudes = np.einsum("gij,gi->gj", turn, np.stack([along for _, along in alike.values()]))
     squares = scales[:, None] ** 2
-    told = 1 + squares * powers
-    occam = 0.5 * np.sum(np.log(told), axis=1)
-    return 0.5 * np.sum(squares / told * amplitudes**2, axis=1) - occam, occam
+    told = 1 + squares * powers[:, None, :]
+    occam = 0.5 * np.sum(np.log(told), axis=2)
+    logs = 0.5 * np.sum(squares / told * amplitudes[:, None, :] ** 2, axis=2) - occam
+    for place, number in enumerate(alike):
+        if blocks[number].least == 0 and _is_negative(turn[place], powers[place], amplitudes[place]):
+            logs[place], occam[place] = -math.inf, 0.0
+    return logs, occam
 
 
 def _is_negative(turn: Array, powers: Array, amplitudes: Array) -> bool:

@@ -14,6 +14,7 @@ from scipy.special import logsumexp
 
 from ident.diagnosis.evidence.misfit import tempered
 from ident.diagnosis.evidence.state import State
+from ident.diagnosis.hypotheses.gram import Beside
 from ident.diagnosis.hypotheses.hypotheses import Hypothesis
 from ident.diagnosis.search.ranked import Ranked
 from ident.diagnosis.search.search import Search
@@ -35,6 +36,9 @@ them: of 35 names of drawn machines that were sure, one was wrong."""
 
 SAME: Final = 0.9999
 """Cosine of what two names of as many numbers add to the rows, from which those do not tell them apart."""
+
+RANK: Final = 1e-9
+"""Power of a combination of columns, over that of the strongest, from which it is one."""
 
 SAME_LAW: Final = 0.98
 """The same of two laws: what is learnt is known to about as much."""
@@ -118,13 +122,13 @@ def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
     odds = {one: place.odds(one) for one in place.logs}
     logs = {one: log for one, log in sorted(odds.items(), key=lambda entry: -entry[1]) if math.isfinite(log)}
     cosines, hypotheses = _cosines(state, index, logs), search.design.hypotheses
-    width, law = len(hypotheses[index].blocks[state.members[index].block].factor), hypotheses[index].free
+    block, law = hypotheses[index].blocks[state.members[index].block], hypotheses[index].free
     alike = [
         one
         for one, (cosine, size) in cosines.items()
         if one != index
         and hypotheses[one].free is law
-        and (cosine > SAME_LAW if law else cosine > SAME and size == width)
+        and (cosine > SAME_LAW if law else cosine > SAME and size == len(block.factor))
     ]
     return Slot(logs, {one: cosine for one, (cosine, _) in cosines.items()}, (index, *alike), place.rivals, excess)
 
@@ -188,19 +192,26 @@ class _Place:
 
 def _cosines(state: State, index: int, others: Mapping[int, float]) -> dict[int, tuple[float, int]]:
     """Of what a member adds to the white rows beside the others, and what each other can; by how many columns."""
-    products = state.target.beside(state.without(index))
-    hypotheses = state.evidence.design.hypotheses
-    own = hypotheses[index].blocks[state.members[index].block]
+    products, hypotheses = state.target.beside(state.without(index)), state.evidence.design.hypotheses
+    own = hypotheses[index].blocks[state.members[index].block].place
     mean = state.target.means(state.members)[index]
-    power = float(mean @ products.of(own.place, own.place) @ mean)
+    power = float(mean @ products.of(own, own) @ mean)
     found = {}
     for other in others:
-        best = 0.0, 0
-        for block in hypotheses[other].blocks:
-            inner, across = products.of(block.place, block.place), products.of(block.place, own.place) @ mean
-            turned = block.factor.T @ inner @ block.factor
-            along = block.factor.T @ across
-            made = float(along @ np.linalg.pinv(turned, rcond=1e-9, hermitian=True) @ along)
-            best = max(best, (made, len(block.factor)), key=lambda one: one[0])
-        found[other] = math.sqrt(min(best[0] / power, 1.0)) if power > 0 else 0.0, best[1]
+        # A law has the same columns at every length.
+        places = {block.place.start: block.place for block in hypotheses[other].blocks}
+        made = [(_reached(products, place, own, mean), place.stop - place.start) for place in places.values()]
+        best, width = max(made, key=lambda one: one[0])
+        found[other] = math.sqrt(min(best / power, 1.0)) if power > 0 else 0.0, width
     return found
+
+
+def _reached(products: Beside, place: slice, own: slice, mean: Array) -> float:
+    """Power of what columns of a place can make of what those of a member add, with these coefficients."""
+    along = products.of(place, own) @ mean
+    if len(along) == 1:
+        power = float(products.diagonal[place.start])
+        return float(along[0]) ** 2 / power if power > 0 else 0.0
+    powers, turn = np.linalg.eigh(products.of(place, place))
+    kept = powers > RANK * powers.max()
+    return float(np.sum((along @ turn[:, kept]) ** 2 / powers[kept]))

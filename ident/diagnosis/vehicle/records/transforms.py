@@ -23,6 +23,7 @@ from ident.diagnosis.vehicle.records.signals import shifted
 from ident.estimate.filters import SEVEN, differentiate, second_derivative, zero_phase
 from ident.plant.lags import following
 from ident.plant.places import DRIVES, ENCODERS, STEERING, indices
+from ident.plant.play import behind_play
 from ident.plant.springs import MOTOR_SHARE
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
@@ -142,14 +143,7 @@ def _unit_friction(side: int, setting: Setting) -> float:
 
 def _play(load: Array, friction: float) -> Array:
     """Load (N,) that a spring holds when dry friction holds what it moves: it follows, `friction` behind."""
-    held, found = 0.0, []
-    for now in load.tolist():
-        if now - held > friction:
-            held = now - friction
-        elif held - now > friction:
-            held = now + friction
-        found.append(held)
-    return np.array(found)
+    return behind_play(load, friction, 0.0)
 
 
 def _relay(load: Array, friction: float) -> Array:
