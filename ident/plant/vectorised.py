@@ -130,9 +130,11 @@ def run(program: Sequence[Instruction], inputs: Inputs, work: dict[int, Any], re
 def value_of(instruction: Instruction, inputs: Inputs, work: Mapping[int, Any]) -> Any:
     """What an instruction puts into its place; arguments as of `run`."""
     code, sources, _, constant = instruction
-    if code == ca.OP_INPUT:
-        return inputs[sources[0]][sources[1]]
-    return constant if code == ca.OP_CONST else OPERATIONS[code](*(work[source] for source in sources))
+    operation = OPERATIONS.get(code)
+    if operation is None:
+        return inputs[sources[0]][sources[1]] if code == ca.OP_INPUT else constant
+    # There are hundreds of thousands of these calls.
+    return operation(work[sources[0]], work[sources[1]]) if len(sources) == 2 else operation(work[sources[0]])
 
 
 def _instruction(function: Any, index: int) -> Instruction:

@@ -9,25 +9,27 @@ import casadi as ca
 import numpy as np
 
 from ident.plant.symbolic import Expression
+from ident.plant.symbols import SIDES
+from ident.vehicle.geometry import WHEELS
 
 _SIZES: Final = {
     "heading": 1,
-    "alpha": 2,
-    "beta": 4,
-    "alpha_rate": 2,
-    "beta_rate": 4,
-    "alpha_acceleration": 2,
-    "beta_acceleration": 4,
-    "motor_acceleration": 4,
-    "torques": 4,
-    "twist": 2,
-    "twist_rate": 2,
-    "hammer": 4,
-    "swing": 4,
-    "rattle": 4,
-    "wander": 2,
-    "rest": 4,
-    "bristles": 6,
+    "alpha": len(SIDES),
+    "beta": len(WHEELS),
+    "alpha_rate": len(SIDES),
+    "beta_rate": len(WHEELS),
+    "alpha_acceleration": len(SIDES),
+    "beta_acceleration": len(WHEELS),
+    "motor_acceleration": len(WHEELS),
+    "torques": len(WHEELS),
+    "twist": len(SIDES),
+    "twist_rate": len(SIDES),
+    "hammer": len(WHEELS),
+    "swing": len(WHEELS),
+    "rattle": len(WHEELS),
+    "wander": len(SIDES),
+    "rest": len(WHEELS),
+    "bristles": len(SIDES) + len(WHEELS),
     "payload": 1,
 }
 
