@@ -16,55 +16,88 @@ import argparse
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 from unittest import mock
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hil.exam.answer_file import open_cases, own_key
 from hil.exam.diagnosing import described, vehicle_records
 from hil.exam.folder import RECORDS, ExamFolder, read_exam
 from ident.diagnosis.vehicle import build
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
-from ident.diagnosis.vehicle.records import loose, sources
+from ident.diagnosis.vehicle.records import loose, moments, sources
+from ident.diagnosis.vehicle.records.signals import Signals
 
-_NEVER: Final = {"new": lambda beta, *others: (np.zeros(beta.shape), np.zeros(beta.shape, dtype=np.bool_))}
+Array = NDArray[np.float64]
 
-KINDS: Final[Mapping[str, Sequence[tuple[Any, str, Any]]]] = MappingProxyType(
+
+@dataclass(frozen=True)
+class Finder:
+    """A function that finds special rows.
+
+    Attributes:
+        module, name: where it is looked up.
+        nothing: what finds none, with the same arguments.
+        is_something: whether a result says that there are some.
+    """
+
+    module: Any
+    name: str
+    nothing: Callable[..., Any]
+    is_something: Callable[[Any], bool]
+
+
+def _no_rattling(beta: Array, *_others: Any) -> tuple[Array, NDArray[np.bool_]]:
+    return np.zeros(beta.shape), np.zeros(beta.shape, dtype=np.bool_)
+
+
+def _everywhere(signals: Signals) -> NDArray[np.bool_]:
+    return np.ones(len(signals.alpha), dtype=np.bool_)
+
+
+USUAL: Final = "all of them"
+
+KINDS: Final[Mapping[str, Sequence[Finder]]] = MappingProxyType(
     {
-        "all of them": (),
         "no motor rattles": (
-            (loose, "rattling", _NEVER["new"]),
-            (loose, "rattling_at_standstill", _NEVER["new"]),
+            Finder(loose, "rattling", _no_rattling, lambda found: bool(found[1].any())),
+            Finder(loose, "rattling_at_standstill", _no_rattling, lambda found: bool(found[1].any())),
         ),
-        "no motor moves at rest": ((loose, "moved_at_rest", lambda beta, near: np.zeros(2)),),
-        "no unit wanders": ((loose, "wandering", lambda *signals: None),),
+        "no motor moves at rest": (
+            Finder(loose, "moved_at_rest", lambda _beta, _near: np.zeros(2), lambda found: bool(found.any())),
+        ),
+        "no unit wanders": (Finder(sources, "wanders", lambda _across, _others: False, bool),),
         "no wheel gives way for a moment": (
-            (build, "apart_from_moments", lambda found, geometry, processing: iter(found)),
+            Finder(moments, "giving_way", lambda inputs, *_others: np.zeros(len(inputs), dtype=np.bool_), np.any),
         ),
         "steering counts however far": (
-            (loose, "near_middle", lambda signals: np.ones(len(signals.alpha), dtype=np.bool_)),
-            (sources, "near_middle", lambda signals: np.ones(len(signals.alpha), dtype=np.bool_)),
+            Finder(loose, "near_middle", _everywhere, lambda found: not found.all()),
+            Finder(sources, "near_middle", _everywhere, lambda found: not found.all()),
         ),
-        "no wheel has slid": ((build, "slid_by_any", lambda found, context: _nothing(found)),),
+        "no wheel has slid": (
+            Finder(
+                build,
+                "slid_by_any",
+                lambda found, _context: [None for source in found for _ in source.coordinates],
+                lambda found: any(one is not None for one in found),
+            ),
+        ),
     }
 )
 """What is left out, and the functions that then find nothing."""
-
-
-def _nothing(found: Sequence[sources.Source]) -> list[None]:
-    return [None for source in found for _ in source.coordinates]
 
 
 @contextmanager
 def without(kind: str) -> Iterator[None]:
     """One kind of special rows left out."""
     with ExitStack() as stack:
-        for module, name, replacement in KINDS[kind]:
-            stack.enter_context(mock.patch.object(module, name, replacement))
+        for one in KINDS[kind]:
+            stack.enter_context(mock.patch.object(one.module, one.name, one.nothing))
         yield
 
 
@@ -72,37 +105,21 @@ def without(kind: str) -> Iterator[None]:
 def noted(finding: set[str]) -> Iterator[None]:
     """Nothing is left out; kinds that find something are noted."""
 
-    def looking(kind: str, usual: Callable[..., Any], replacement: Callable[..., Any]) -> Callable[..., Any]:
+    def looking(kind: str, one: Finder, usual: Callable[..., Any]) -> Callable[..., Any]:
         def look(*arguments: Any) -> Any:
-            found, nothing = (_kept(one(*arguments)) for one in (usual, replacement))
-            if not _is_same(found, nothing):
+            found = usual(*arguments)
+            if one.is_something(found):
                 finding.add(kind)
             return found
 
         return look
 
     with ExitStack() as stack:
-        for kind, functions in KINDS.items():
-            for module, name, replacement in functions:
-                usual = looking(kind, getattr(module, name), replacement)
-                stack.enter_context(mock.patch.object(module, name, usual))
+        for kind, finders in KINDS.items():
+            for one in finders:
+                usual = looking(kind, one, getattr(one.module, one.name))
+                stack.enter_context(mock.patch.object(one.module, one.name, usual))
         yield
-
-
-def _kept(values: Any) -> Any:
-    return list(values) if isinstance(values, Iterator) else values
-
-
-def _is_same(one: Any, other: Any) -> bool:
-    if is_dataclass(one) and is_dataclass(other):
-        return all(_is_same(getattr(one, each.name), getattr(other, each.name)) for each in fields(one))
-    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
-        return np.array_equal(one, other)
-    if isinstance(one, (list, tuple)) and isinstance(other, (list, tuple)):
-        return len(one) == len(other) and all(map(_is_same, one, other))
-    return one is other or (
-        not isinstance(one, np.ndarray) and not isinstance(other, np.ndarray) and bool(one == other)
-    )
 
 
 def said_of(identifier: str, exam: Path) -> list[str]:
@@ -116,10 +133,10 @@ def said_of(identifier: str, exam: Path) -> list[str]:
 
 def answers_of(identifier: str, exam: Path) -> Iterator[tuple[str, list[str]]]:
     """What is said of a case with all rows, and without each kind that finds something."""
-    usual, finding = next(iter(KINDS)), set[str]()
+    finding = set[str]()
     with noted(finding):
         said = said_of(identifier, exam)
-    yield usual, said
+    yield USUAL, said
     for kind in KINDS:
         if kind in finding:
             with without(kind):
@@ -146,10 +163,9 @@ def table(lines: Sequence[Mapping[str, Any]]) -> str:
         "| without | cases in which there are some | right with them | right without | others |",
         "|---|---|---|---|---|",
     ]
-    usual = next(iter(KINDS))
     said = {(line["kind"], line["identifier"]): line for line in lines}
     for kind in KINDS:
-        pairs = [(said[usual, line["identifier"]], line) for line in lines if line["kind"] == kind]
+        pairs = [(said[USUAL, line["identifier"]], line) for line in lines if line["kind"] == kind]
         right = [
             sum(line["said"][0].partition("@")[0] == line["true"] for line in column)
             for column in zip(*pairs, strict=True)

@@ -21,6 +21,7 @@ from ident.diagnosis.axis.positional import friction_position, gravity_loads, in
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.observations.delays import DAMPING, HELD, delayed, sprung
 from ident.diagnosis.observations.orders import FEWEST
+from ident.diagnosis.observations.tried import RATIO, tried_between
 from ident.diagnosis.problem import Candidate, Periodic, Variant
 from ident.effects import EffectParameter
 from ident.estimate.filters import SEVEN, differentiate
@@ -29,8 +30,6 @@ from ident.records.axis_record import AxisKind
 
 Array = NDArray[np.float64]
 
-STRIBECK_SPEEDS: Final = (0.02, 0.03, 0.045, 0.065, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6)
-"""Tried first, over the 95th percentile of the speed: so near to each other that a drag fits no better by chance."""
 RESONANCES: Final = (*(0.8 * 1.1**step for step in range(13)), 3.2, 4.5, 20.0)
 """Tried first, over the bandwidth of the rows; the last is a spring that shows as a compliance alone. Near the band the
 rows hold the resonance itself, in a valley that is a tenth wide: from beside it a descent ends elsewhere."""
@@ -46,10 +45,8 @@ SAMPLED: Final = 1 / 2
 """Of T²/M, the compliance up to which sampling may be what it is: when within a sample interval the effort acts and the
 position is read is not known, and a delay of T has (sT)²/2 in second order. Errors of the position make negative ones,
 up to all of it."""
-BACKLASH_GAPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05)
-"""Tried first, over the range of the position."""
-GRID: Final = 0.3
-"""Part of a gap by which it may lie between those tried."""
+WIDEST_GAP: Final = 0.1
+"""Over the range of the position: more than that a motion hardly crosses before it reverses again."""
 LEAST_SHARE: Final = 0.1
 """Of the effort that must lie behind a play for it to be one."""
 
@@ -124,8 +121,7 @@ def _stribeck(axis: AxisModel) -> Candidate:
     )
     # At half the speed that hardly a row is below, all rows have lost it, but what they miss near a reversal looks so.
     slowest = axis.slowest / 2
-    speeds = [speed for share in STRIBECK_SPEEDS if (speed := share * axis.speed) > slowest]
-    candidate = shaped_by(axis, EffectName.STRIBECK, parameters, curve, speeds or [2 * slowest])
+    candidate = shaped_by(axis, EffectName.STRIBECK, parameters, curve, tried_between(slowest, axis.speed))
     return replace(candidate, lowest=(0.0, slowest))
 
 
@@ -194,10 +190,11 @@ def _backlash(axis: AxisModel) -> Candidate:
         EffectParameter("gap", axis.kind.position_unit, "whole play"),
         EffectParameter("share", "1", "of the effort that lies behind it"),
     )
-    gaps = [gap for share in BACKLASH_GAPS if (gap := share * axis.reach) > axis.nearest]
-    variants = tuple(variant(gap) for gap in gaps or [2 * axis.nearest])
+    variants = tuple(map(variant, tried_between(axis.nearest, WIDEST_GAP * axis.reach)))
     _, force = axis.exactly(lambda values, _baseline: values[1] * missing(float(values[0])))
-    return Candidate(EffectName.BACKLASH, axis.place, parameters, variants, force=force, least=LEAST_SHARE, part=GRID)
+    return Candidate(
+        EffectName.BACKLASH, axis.place, parameters, variants, force=force, least=LEAST_SHARE, part=RATIO - 1
+    )
 
 
 def in_gap(position: Array, gap: float) -> Array:

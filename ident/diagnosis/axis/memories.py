@@ -13,37 +13,35 @@ from ident.diagnosis.axis.model import AxisEffect, AxisModel, linear, shaped_by
 from ident.diagnosis.dependence import path_since_reversal
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.observations.delays import HELD, RARER, led
+from ident.diagnosis.observations.tried import tried_between
 from ident.diagnosis.problem import Candidate, Variant
 from ident.effects import EffectParameter
 from ident.estimate.filters import SEVEN, differentiate
 
 Array = NDArray[np.float64]
 
-PATHS: Final = (0.001, 0.003, 0.01, 0.03, 0.1)
-"""Over which friction settles after a reversal, tried first, over the range of the position."""
+START: Final = 0.1
+"""Part of a record over which friction warms up at least: faster is a start, no warming."""
 
-TIMES: Final = (0.1, 0.3, 1.0)
-"""Over which friction warms up, tried first, over the duration of the record; faster is a start, no warming."""
-
-WIDER: Final = 3.0
-"""How far beyond those tried first a distance or a time is followed: further away a record says nothing of it."""
+FURTHEST: Final = 3.0
+"""Durations of a record over which it warms up at most: what is slower has one shape."""
 
 
 def presliding(axis: AxisModel) -> Candidate:
     """Bristles that bend before they slide (Dahl 1968): beyond the friction in motion, exp(-s/d) over the path s."""
     direction = np.sign(axis.motion.velocity)
     path = path_since_reversal(axis.motion.position, axis.motion.velocity)
-    shortest = max(PATHS[0] * axis.reach, axis.nearest)
+    shortest, longest = axis.nearest, axis.reach
 
     def series(distance: float) -> Array:
-        within = np.clip(abs(distance), shortest, PATHS[-1] * axis.reach * WIDER)
+        within = np.clip(abs(distance), shortest, longest)
         return np.asarray(direction * np.exp(-path / within))
 
     parameters = (
         EffectParameter("amplitude", axis.unit(), "friction right after a reversal beyond that in motion"),
         EffectParameter("distance", axis.kind.position_unit, "path over which it has fallen to 1/e"),
     )
-    tried = [max(share * axis.reach, shortest) for share in PATHS]
+    tried = tried_between(shortest, longest)
     candidate = shaped_by(axis, EffectName.PRESLIDING, parameters, series, tried, price=math.log(len(tried)))
     return replace(candidate, lowest=(0.0, shortest))
 
@@ -58,16 +56,17 @@ def friction_warming(axis: AxisModel) -> Candidate:
     """Dry friction that comes to change as the axis warms up, by 1 - exp(-t/T)."""
     time = np.arange(len(axis.effort)) * axis.sample_time
     direction = np.sign(axis.motion.velocity)
+    shortest, longest = START * float(time[-1]), FURTHEST * float(time[-1])
 
     def series(constant: float) -> Array:
-        within = np.clip(abs(constant), TIMES[0] * time[-1], TIMES[-1] * time[-1] * WIDER)
+        within = np.clip(abs(constant), shortest, longest)
         return np.asarray(direction * (1 - np.exp(-time / within)))
 
     parameters = (
         EffectParameter("change", axis.unit(), "of the Coulomb friction, once warm"),
         EffectParameter("time", "s", "in which 63 % of the change have come"),
     )
-    tried = [share * time[-1] for share in TIMES]
+    tried = tried_between(shortest, longest)
     return shaped_by(axis, AxisEffect.FRICTION_WARMING, parameters, series, tried, price=math.log(len(tried)))
 
 

@@ -1,4 +1,4 @@
-"""Numbers of an effect's shape that are tried first: at equal ratios, from the least that rows can bound to the most."""
+"""Numbers of a shape that are tried first: at equal ratios, from the least that rows can bound to the most."""
 
 from __future__ import annotations
 
