@@ -23,6 +23,7 @@ from ident.diagnosis.axis.reference import (
 )
 from ident.diagnosis.axis.scale import Scale, nominal
 from ident.diagnosis.check.refit import Refit
+from ident.diagnosis.check.sized import SURELY
 from ident.diagnosis.dependence import Dependence, across
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.observations.delays import HELD
@@ -47,8 +48,6 @@ HOLDS = 1 / 12
 that is averaged over the interval as one with as much more."""
 LAGS = 1 / math.sqrt(12)
 """Deviation of a lag over T: a position may be read at any part of an interval, at each rate at another one."""
-SURELY = 2.0
-"""Standard deviations by which a lag must exceed what sampling explains."""
 
 
 def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem:

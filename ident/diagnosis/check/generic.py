@@ -62,7 +62,7 @@ class SmoothFunction:
         fitted = ~rows.confirming
         model, target = white[:, :-1], white[:, -1]
         left = target - model @ least_squares(model[fitted], target[fitted])
-        absorbed = _absorbed(model[fitted], self._white[fitted])
+        absorbed = least_squares(model[fitted], self._white[fitted])
         extra = self._white - model @ absorbed
         weights = _ridge(extra[fitted], left[fitted], regression.stretch[fitted])
         predicted = extra @ weights
@@ -99,12 +99,6 @@ def _cosines(states: Array, inside: NDArray[np.bool_], seed: int) -> Array:
     values = np.zeros((len(states), FUNCTIONS))
     values[inside] = np.cos(scaled @ frequencies + phases)
     return values
-
-
-def _absorbed(model: Array, extra: Array) -> Array:
-    scale = np.linalg.norm(model, axis=0)
-    scale[scale == 0] = 1.0
-    return np.asarray(np.linalg.lstsq(model / scale, extra, rcond=1e-7)[0] / scale[:, None])
 
 
 class _Ridge:

@@ -20,14 +20,12 @@ from ident.diagnosis.law.learning import LENGTHS, Designs
 from ident.diagnosis.law.spline import Knots
 from ident.diagnosis.names import LAW
 from ident.diagnosis.noise.colours import Colours
+from ident.diagnosis.observations.linear import ROUNDING
 from ident.diagnosis.observations.regression import Regression
 from ident.diagnosis.observations.rows import Column
 from ident.diagnosis.problem import Candidate, Problem, Variant
 
 Array = NDArray[np.float64]
-
-LEAST: Final = 1e-9
-"""Size of a column, over the largest of the same hypothesis, that is nothing."""
 
 SAME: Final = 1e-5
 """Share of the power of a free function that a direction must have: less changes no row."""
@@ -200,7 +198,7 @@ class _Builder:
         return found
 
     def _block(self, column: Column, sizes: Array, weight: float, candidate: Candidate) -> Block:
-        kept = sizes > LEAST * sizes.max()
+        kept = sizes > ROUNDING * sizes.max()
         place = self._appended(self.regression.rows.columns[:, column.place][:, kept] / sizes[kept])
         variant = candidate.variants[column.variant]
         # The size that a coefficient of one is: a ripple's is told at the motor, its column at the wheel.

@@ -18,7 +18,7 @@ from scipy import linalg
 from ident.diagnosis.dependence import Dependence, Variable
 from ident.diagnosis.law.spline import Knots, knots_around, knots_over
 from ident.diagnosis.observations.directions import VISIBLE
-from ident.diagnosis.observations.linear import orthonormal
+from ident.diagnosis.observations.linear import ROUNDING, orthonormal
 from ident.diagnosis.observations.regression import Regression
 from ident.diagnosis.observations.rows import Rows
 from ident.diagnosis.observations.whitening import Whitening
@@ -32,12 +32,6 @@ LENGTHS: Final = (1.0, 0.5, 0.25, 0.125, 0.07, 0.035)
 
 SHORTEST_IN_TIME: Final = 0.07
 """Of a function of time, over the record: what is shorter follows the motion, and two records of one motion agree."""
-
-ROUNDING: Final = 1e-9
-"""Range of a variable, relative to its size, from which it changes."""
-
-RIDGE: Final = 1e-9
-"""Of columns of unit length, where some of them are the same."""
 
 SIZES: Final = tuple(np.logspace(0, 8, 17).tolist())
 """Of a function that are tried: power of its best direction over that of the noise."""
@@ -184,7 +178,7 @@ def _beside_absorbed(design: Array, left: Array) -> Array:
     """
     whole = design.T @ design
     size = np.sqrt(np.maximum(np.diag(whole), np.finfo(float).tiny))
-    scaled = whole / np.outer(size, size) + RIDGE * np.eye(len(whole))
+    scaled = whole / np.outer(size, size) + ROUNDING * np.eye(len(whole))
     shares, turn = linalg.eigh(left.T @ left / np.outer(size, size), scaled)
     absorbed = turn[:, shares < VISIBLE**2] / size[:, None]
     # Orthonormal in the metric of the whole columns: what is taken off is what these rows cannot tell.

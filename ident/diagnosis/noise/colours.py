@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from ident.diagnosis.noise.autoregression import autocovariance
-from ident.diagnosis.observations.linear import rms
+from ident.diagnosis.observations.linear import ROUNDING, rms
 from ident.diagnosis.observations.regression import Regression
 from ident.diagnosis.observations.rows import Rows
 from ident.diagnosis.observations.whitening import Left, Predictor, Whitener, colours_of, predictor_of, whitener_of
@@ -39,9 +39,6 @@ PRICE: Final = 2.0
 
 MEMORIES: Final = (0.1, 0.5, 2.0)
 """Of what a model lacks [s], a third of its power each: contacts and friction have it at every one."""
-
-ROUNDING: Final = 1e-9
-"""White share of a covariance, so that a band without any power is not blown up."""
 
 ROUNDS: Final = 4
 """Times that the sizes of all labels are looked at."""
@@ -80,6 +77,7 @@ class Colours:
             # What nothing that repeats tells apart has what is tolerated in it.
             predictor = predictor_of(colour) if alone is None or colour.count else alone.predictors[group]
             tolerated = block.tolerance**2 * memory if colour.count else np.zeros_like(memory)
+            # A white share, so that a band without any power is not blown up.
             least = (ROUNDING * rms(self.rows.target[place])) ** 2 * np.eye(len(memory))
             noise = _covariance(predictor, self.rows.run[place]) + least
             self._places.append(place)

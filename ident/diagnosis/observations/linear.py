@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 RANK: Final = 1e-7
-"""Smallest singular value, relative to the largest, of a baseline column that counts."""
+"""Of columns that are independent: smallest singular value, or power of a combination, relative to the largest."""
+
+ROUNDING: Final = 1e-9
+"""Of a number, relative to those that it was computed from, that is none."""
 
 
 def orthonormal(columns: Array, rank: float = RANK) -> Array:
@@ -43,7 +46,7 @@ def unit_of(baseline: Array, target: Array) -> float:
 
 
 def least_squares(design: Array, target: Array) -> Array:
-    """Coefficients of columns of any scale; of dependent ones, the smallest."""
+    """Coefficients (k,) or (k, m) of columns of any scale for a target (n,) or (n, m); of dependent ones, the least."""
     scale = np.linalg.norm(design, axis=0)
     scale[scale == 0] = 1.0
-    return np.asarray(np.linalg.lstsq(design / scale, target, rcond=1e-7)[0] / scale)
+    return np.asarray(np.linalg.lstsq(design / scale, target, rcond=RANK)[0].T / scale).T

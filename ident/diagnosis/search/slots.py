@@ -16,6 +16,7 @@ from ident.diagnosis.evidence.misfit import tempered
 from ident.diagnosis.evidence.state import State
 from ident.diagnosis.hypotheses.gram import Beside
 from ident.diagnosis.hypotheses.hypotheses import Hypothesis
+from ident.diagnosis.observations.linear import RANK
 from ident.diagnosis.search.ranked import Ranked
 from ident.diagnosis.search.search import Search
 
@@ -36,9 +37,6 @@ them: of 35 names of drawn machines that were sure, one was wrong."""
 
 SAME: Final = 0.9999
 """Cosine of what two names of as many numbers add to the rows, from which those do not tell them apart."""
-
-RANK: Final = 1e-9
-"""Power of a combination of columns, over that of the strongest, from which it is one."""
 
 SAME_LAW: Final = 0.98
 """The same of two laws: what is learnt is known to about as much."""

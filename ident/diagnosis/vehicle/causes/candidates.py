@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.names import LATE, EffectName
 from ident.diagnosis.observations.delays import HELD, RARER
+from ident.diagnosis.observations.linear import ROUNDING
 from ident.diagnosis.problem import Candidate, Variant
 from ident.diagnosis.vehicle.causes.askew import MODES, Travelling, sliding_aside, with_shares
 from ident.diagnosis.vehicle.causes.bending import BristleCause
@@ -49,9 +50,6 @@ from ident.vehicle.parameters import PARAMETER_NAMES
 from ident.vehicle.quantities import GRAVITY
 
 Array = NDArray[np.float64]
-
-ROUNDING: Final = 1e-12
-"""Of a column, relative to what the model has in the same row."""
 
 
 OFFSET_STD: Final = 2.2e-5

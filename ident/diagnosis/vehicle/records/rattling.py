@@ -35,7 +35,7 @@ LEAST: Final = 1e-4
 """Rms by which a motor must move above the band to rattle, at the wheel [rad]: ten times what dry friction makes."""
 
 ABOVE_OTHERS: Final = 5.0
-"""The same over that of the quietest motor, whose encoder has the same noise."""
+"""The same over that of the quietest motor, whose encoder has the same noise; what all show is no gear's."""
 
 OFTEN: Final = 0.1
 """Part of a drive that a motor must rattle for; what it has shaken loose then slides on in all of it [-].

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.vehicle.records.inputs import SLICES
+from ident.diagnosis.vehicle.records.rattling import ABOVE_OTHERS
 from ident.diagnosis.vehicle.records.rows import OwnRows
 from ident.vehicle.geometry import WHEELS, Geometry
 
@@ -25,9 +26,6 @@ Mask = NDArray[np.bool_]
 LEAST: Final = 2e-4
 """Range of its motion from which a motor is loose [rad]; in rigid gears it is up to 0.07 mrad on the emulator, up to
 0.25 mrad where another one of 5 mrad pushes the chassis, or a wheel slides: those rattle in no drive."""
-
-ABOVE_OTHER: Final = 5.0
-"""The same over that of the other motor of its side, unless that is loose as well: what both show is no gear's."""
 
 WIDE: Final = 7e-4
 """Range from which what rolls at standstill is left out of a record [rad]: gears that give way move their motors by up
@@ -60,7 +58,7 @@ def moved_at_rest(beta: Array, near: Mask) -> Array:
     whole = np.array([_extent(angle) for angle in beta[near].T])
     other = whole[::-1]
     across = np.array([max(map(_extent, _parts(angle))) for angle in beta[near].T])
-    return np.where((whole > LEAST) & ((whole > ABOVE_OTHER * other) | (other > LEAST)), across, 0.0)
+    return np.where((whole > LEAST) & ((whole > ABOVE_OTHERS * other) | (other > LEAST)), across, 0.0)
 
 
 def range_of(values: Array, inputs: Array, wheel: int) -> float:

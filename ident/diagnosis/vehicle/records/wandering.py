@@ -18,6 +18,7 @@ from scipy import ndimage
 
 from ident.diagnosis.observations.linear import least_squares
 from ident.diagnosis.vehicle.records.inputs import SLICES
+from ident.diagnosis.vehicle.records.rattling import ABOVE_OTHERS
 from ident.diagnosis.vehicle.records.rows import OwnRows
 from ident.vehicle.geometry import Geometry
 
@@ -44,9 +45,6 @@ apart depends on more than the angle), plays and compliances of a gear 0.05 to 0
 
 LEAST: Final = 5e-5
 """Range of d from which a unit wanders [rad]; without a play it is up to 0.02 mrad on the emulator."""
-
-ABOVE_OTHER: Final = 5.0
-"""The same over that of the other side: what both show is how the floor holds the wheels."""
 
 UNTOLD: Final = 0.1
 """Part of the range that may stay unexplained: a unit does not always reach both flanks [-]."""
@@ -112,7 +110,7 @@ def _range(values: Array, width: int) -> Array:
 
 def wanders(across: float, others: Sequence[float]) -> bool:
     """Whether a range [rad] is that of a play, and not what the other side shows too, if that is known."""
-    return bool(others) and across > max(LEAST, *(ABOVE_OTHER * other for other in others))
+    return bool(others) and across > max(LEAST, *(ABOVE_OTHERS * other for other in others))
 
 
 def wander_rows(side: int, geometry: Geometry) -> OwnRows:
