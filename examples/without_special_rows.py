@@ -131,13 +131,13 @@ def said_of(identifier: str, exam: Path) -> list[str]:
     return [f"{one.name}@{one.where}" for one in found.effects] or [str(found.verdict)]
 
 
-def answers_of(identifier: str, exam: Path) -> Iterator[tuple[str, list[str]]]:
-    """What is said of a case with all rows, and without each kind that finds something."""
+def answers_of(identifier: str, exam: Path, kinds: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
+    """What is said of a case with all rows, and without each of some kinds that finds something."""
     finding = set[str]()
     with noted(finding):
         said = said_of(identifier, exam)
     yield USUAL, said
-    for kind in KINDS:
+    for kind in kinds:
         if kind in finding:
             with without(kind):
                 yield kind, said_of(identifier, exam)
@@ -185,6 +185,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("exams", type=Path, nargs="+", help="of vehicles, whose answers are open")
     parser.add_argument("--key", type=Path, action="append", default=[], help="that an exam was sealed with")
+    parser.add_argument("--kind", action="append", choices=KINDS, help="to leave out; default: each")
     parser.add_argument("--into", type=Path, required=True, help="lines of JSON, appended")
     asked = parser.parse_args()
     lines = [json.loads(line) for line in asked.into.read_text().splitlines()] if asked.into.exists() else []
@@ -194,7 +195,7 @@ def main() -> None:
                 continue
             own = [
                 {"kind": kind, "identifier": identifier, "exam": exam.name, "true": true, "said": said}
-                for kind, said in answers_of(identifier, exam)
+                for kind, said in answers_of(identifier, exam, asked.kind or list(KINDS))
             ]
             lines += own
             with asked.into.open("a", encoding="utf-8") as stream:

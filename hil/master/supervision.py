@@ -28,7 +28,7 @@ class Supervision:
         self._period = network.times["heartbeat_period"]
         self._nodes = {node.node_id: node for node in network.nodes}
         self._next_beat = float("-inf")
-        self._now = 0.0
+        self._now = self._started = 0.0
         self._heard: dict[int, float] = {}
         self._states: dict[int, int] = {}
         self._emergencies: dict[int, tuple[int, int]] = {}
@@ -38,7 +38,7 @@ class Supervision:
 
     def start(self, now: float) -> None:
         """The nodes are operational from `now` [s] on."""
-        self._now = now
+        self._now = self._started = now
         self._next_beat = now
         self._heard = dict.fromkeys(self._nodes, now)
         self._states = dict.fromkeys(self._nodes, _OPERATIONAL)
@@ -78,9 +78,12 @@ class Supervision:
             )
 
     def _on_heartbeat(self, can_id: int, data: bytearray, _timestamp: float) -> None:
-        self._heard[can_id - Service.HEARTBEAT] = self._now
-        if data:
-            self._states[can_id - Service.HEARTBEAT] = data[0] & NMT_STATE
+        node_id = can_id - Service.HEARTBEAT
+        self._heard[node_id] = self._now
+        # One that was on its way as the node was started still says what it was before; the next one does not.
+        period = self._nodes[node_id].quantities["heartbeat_period"].value
+        if data and (data[0] & NMT_STATE == _OPERATIONAL or self._now - self._started > period):
+            self._states[node_id] = data[0] & NMT_STATE
 
     def _on_emergency(self, can_id: int, data: bytearray, _timestamp: float) -> None:
         if len(data) >= 3:

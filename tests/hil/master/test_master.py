@@ -365,6 +365,24 @@ def test_a_node_that_somebody_stopped_is_noticed_by_its_heartbeat_or_its_silence
         drive(master, 200)
 
 
+def test_a_heartbeat_that_was_on_its_way_as_the_node_was_started_is_no_node_that_left(bench, network) -> None:
+    node = bench.devices.nodes[1]
+    usual = node.sync_frames
+
+    def behind_a_late_heartbeat():
+        node.sync_frames = usual
+        node.network.send(0x701, b"\x7f")
+        return usual()
+
+    node.sync_frames = behind_a_late_heartbeat
+    master = enabled(bench, network)
+    drive(master, 200)
+    node.object_dictionary.write(0x1017, 0, 0, downloaded=True)
+    node.network.send(0x701, b"\x7f")
+    with pytest.raises(NodeLostError, match=r"node 1 \(drive_fl\) has left the NMT state operational"):
+        drive(master, 200)
+
+
 def test_a_node_whose_heartbeat_stops_is_noticed_though_its_tpdos_go_on(bench, network) -> None:
     master = enabled(bench, network)
     bench.devices.nodes[6].object_dictionary.write(0x1017, 0, 0, downloaded=True)
