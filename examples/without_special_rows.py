@@ -6,7 +6,7 @@
 
 What rattles, rests, wanders or gives way for a moment is not rolling as the equations say. Each kind is taken out of
 the records in a module of its own; here that module finds nothing, and everything is answered once more, in every case
-in which it had found something. Lines that stand in the file already are not computed again. A case counts as right if
+in which it had found something. Cases that the file has already are passed over. A case counts as right if
 its first effect is the true one.
 """
 
@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from hil.exam.answer_file import open_cases, own_key
 from hil.exam.diagnosing import described, vehicle_records
 from hil.exam.folder import RECORDS, ExamFolder, read_exam
+from ident.diagnosis.diagnosis import NamedEffect
 from ident.diagnosis.vehicle import build
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.diagnosis.vehicle.records import loose, moments, sources
@@ -123,22 +124,27 @@ def noted(finding: set[str]) -> Iterator[None]:
 
 
 def said_of(identifier: str, exam: Path) -> list[str]:
-    """Names and places that are said of a case, or its verdict where it has none."""
+    """Names, places and first sizes that are said of a case, or its verdict where it has none."""
     fit, confirm = ((exam / "cases" / f"{identifier}.{which}.parquet").read_bytes() for which in ("fit", "confirm"))
     records = vehicle_records(fit, confirm)
     texts = [(exam / name).read_text(encoding="utf-8") for name in ("vehicle.toml", "model.toml")]
     found = diagnose_vehicle(records[:1], records[1:], *described(texts[0], texts[1])).diagnosis
-    return [f"{one.name}@{one.where}" for one in found.effects] or [str(found.verdict)]
+    return [_named(one) for one in found.effects] or [str(found.verdict)]
 
 
-def answers_of(identifier: str, exam: Path, kinds: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
+def _named(effect: NamedEffect) -> str:
+    sizes = [f" = {one.value:.3g} ± {one.std:.2g} {one.unit}" for one in effect.parameters.values()]
+    return f"{effect.name}@{effect.where}{''.join(sizes[:1])}"
+
+
+def answers_of(identifier: str, exam: Path, kinds: Collection[str]) -> Iterator[tuple[str, list[str]]]:
     """What is said of a case with all rows, and without each of some kinds that finds something."""
     finding = set[str]()
     with noted(finding):
         said = said_of(identifier, exam)
     yield USUAL, said
-    for kind in kinds:
-        if kind in finding:
+    for kind in KINDS:
+        if kind in finding and kind in kinds:
             with without(kind):
                 yield kind, said_of(identifier, exam)
 
@@ -151,6 +157,11 @@ def truth_of(exam: Path, keys: Sequence[Path]) -> dict[str, str]:
         for case in open_cases(folder, own_key(folder, read_exam(folder), keys))
         if folder.record(case.identifier, RECORDS[-1]).exists()
     }
+
+
+def _names(line: Mapping[str, Any]) -> list[str]:
+    """Without their sizes."""
+    return [one.partition(" = ")[0] for one in line["said"]]
 
 
 def _is_right(line: Mapping[str, Any]) -> bool:
@@ -166,14 +177,11 @@ def table(lines: Sequence[Mapping[str, Any]]) -> str:
     said = {(line["kind"], line["identifier"]): line for line in lines}
     for kind in KINDS:
         pairs = [(said[USUAL, line["identifier"]], line) for line in lines if line["kind"] == kind]
-        right = [
-            sum(line["said"][0].partition("@")[0] == line["true"] for line in column)
-            for column in zip(*pairs, strict=True)
-        ]
+        right = [sum(map(_is_right, column)) for column in zip(*pairs, strict=True)]
         other = [
-            f"{line['true']}: {', '.join(with_them['said'])} -> {', '.join(line['said'])}"
+            f"{line['true']}: {', '.join(_names(with_them))} -> {', '.join(_names(line))}"
             for with_them, line in pairs
-            if with_them["said"] != line["said"]
+            if _names(with_them) != _names(line)
         ]
         counts = " | ".join(map(str, right or [0, 0]))
         rows.append(f"| {kind} | {len(pairs)} | {counts} | {'; '.join(other)} |")
@@ -195,7 +203,7 @@ def main() -> None:
                 continue
             own = [
                 {"kind": kind, "identifier": identifier, "exam": exam.name, "true": true, "said": said}
-                for kind, said in answers_of(identifier, exam, asked.kind or list(KINDS))
+                for kind, said in answers_of(identifier, exam, asked.kind or KINDS)
             ]
             lines += own
             with asked.into.open("a", encoding="utf-8") as stream:

@@ -10,6 +10,7 @@ from hil.network import Network, Node
 from hil.network.cia import NMT_STATE, Service
 
 _OPERATIONAL = 5
+_PRE_OPERATIONAL = 127
 _LOST_AFTER = 3
 """Heartbeat periods without a heartbeat after which a node counts as lost."""
 
@@ -80,10 +81,12 @@ class Supervision:
     def _on_heartbeat(self, can_id: int, data: bytearray, _timestamp: float) -> None:
         node_id = can_id - Service.HEARTBEAT
         self._heard[node_id] = self._now
-        # One that was on its way as the node was started still says what it was before; the next one does not.
-        period = self._nodes[node_id].quantities["heartbeat_period"].value
-        if data and (data[0] & NMT_STATE == _OPERATIONAL or self._now - self._started > period):
+        if data and not (data[0] & NMT_STATE == _PRE_OPERATIONAL and self._may_be_late(node_id)):
             self._states[node_id] = data[0] & NMT_STATE
+
+    def _may_be_late(self, node_id: int) -> bool:
+        """Whether a heartbeat may have been on its way as the node was started, and say what it was before."""
+        return self._now - self._started <= self._nodes[node_id].quantities["heartbeat_period"].value
 
     def _on_emergency(self, can_id: int, data: bytearray, _timestamp: float) -> None:
         if len(data) >= 3:

@@ -16,15 +16,14 @@ def behind_play(driving: Array, half: float, start: float) -> Array:
 
     Args:
         driving: x (N,), in whatever unit.
-        half: of the play, in the same.
+        half: of the play, in the same; not negative.
         start: y before the first sample.
     """
     # Two clips, one after the other, are one: a scan by doubling.
     low, high = driving - half, driving + half
     steps = 1
     while steps < len(driving) and np.any(low[steps:] < high[steps:]):
-        low[steps:], high[steps:] = (
-            np.clip(before[:-steps], low[steps:], high[steps:]) for before in (low.copy(), high.copy())
-        )
+        lower, higher = (np.clip(end[:-steps], low[steps:], high[steps:]) for end in (low, high))
+        low[steps:], high[steps:] = lower, higher
         steps *= 2
     return np.asarray(np.clip(start, low, high))

@@ -47,6 +47,10 @@ position is read is not known, and a delay of T has (sT)²/2 in second order. Er
 up to all of it."""
 WIDEST_GAP: Final = 0.1
 """Over the range of the position: more than that a motion hardly crosses before it reverses again."""
+RESTING: Final = 0.998
+"""Part of half a gap from which a side is pushed: an axis that rests there moves a little to and fro."""
+BETWEEN: Final = math.log(RATIO) / math.sqrt(12)
+"""Of a gap, as part of it: it may lie anywhere between two that are tried."""
 LEAST_SHARE: Final = 0.1
 """Of the effort that must lie behind a play for it to be one."""
 
@@ -121,7 +125,7 @@ def _stribeck(axis: AxisModel) -> Candidate:
     )
     # At half the speed that hardly a row is below, all rows have lost it, but what they miss near a reversal looks so.
     slowest = axis.slowest / 2
-    candidate = shaped_by(axis, EffectName.STRIBECK, parameters, curve, tried_between(slowest, axis.speed))
+    candidate = shaped_by(axis, EffectName.STRIBECK, parameters, curve, tried_between(axis.slowest, axis.speed))
     return replace(candidate, lowest=(0.0, slowest))
 
 
@@ -190,18 +194,17 @@ def _backlash(axis: AxisModel) -> Candidate:
         EffectParameter("gap", axis.kind.position_unit, "whole play"),
         EffectParameter("share", "1", "of the effort that lies behind it"),
     )
-    variants = tuple(map(variant, tried_between(axis.nearest, WIDEST_GAP * axis.reach)))
+    variants = tuple(map(variant, tried_between(RATIO * axis.nearest, WIDEST_GAP * axis.reach)))
     _, force = axis.exactly(lambda values, _baseline: values[1] * missing(float(values[0])))
     return Candidate(
-        EffectName.BACKLASH, axis.place, parameters, variants, force=force, least=LEAST_SHARE, part=RATIO - 1
+        EffectName.BACKLASH, axis.place, parameters, variants, force=force, least=LEAST_SHARE, part=BETWEEN
     )
 
 
 def in_gap(position: Array, gap: float) -> Array:
     """1 where a position (N,) is on its way across a gap after a reversal, 0 where it pushes one of its sides."""
     behind = behind_play(position, gap / 2, float(position[0]))
-    pushed = (behind == position - gap / 2) | (behind == position + gap / 2)
-    return np.where(pushed, 0.0, 1.0)
+    return np.where(np.abs(position - behind) < RESTING * gap / 2, 1.0, 0.0)
 
 
 def _torque_ripple(axis: AxisModel) -> Candidate:

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from ident.diagnosis.check.refit import Part
+from ident.diagnosis.observations.linear import ROUNDING
 from ident.diagnosis.problem import Candidate
 
 SURELY: Final = 2.0
@@ -26,8 +27,12 @@ def is_sizeless(candidate: Candidate, part: Part) -> bool:
 
 
 def is_foreign(candidate: Candidate, part: Part) -> bool:
-    """Whether the refit has made something else of an effect, of parameters that it does not have."""
-    return bool(candidate.lowest) and bool(np.any(np.abs(part.values) < candidate.lowest))
+    """Whether the refit has made something else of an effect, of parameters that it does not have.
+
+    A speed or a distance that is at the least that rows can bound is where they want less of it.
+    """
+    lowest = np.array(candidate.lowest)
+    return bool(np.any((lowest > 0) & (np.abs(part.values[: len(lowest)]) <= (1 + ROUNDING) * lowest)))
 
 
 def is_nothing(candidate: Candidate, part: Part) -> bool:

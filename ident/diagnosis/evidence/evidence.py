@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -67,11 +68,20 @@ class Evidence:
         found = self._bent(bends) if bends else Gram.of_all(self._beside)
         return Target(self, found, -0.5 * float(found.target[-1]) - self._volume - self._determinant)
 
+    @cached_property
+    def _plain(self) -> Target:
+        return self.target_beside(())
+
+    @cached_property
+    def _beside_nothing(self) -> Beside:
+        return self._plain.beside({})
+
     def alone(self, hypothesis: int) -> Table:
         """Log evidence of a hypothesis beside nothing, and beside what acts in other rows."""
         if hypothesis not in self._alone:
-            blocks, target = self.design.hypotheses[hypothesis].blocks, self.target_beside(())
-            (self._alone[hypothesis],) = target.tables_by([blocks], target.beside({}))
+            (self._alone[hypothesis],) = self._plain.tables_by(
+                [self.design.hypotheses[hypothesis].blocks], self._beside_nothing
+            )
         return self._alone[hypothesis]
 
     def parameters(self, added: Array) -> Array:
@@ -175,7 +185,7 @@ class Target:
         return {one: self.evidence.alone(one) if one in alone else next(rest) for one in hypotheses}
 
     def tables_by(self, blocks: Sequence[Sequence[Block]], products: Beside) -> list[Table]:
-        """The same by some blocks of each."""
+        """Of hypotheses that have these blocks, whose numbers in the tables are their places here."""
         evidence = self.evidence
         return tables_of(blocks, evidence.products.at, products, evidence.scales, len(evidence.design.target))
 

@@ -2,8 +2,9 @@
 
 Where all hypotheses are a little wrong, the likelihood grows with the rows as if each of them was new. The sandwich
 over stretches of rows (White 1982) is the variance of what is found whatever the noise is. Likelihoods are taken to the
-power of the inverse of the ratio before they are integrated (Pauli, Racugno and Ventura 2011). Scores are not corrected
-for leverage: a member that acts in a few stretches alone has a ratio that is too small.
+power of the inverse of the ratio before they are integrated (Pauli, Racugno and Ventura 2011). What is fitted follows
+the rows of a stretch that has much of a member: so residuals of a stretch are made as large as they would be without,
+by the leverage of its rows, and the ratio is one in the mean where the noise is as it says (Bell and McCaffrey 2002).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.observations.linear import stretch_sums
+from ident.diagnosis.observations.linear import RANK
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ def excess_of_scatter(
     beside, wanted = known
     inverse = np.linalg.inv(np.eye(white.shape[1]) + white.T @ white + beside.T @ beside)
     found = inverse @ (white.T @ target + beside.T @ wanted)
-    scores = stretch_sums(white * (target - white @ found)[:, None], stretch)
+    scores = _unbiased_scores(white, target - white @ found, np.asarray(inverse, dtype=np.float64), stretch)
     # What is known otherwise, the priors included, is as uncertain as it says.
     otherwise = inverse @ (np.eye(len(inverse)) + beside.T @ beside) @ inverse
     scattered = scores @ inverse
@@ -49,3 +50,18 @@ def excess_of_scatter(
         by_rows = float(np.sum((scattered[:, place] @ along) ** 2) + along @ otherwise[place, place] @ along)
         ratios.append(max(by_rows / by_noise, 1.0) if by_noise > 0 else 1.0)
     return ratios
+
+
+def _unbiased_scores(white: Array, residual: Array, inverse: Array, stretch: NDArray[np.int64]) -> Array:
+    """(J, k) sums of columns times residuals over every stretch, these over (1 - H)^(1/2), H its rows' leverage."""
+    starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
+    scores = np.zeros((len(starts), white.shape[1]))
+    for number, (rows, left) in enumerate(
+        zip(np.split(white, starts[1:]), np.split(residual, starts[1:]), strict=True)
+    ):
+        leverages, turn = np.linalg.eigh(rows @ inverse @ rows.T)
+        # What a stretch alone tells leaves no residual there, and says nothing of the noise.
+        free = 1 - leverages
+        weight = np.where(free > RANK, 1 / np.sqrt(np.maximum(free, RANK)), 0.0)
+        scores[number] = (left @ turn * weight) @ (turn.T @ rows)
+    return scores

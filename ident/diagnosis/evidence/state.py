@@ -76,7 +76,7 @@ class State:
 
     @cached_property
     def _made(self) -> dict[tuple[int, int | None, tuple[tuple[int, Member], ...]], Table]:
-        """Tables of members beside others, as long as the exact forms are the same."""
+        """Tables of members beside others; exact forms and noise are the same for all that share it."""
         return {}
 
     def cost(self, hypothesis: int) -> float:

@@ -96,6 +96,8 @@ def tables_of(
         scales: (S,) tried, rising.
         count: number of the rows.
     """
+    if not hypotheses:
+        return []
     every = [block for blocks in hypotheses for block in blocks]
     masses = masses_of(every, scales)
     logs, occam = logs_of(every, [at(block.place) for block in every], products, scales, count)
@@ -127,7 +129,7 @@ def logs_of(
     if single:
         starts = np.array([places[number].start for number in single])
         logs[single], occam[single] = _of_single([blocks[number] for number in single], starts, products, scales, count)
-    for alike in _of_one_size(blocks, places, products):
+    for alike in _by_directions(blocks, places, products):
         logs[list(alike)], occam[list(alike)] = _of_several(blocks, alike, scales)
     largest = np.maximum([block.largest for block in blocks], scales[0])
     logs[scales > largest[:, None]] = -math.inf
@@ -163,10 +165,13 @@ def _are_refused(blocks: Sequence[Block], sizes: Array) -> NDArray[np.bool_]:
     return np.asarray((sizes <= least) | small)
 
 
-def _of_one_size(
+def _by_directions(
     blocks: Sequence[Block], places: Sequence[slice], products: Beside
 ) -> Iterable[Mapping[int, tuple[Array, Array]]]:
-    """Products (R, R) and (R,) of blocks of several columns, by number, those together that have as many directions."""
+    """Products (R, R) and (R,) of the directions Φ of blocks of several columns, those of one number R together.
+
+    Φ' X Φ and Φ' z by number of the block; a law of a single direction is one of these.
+    """
     found = defaultdict[int, dict[int, tuple[Array, Array]]](dict)
     inner = dict[int, Array]()
     for number, (block, place) in enumerate(zip(blocks, places, strict=True)):

@@ -178,6 +178,7 @@ def _beside_absorbed(design: Array, left: Array) -> Array:
     """
     whole = design.T @ design
     size = np.sqrt(np.maximum(np.diag(whole), np.finfo(float).tiny))
+    # Some of the columns may be the same.
     scaled = whole / np.outer(size, size) + ROUNDING * np.eye(len(whole))
     shares, turn = linalg.eigh(left.T @ left / np.outer(size, size), scaled)
     absorbed = turn[:, shares < VISIBLE**2] / size[:, None]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 RANK: Final = 1e-7
-"""Of columns that are independent: smallest singular value, or power of a combination, relative to the largest."""
+"""Smallest singular value, relative to the largest, of a column that counts."""
 
 ROUNDING: Final = 1e-9
 """Of a number, relative to those that it was computed from, that is none."""

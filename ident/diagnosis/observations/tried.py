@@ -11,12 +11,18 @@ RATIO: Final = 1.5
 """Between neighbours, at most: a descent, or an interpolation, reaches the rest."""
 
 
+SMALLEST: Final = 1e-3
+"""Of the most: what a shape does within less is over before the next row."""
+
+
 def tried_between(least: float, most: float) -> tuple[float, ...]:
     """Numbers at equal ratios, both ends included; `least` alone where `most` is not beyond it.
 
     Args:
-        least, most: positive, in whatever unit.
+        least, most: in whatever unit; rows that bound nothing would ask for ever more, so `least` counts from a
+            thousandth of `most` on.
     """
+    least = max(least, SMALLEST * most)
     if most <= least:
         return (least,)
     count = 1 + math.ceil(math.log(most / least) / math.log(RATIO))

@@ -16,7 +16,7 @@ from ident.diagnosis.evidence.misfit import tempered
 from ident.diagnosis.evidence.state import State
 from ident.diagnosis.hypotheses.gram import Beside
 from ident.diagnosis.hypotheses.hypotheses import Hypothesis
-from ident.diagnosis.observations.linear import RANK
+from ident.diagnosis.observations.linear import ROUNDING
 from ident.diagnosis.search.ranked import Ranked
 from ident.diagnosis.search.search import Search
 
@@ -189,7 +189,10 @@ class _Place:
 
 
 def _cosines(state: State, index: int, others: Mapping[int, float]) -> dict[int, tuple[float, int]]:
-    """Of what a member adds to the white rows beside the others, and what each other can; by how many columns."""
+    """Of what a member adds to the white rows beside the others, and what each other can; by how many columns.
+
+    By whatever its columns can make, of a law at all lengths together.
+    """
     products, hypotheses = state.target.beside(state.without(index)), state.evidence.design.hypotheses
     own = hypotheses[index].blocks[state.members[index].block].place
     mean = state.target.means(state.members)[index]
@@ -211,5 +214,5 @@ def _reached(products: Beside, place: slice, own: slice, mean: Array) -> float:
         power = float(products.diagonal[place.start])
         return float(along[0]) ** 2 / power if power > 0 else 0.0
     powers, turn = np.linalg.eigh(products.of(place, place))
-    kept = powers > RANK * powers.max()
+    kept = powers > ROUNDING * powers.max()
     return float(np.sum((along @ turn[:, kept]) ** 2 / powers[kept]))

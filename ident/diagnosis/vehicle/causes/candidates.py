@@ -154,7 +154,7 @@ def slid_by_any(sources: Sequence[Source], context: Context) -> Sequence[Array |
 def seen_together(
     candidates: Sequence[Candidate], sources: Sequence[Source], tables: Sequence[Array], context: Context
 ) -> Iterator[Candidate]:
-    """The candidates: offsets of the steering with shares, and slip only of wheels that slide alone, and let go."""
+    """The candidates: offsets of the steering with shares; slip of a wheel that slides alone, or of what lets go."""
     driving = [source for source in sources if source.rolls and not source.rattles.any()]
     inputs, settings = [context.inputs(one) for one in driving], [context.setting(one) for one in driving]
     times = np.sum([np.zeros(len(WHEEL_PLACES)), *map(sliding_times, inputs, settings)], axis=0)
@@ -164,8 +164,9 @@ def seen_together(
     dragging = context.known[PARAMETER_NAMES.index("m_ch")] * GRAVITY / 4 * context.geometry.wheel_radius / 2
     for candidate in candidates:
         if candidate.effect == EffectName.SLIP:
-            alone = slides_alone(sliding_cause(candidate.where), times)
-            yield replace(candidate, excluded=not (alone and lets_go))
+            cause = sliding_cause(candidate.where)
+            possible = slides_alone(cause, times) and (len(cause.wheels) == 1 or lets_go)
+            yield replace(candidate, excluded=not possible)
         else:
             askew = candidate.effect == EffectName.STEERING_OFFSET
             yield with_shares(candidate, blocks, dragging) if askew else candidate

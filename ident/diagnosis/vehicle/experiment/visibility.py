@@ -14,7 +14,6 @@ from ident.diagnosis.observations.directions import VISIBLE
 from ident.diagnosis.observations.linear import orthonormal
 from ident.diagnosis.observations.rows import Rows, make_rows
 from ident.diagnosis.problem import Channel, Problem
-from ident.diagnosis.search.slots import SAME_LAW
 from ident.diagnosis.vehicle.build import build_problem
 from ident.diagnosis.vehicle.causes.lag import LAG_NAME
 from ident.diagnosis.vehicle.experiment.ideal import DIAGNOSTIC, FOUR, Drive, ideal_record
@@ -22,6 +21,9 @@ from ident.effects import Effect
 from ident.vehicle.description import VehicleDescription
 
 Array = NDArray[np.float64]
+
+ALIKE: Final = 0.98
+"""Cosine of the angle between what two causes leave, from which they count as one."""
 
 RANK: Final = 1e-6
 """Smallest singular value, relative to the largest, of a baseline column that counts."""
@@ -104,7 +106,7 @@ def _are_alike(first: Array, second: Array) -> bool:
         return False
     cosines = first.T @ second
     # The Frobenius norm is no smaller, and takes no singular values.
-    return bool(np.linalg.norm(cosines) > SAME_LAW and np.linalg.norm(cosines, 2) > SAME_LAW)
+    return bool(np.linalg.norm(cosines) > ALIKE and np.linalg.norm(cosines, 2) > ALIKE)
 
 
 FORETOLD: Final = frozenset(EffectName) - {EffectName.PARAMETER_CHANGE, EffectName.SLIP}

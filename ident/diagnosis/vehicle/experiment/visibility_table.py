@@ -11,9 +11,8 @@ from typing import Final
 
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.observations.directions import VISIBLE
-from ident.diagnosis.search.slots import SAME_LAW
 from ident.diagnosis.vehicle.experiment.ideal import DIAGNOSTIC
-from ident.diagnosis.vehicle.experiment.visibility import EXPERIMENTS, Sight, Visibility
+from ident.diagnosis.vehicle.experiment.visibility import ALIKE, EXPERIMENTS, Sight, Visibility
 from ident.effects import EFFECTS
 from ident.vehicle.description import load_vehicle
 
@@ -35,7 +34,7 @@ those of the eleven parameters, on ideal records of each experiment. Regenerate 
 `python -m ident.diagnosis.vehicle.experiment.visibility_table`; a test compares this page with the equations.
 
 - `-`: **invisible**. The parameters absorb the effect (they leave less than {VISIBLE:g} of its column).
-- `seen`: visible, but another effect looks the same (cosine of the angle between what both leave above {SAME_LAW:g}).
+- `seen`: visible, but another effect looks the same (cosine of the angle between what both leave above {ALIKE:g}).
 - `split`: told apart from every other effect, but not its place from another place.
 - `placed`: effect and place.
 

@@ -49,7 +49,7 @@ ALONE: Final = 0.9
 what sets wheels against each other (see `ident.diagnosis.vehicle.causes.askew`) makes several of them slide [-]."""
 
 HOLDING: Final = 0.5
-"""Part of the largest traction of sliding wheels below which a floor of low friction holds them [-].
+"""Part of the largest traction of sliding wheels below which a floor of low friction under all holds them [-].
 
 It lets go where the traction fills the friction cone, with what of it acts across the wheel. What sets wheels against
 each other drags them over any floor, at any traction.

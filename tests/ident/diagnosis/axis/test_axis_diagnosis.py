@@ -247,6 +247,12 @@ def test_a_play_is_crossed_after_every_reversal_and_only_then() -> None:
     assert not inside[122:].any()
 
 
+def test_an_axis_that_rests_at_a_side_of_its_play_is_not_crossing_it() -> None:
+    """A position that is smoothed rings a little there."""
+    rests = 1 + 1e-6 * np.sin(np.arange(200.0))
+    assert not in_gap(np.concatenate([np.linspace(0, 1, 101), rests]), 0.2)[25:].any()
+
+
 EMPS = os.environ.get("QUASIOMNI_EMPS", "")
 needs_emps = pytest.mark.skipif(
     not EMPS, reason="QUASIOMNI_EMPS does not name DATA_EMPS.mat, which is not ours to ship"

@@ -66,6 +66,20 @@ def test_the_evidence_of_a_hypothesis_integrates_its_scale(problems: tuple[Probl
     assert target.table_of(number, {}).total == pytest.approx(table.total)
 
 
+def test_hypotheses_looked_at_together_have_the_evidence_that_each_has_alone(
+    problems: tuple[Problem, Problem], asked: Asked
+) -> None:
+    question = asked(*problems)
+    target = Evidence(question.products, question.colours.usual).target_beside(())
+    beside = target.beside({question.number("b@place"): Member(0, 2.0)})
+    others = [one for one in range(len(question.design.hypotheses)) if one != question.number("b@place")]
+    together = target.tables(others, beside)
+    for one in others:
+        alone = target.table(one, beside)
+        np.testing.assert_allclose(together[one].logs, alone.logs, rtol=1e-9)
+        assert together[one].best == alone.best
+
+
 def test_what_physics_expects_of_a_size_weighs_as_a_row_does(problems: tuple[Problem, Problem], asked: Asked) -> None:
     """Against the integral over the size, by quadrature."""
 

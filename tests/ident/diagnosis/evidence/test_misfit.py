@@ -40,3 +40,20 @@ def test_what_is_known_otherwise_does_not_scatter() -> None:
     ratios = excess_of_scatter(white, target, known, stretch, [slice(0, 1), slice(1, 3)])
     assert ratios[0] == pytest.approx(1.0, abs=0.01)
     assert ratios[1] > 5
+
+
+def test_the_scatter_of_few_stretches_is_told_though_what_is_fitted_follows_their_rows() -> None:
+    draw, stretch = np.random.default_rng(5), np.repeat(np.arange(60), 10)
+    white = draw.normal(size=(600, 3))
+    white[stretch > 2, 1] = 0.0
+    targets = white @ [2.0, 5.0, -5.0] + 3.0 * draw.normal(size=(400, 600))
+    ratios = [excess_of_scatter(white, target, NOTHING, stretch, [slice(0, 1), slice(1, 2)]) for target in targets]
+    assert np.mean(ratios, axis=0) == pytest.approx([9.0, 9.0], rel=0.1)
+
+
+def test_what_a_single_stretch_tells_is_taken_as_it_is() -> None:
+    draw, stretch = np.random.default_rng(6), np.repeat(np.arange(60), 10)
+    white = draw.normal(size=(600, 3))
+    white[:, 1] = 1e5 * (stretch == 7)
+    target = white @ [2.0, 5e-5, -5.0] + 3.0 * draw.normal(size=600)
+    assert excess_of_scatter(white, target, NOTHING, stretch, [slice(1, 2)]) == [1.0]
