@@ -21,13 +21,14 @@ from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.plans import plans_from_text
 from ident.campaign.plan import Plan
 from ident.campaign.reference import STEERING_LOOPS, sample_times
+from ident.diagnosis.observations.directions import VISIBLE
 from ident.diagnosis.observations.linear import least_squares, orthonormal
 from ident.diagnosis.observations.rows import Column, make_rows
 from ident.diagnosis.problem import Candidate, Problem
 from ident.diagnosis.vehicle.build import build_problem
 from ident.diagnosis.vehicle.causes.library import DRIFTS, POSITIVE
 from ident.diagnosis.vehicle.experiment.advice import Driven, hidden_effects
-from ident.diagnosis.vehicle.experiment.visibility import RANK, VISIBLE, Visibility, row_noise
+from ident.diagnosis.vehicle.experiment.visibility import RANK, Visibility, row_noise
 from ident.effects import EFFECTS
 from ident.parameters_file import read_model
 from ident.records.record import Record, Segment, make_segment

@@ -37,7 +37,6 @@ from ident.diagnosis.vehicle.records.sliding import (
     SlidingCause,
     adhesion,
     slides_alone,
-    slides_at_its_limit,
     sliding_cause,
     sliding_causes,
     sliding_times,
@@ -154,19 +153,16 @@ def slid_by_any(sources: Sequence[Source], context: Context) -> Sequence[Array |
 def seen_together(
     candidates: Sequence[Candidate], sources: Sequence[Source], tables: Sequence[Array], context: Context
 ) -> Iterator[Candidate]:
-    """The candidates: offsets of the steering with shares; slip of a wheel that slides alone, or of what lets go."""
+    """The candidates: offsets of the steering with shares, and slip only of wheels that slide alone."""
     driving = [source for source in sources if source.rolls and not source.rattles.any()]
     inputs, settings = [context.inputs(one) for one in driving], [context.setting(one) for one in driving]
     times = np.sum([np.zeros(len(WHEEL_PLACES)), *map(sliding_times, inputs, settings)], axis=0)
-    lets_go = slides_at_its_limit(inputs, settings)
     blocks = list(_travelling(sources, tables, context.geometry))
     # Two of the four wheels slide by the whole angle, or all by half of it.
     dragging = context.known[PARAMETER_NAMES.index("m_ch")] * GRAVITY / 4 * context.geometry.wheel_radius / 2
     for candidate in candidates:
         if candidate.effect == EffectName.SLIP:
-            cause = sliding_cause(candidate.where)
-            possible = slides_alone(cause, times) and (len(cause.wheels) == 1 or lets_go)
-            yield replace(candidate, excluded=not possible)
+            yield replace(candidate, excluded=not slides_alone(sliding_cause(candidate.where), times))
         else:
             askew = candidate.effect == EffectName.STEERING_OFFSET
             yield with_shares(candidate, blocks, dragging) if askew else candidate

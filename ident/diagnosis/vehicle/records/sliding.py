@@ -48,19 +48,6 @@ ALONE: Final = 0.9
 """Part of all the time that wheels surely slide in which it must be one wheel, for the floor under it to be the cause:
 what sets wheels against each other (see `ident.diagnosis.vehicle.causes.askew`) makes several of them slide [-]."""
 
-HOLDING: Final = 0.5
-"""Part of the largest traction of sliding wheels below which a floor of low friction under all holds them [-].
-
-It lets go where the traction fills the friction cone, with what of it acts across the wheel. What sets wheels against
-each other drags them over any floor, at any traction.
-"""
-
-DRAGGED: Final = 0.25
-"""Part of the square of all sliding that may be below that: a wheel that has slid rolls again some time later [-].
-
-On 10 cases of low friction of two engines it was 0.002 to 0.19, on 5 of wheels 5 mrad askew 0.28 to 0.70.
-"""
-
 ALONG: Final = 0.8
 """Part of the friction cone that the traction has filled when a wheel slides; the rest acts across its plane [-]."""
 
@@ -194,17 +181,6 @@ def sliding_times(inputs: Array, setting: Setting) -> Array:
     sense = np.sign(np.stack([traction(inputs, wheel, setting) for wheel in range(len(WHEEL_PLACES))], axis=1))
     forward = sense * ahead_of_the_rest(inputs, setting.geometry, setting.sample_time)
     return np.asarray(setting.sample_time * np.sum(_surely(forward, speed), axis=0))
-
-
-def slides_at_its_limit(inputs: Sequence[Array], settings: Sequence[Setting]) -> bool:
-    """Whether wheels slide only where their traction is large, by the signals (N, INPUTS) of drives."""
-    dragged, slid = 0.0, 0.0
-    for one, setting in zip(inputs, settings, strict=True):
-        power = np.square(ANY_WHEEL.sliding(one, setting))
-        pull = np.abs(np.stack([traction(one, wheel, setting) for wheel in ANY_WHEEL.wheels], axis=1))
-        held = pull < HOLDING * pull[power > 0].max(initial=0.0)
-        dragged, slid = dragged + float(power[held].sum()), slid + float(power.sum())
-    return dragged <= DRAGGED * slid
 
 
 def _slides(forward: Array, speed: Array) -> Mask:
