@@ -25,7 +25,7 @@ from ident.diagnosis.names import LAW
 from ident.diagnosis.noise.colours import SIZES, Colours
 from ident.diagnosis.observations.orders import with_orders
 from ident.diagnosis.problem import Problem
-from ident.diagnosis.search.asked import Asked, asked_beside, asked_beside_a_law, asked_of
+from ident.diagnosis.search.asked import Asked, asked_beside, asked_beside_a_law, asked_of, asked_once_more
 from ident.diagnosis.search.search import Search
 from ident.diagnosis.search.slots import slot_of
 from ident.stages import Stage, untold
@@ -70,7 +70,7 @@ def answer_of(fit: Problem, confirm: Problem, *, seed: int, stage: Stage = untol
 
 
 def _found(asked: Asked, stage: Stage) -> tuple[Asked, Search, State]:
-    """What is there, asked once more beside it."""
+    """What is there, asked again beside it."""
     search = Search(asked.fitter)
     # Without repeats the first noise only leads to the second: what has grown by it leaves as much as what is best.
     state = search.run() if Colours.repeats(asked.regression) else search.grown(asked.fitter.nothing)
@@ -78,7 +78,11 @@ def _found(asked: Asked, stage: Stage) -> tuple[Asked, Search, State]:
         return asked, search, state
     stage("again beside what is there")
     search = Search(again.fitter)
-    return again, search, search.run()
+    state = search.run()
+    if (once_more := asked_once_more(asked, again, state)) is not None:
+        again, search = once_more, Search(once_more.fitter)
+        state = search.run()
+    return again, search, state
 
 
 def _likelier(asked: Asked, before: State, stage: Stage) -> tuple[Asked, Search, State] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ident.diagnosis.evidence.fitting import Fitter
 from ident.diagnosis.evidence.state import State
@@ -49,6 +49,25 @@ def asked_beside(asked: Asked, state: State) -> Asked | None:
         left = asked.fitter.left(state)
     problems = with_hidden_orders(problems, asked.design, asked.designs, state) or problems
     return None if problems is asked.problems and left is None else asked_of(problems, asked.designs, left)
+
+
+def asked_once_more(asked: Asked, again: Asked, state: State) -> Asked | None:
+    """The second question, what its set differs by known better; None where the first one knew nothing of that.
+
+    Numbers that were found with a drift in the noise are rough, and leave some of it there.
+
+    Args:
+        asked, again: the first question, and the one beside what was found.
+        state: what was found by that.
+    """
+    same = all(one.blocks is other.blocks for one, other in zip(asked.problems, again.problems, strict=True))
+    if same or not Colours.repeats(asked.regression):
+        return None
+    known = with_known_differences(asked.problems, asked.regression, again.design, again.designs, state)
+    if known is asked.problems:
+        return None
+    problems = tuple(replace(mine, blocks=one.blocks) for mine, one in zip(again.problems, known, strict=True))
+    return asked_of(problems, again.designs)
 
 
 def asked_beside_a_law(asked: Asked, state: State) -> Asked | None:
