@@ -69,20 +69,19 @@ class Evidence:
         return Target(self, found, -0.5 * float(found.target[-1]) - self._volume - self._determinant)
 
     @cached_property
-    def _plain(self) -> Target:
-        return self.target_beside(())
-
-    @cached_property
-    def _beside_nothing(self) -> Beside:
-        return self._plain.beside({})
+    def _plain(self) -> Beside:
+        """All columns beside nothing; what is large here holds nothing that holds it, and goes when it is not asked."""
+        return Beside.beside_nothing(Gram.of_all(self._beside))
 
     def alone(self, hypothesis: int) -> Table:
         """Log evidence of a hypothesis beside nothing, and beside what acts in other rows."""
         if hypothesis not in self._alone:
-            (self._alone[hypothesis],) = self._plain.tables_by(
-                [self.design.hypotheses[hypothesis].blocks], self._beside_nothing
-            )
+            (self._alone[hypothesis],) = self.tables_by([self.design.hypotheses[hypothesis].blocks], self._plain)
         return self._alone[hypothesis]
+
+    def tables_by(self, blocks: Sequence[Sequence[Block]], products: Beside) -> list[Table]:
+        """Of hypotheses that have these blocks, whose numbers in the tables are their places here."""
+        return tables_of(blocks, self.products.at, products, self.scales, len(self.design.target))
 
     def parameters(self, added: Array) -> Array:
         """(p,) of the plant beside what some members add (n,), in their units; those that are known as they are."""
@@ -131,7 +130,7 @@ class Target:
     def beside(self, members: Members) -> Beside:
         """The products of columns and of the target, members integrated."""
         if not members:
-            return Beside(self.products, np.zeros((len(self.products), 0)), np.zeros(0))
+            return Beside.beside_nothing(self.products)
         own, rows = self._stacked(members)
         powers, directions = self._directions(own, rows)
         return Beside(self.products, self.products.columns(rows) @ directions, powers)
@@ -167,7 +166,7 @@ class Target:
             return self.table(hypothesis, self.beside(others))
         # What is expected of it stands in its products already.
         block = replace(self.evidence.design.hypotheses[hypothesis].blocks[only], expected=None)
-        (table,) = self.tables_by([[block]], self.beside(others))
+        (table,) = self.evidence.tables_by([[block]], self.beside(others))
         return replace(table, blocks=(only,))
 
     def table(self, hypothesis: int, products: Beside) -> Table:
@@ -180,14 +179,9 @@ class Target:
         alone = {
             one for one in hypotheses if all(products.untouched[at(block.place)].all() for block in every[one].blocks)
         }
-        made = self.tables_by([every[one].blocks for one in hypotheses if one not in alone], products)
+        made = self.evidence.tables_by([every[one].blocks for one in hypotheses if one not in alone], products)
         rest = iter(made)
         return {one: self.evidence.alone(one) if one in alone else next(rest) for one in hypotheses}
-
-    def tables_by(self, blocks: Sequence[Sequence[Block]], products: Beside) -> list[Table]:
-        """Of hypotheses that have these blocks, whose numbers in the tables are their places here."""
-        evidence = self.evidence
-        return tables_of(blocks, evidence.products.at, products, evidence.scales, len(evidence.design.target))
 
     def _block(self, index: int, member: Member) -> Block:
         return self.evidence.design.hypotheses[index].blocks[member.block]

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.observations.linear import RANK
+from ident.diagnosis.observations.linear import RANK, starts_of
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def excess_of_scatter(
 
 def _unbiased_scores(white: Array, residual: Array, inverse: Array, stretch: NDArray[np.int64]) -> Array:
     """(J, k) sums of columns times residuals over every stretch, these over (1 - H)^(1/2), H its rows' leverage."""
-    starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
+    starts = starts_of(stretch)
     scores = np.zeros((len(starts), white.shape[1]))
     for number, (rows, left) in enumerate(
         zip(np.split(white, starts[1:]), np.split(residual, starts[1:]), strict=True)

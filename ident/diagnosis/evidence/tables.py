@@ -99,22 +99,22 @@ def tables_of(
     if not hypotheses:
         return []
     every = [block for blocks in hypotheses for block in blocks]
-    masses = masses_of(every, scales)
-    logs, occam = logs_of(every, [at(block.place) for block in every], products, scales, count)
+    masses = _masses(every, scales)
+    logs, occam = _logs(every, [at(block.place) for block in every], products, scales, count)
     logs += masses[:, None]
     ends = np.cumsum([len(blocks) for blocks in hypotheses])[:-1]
     parts = zip(*(np.split(values, ends) for values in (logs, occam, masses)), strict=True)
     return [Table(scales, own, costs, mass, range(len(mass))) for own, costs, mass in parts]
 
 
-def masses_of(blocks: Sequence[Block], scales: Array) -> Array:
+def _masses(blocks: Sequence[Block], scales: Array) -> Array:
     """(G,) log of the prior mass of every block at one of the scales (S,)."""
     allowed = np.searchsorted(scales, [block.largest for block in blocks], side="right")
     one_sided = np.array([math.log(2) if block.least == 0 else 0.0 for block in blocks])
     return np.asarray(np.array([block.weight for block in blocks]) - np.log(np.maximum(allowed, 1)) + one_sided)
 
 
-def logs_of(
+def _logs(
     blocks: Sequence[Block], places: Sequence[slice], products: Beside, scales: Array, count: int
 ) -> tuple[Array, Array]:
     """(G, S) log evidence of blocks against their absence, and what of that integrating the coefficients costs.

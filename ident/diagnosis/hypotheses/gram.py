@@ -98,6 +98,11 @@ class Beside:
     across: Array
     powers: Array
 
+    @staticmethod
+    def beside_nothing(gram: Gram) -> Beside:
+        """No members."""
+        return Beside(gram, np.zeros((len(gram), 0)), np.zeros(0))
+
     def of(self, place: slice, other: slice) -> Array:
         """Products of the columns of one place with those of another."""
         return np.asarray(self.gram.of(place, other) - (self.across[place] / (1 + self.powers)) @ self.across[other].T)

@@ -29,9 +29,14 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
+def starts_of(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Where (J,) stretches or runs of rows begin, by their numbers (n,), of which neighbours have others."""
+    return np.flatnonzero(np.diff(numbers, prepend=-1) != 0)
+
+
 def stretch_sums(values: Array, stretch: NDArray[np.int64]) -> Array:
     """Sums (J,) or (J, k) of rows over stretches, whose numbers (n,) rise."""
-    starts = np.flatnonzero(np.diff(stretch, prepend=-1) != 0)
+    starts = starts_of(stretch)
     return np.asarray(np.add.reduceat(values, starts, axis=0)) if starts.size else np.zeros((0, *values.shape[1:]))
 
 

@@ -10,7 +10,6 @@ import numpy as np
 RATIO: Final = 1.5
 """Between neighbours, at most: a descent, or an interpolation, reaches the rest."""
 
-
 SMALLEST: Final = 1e-3
 """Of the most: what a shape does within less is over before the next row."""
 

@@ -16,6 +16,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.observations.linear import starts_of
 from ident.diagnosis.observations.rows import Rows
 
 Array = NDArray[np.float64]
@@ -91,7 +92,7 @@ class Whitener:
 def row_ages(rows: Rows) -> NDArray[np.int64]:
     """How many rows of the same run lie before each row (n,)."""
     number = np.arange(len(rows))
-    starts = np.flatnonzero(np.diff(rows.run, prepend=-1) != 0)
+    starts = starts_of(rows.run)
     lengths = np.diff(np.append(starts, len(rows)))
     return np.asarray(number - np.repeat(starts, lengths))
 

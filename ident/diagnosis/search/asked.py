@@ -60,8 +60,7 @@ def asked_once_more(asked: Asked, again: Asked, state: State) -> Asked | None:
         asked, again: the first question, and the one beside what was found.
         state: what was found by that.
     """
-    same = all(one.blocks is other.blocks for one, other in zip(asked.problems, again.problems, strict=True))
-    if same or not Colours.repeats(asked.regression):
+    if all(one.blocks is other.blocks for one, other in zip(asked.problems, again.problems, strict=True)):
         return None
     known = with_known_differences(asked.problems, asked.regression, again.design, again.designs, state)
     if known is asked.problems:

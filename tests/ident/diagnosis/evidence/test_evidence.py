@@ -137,7 +137,7 @@ def test_a_tempered_likelihood_is_that_of_rows_of_so_much_more_variance(
     alone = whole.target.table(number, whole.target.beside({}))
     blocks = question.design.hypotheses[number].blocks
     products = diluted_by(excess, whole.target.beside({}))
-    (table,) = whole.target.tables_by([blocks], products)
+    (table,) = whole.evidence.tables_by([blocks], products)
     diluted = table.total - price
     slot = slot_of(question.search, whole, number, excess)
     bare = state.log_posterior - question.search.fitter.nothing.log_posterior
