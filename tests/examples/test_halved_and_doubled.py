@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from examples.halved_and_doubled import changed, constants_of
-from ident.diagnosis.answer import answered
+from ident.diagnosis.answer import contest
 from ident.diagnosis.check import sized
 from ident.diagnosis.search import search
 
@@ -12,9 +12,9 @@ def test_it_is_halved_where_it_is_made_and_where_it_is_used() -> None:
     surely = next(one for one in constants_of(["check"]) if one.name == "SURELY")
     with changed(surely, 0.5):
         assert sized.SURELY == 1.0
-        assert answered.SURELY == 1.0
+        assert contest.SURELY == 1.0
     assert sized.SURELY == 2.0
-    assert answered.SURELY == 2.0
+    assert contest.SURELY == 2.0
 
 
 def test_what_counts_stays_whole_and_at_least_one() -> None:
@@ -28,4 +28,4 @@ def test_what_counts_stays_whole_and_at_least_one() -> None:
 def test_every_constant_is_of_one_module() -> None:
     found = [one.key for one in constants_of()]
     assert len(found) == len(set(found)) > 50
-    assert "answer.answered.SURELY" not in found
+    assert "answer.contest.SURELY" not in found

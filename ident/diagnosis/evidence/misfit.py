@@ -5,11 +5,18 @@ over stretches of rows (White 1982) is the variance of what is found whatever th
 power of the inverse of the ratio before they are integrated (Pauli, Racugno and Ventura 2011). What is fitted follows
 the rows of a stretch that has much of a member: so residuals of a stretch are made as large as they would be without,
 by the leverage of its rows, and the ratio is one in the mean where the noise is as it says (Bell and McCaffrey 2002).
+A member that few stretches have is told a ratio of few degrees of freedom, by accident anything: what is believed
+beforehand, that it is the ratio of all other directions, counts beside it (scaled inverse chi-squared; Gelman et
+al. 2013, 2.6).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +24,9 @@ from numpy.typing import NDArray
 from ident.diagnosis.observations.linear import RANK, starts_of
 
 Array = NDArray[np.float64]
+
+BELIEVED: Final = 4.0
+"""Degrees of freedom of what is believed of a ratio beforehand: it is known to within a factor of two."""
 
 
 def tempered(log: float, cost: float, excess: float) -> float:
@@ -37,31 +47,73 @@ def excess_of_scatter(
         places: columns of every member.
     """
     beside, wanted = known
-    inverse = np.linalg.inv(np.eye(white.shape[1]) + white.T @ white + beside.T @ beside)
+    inverse = np.asarray(np.linalg.inv(np.eye(white.shape[1]) + white.T @ white + beside.T @ beside), dtype=np.float64)
     found = inverse @ (white.T @ target + beside.T @ wanted)
-    scores = _unbiased_scores(white, target - white @ found, np.asarray(inverse, dtype=np.float64), stretch)
-    # What is known otherwise, the priors included, is as uncertain as it says.
-    otherwise = inverse @ (np.eye(len(inverse)) + beside.T @ beside) @ inverse
-    scattered = scores @ inverse
+    sandwich = _Sandwich.of(white, target - white @ found, inverse, stretch)
     ratios = []
     for place in places:
-        along = np.linalg.solve(inverse[place, place], found[place])
-        by_noise = float(along @ inverse[place, place] @ along)
-        by_rows = float(np.sum((scattered[:, place] @ along) ** 2) + along @ otherwise[place, place] @ along)
-        ratios.append(max(by_rows / by_noise, 1.0) if by_noise > 0 else 1.0)
+        turned = np.linalg.solve(inverse[place, place], found[place])
+        along, by_noise = inverse[:, place] @ turned, float(found[place] @ turned)
+        ratios.append(max(sandwich.ratio(along / math.sqrt(by_noise)), 1.0) if by_noise > 0 else 1.0)
     return ratios
 
 
-def _unbiased_scores(white: Array, residual: Array, inverse: Array, stretch: NDArray[np.int64]) -> Array:
-    """(J, k) sums of columns times residuals over every stretch, these over (1 - H)^(1/2), H its rows' leverage."""
-    starts = starts_of(stretch)
-    scores = np.zeros((len(starts), white.shape[1]))
-    for number, (rows, left) in enumerate(
-        zip(np.split(white, starts[1:]), np.split(residual, starts[1:]), strict=True)
-    ):
-        leverages, turn = np.linalg.eigh(rows @ inverse @ rows.T)
-        # What a stretch alone tells leaves no residual there, and says nothing of the noise.
-        free = 1 - leverages
-        weight = np.where(free > RANK, 1 / np.sqrt(np.maximum(free, RANK)), 0.0)
-        scores[number] = (left @ turn * weight) @ (turn.T @ rows)
-    return scores
+@dataclass(frozen=True)
+class _Sandwich:
+    """Stretches of rows as they are squared and summed.
+
+    Attributes:
+        rows: (m, k) of every stretch, over the square root of 1 - H, H their leverage.
+        raw: the same as they are.
+        residuals: (m,).
+        inverse: (k, k) covariance of the coefficients by the noise.
+    """
+
+    rows: Sequence[Array]
+    raw: Sequence[Array]
+    residuals: Sequence[Array]
+    inverse: Array
+
+    @classmethod
+    def of(cls, white: Array, residual: Array, inverse: Array, stretch: NDArray[np.int64]) -> _Sandwich:
+        """Of rows (n, k) and what is left of them (n,), by numbers of their stretches (n,)."""
+        ends = starts_of(stretch)[1:]
+        raw = np.split(white, ends)
+        return cls([_as_without_leverage(rows, inverse) for rows in raw], raw, np.split(residual, ends), inverse)
+
+    @cached_property
+    def _everywhere(self) -> tuple[float, float]:
+        """Variance, and what is expected of it by the noise, of all independent directions together."""
+        scatter = expected = 0.0
+        basis = np.linalg.cholesky(self.inverse)
+        for rows, raw, left in zip(self.rows, self.raw, self.residuals, strict=True):
+            weights = rows @ basis
+            scatter += float(np.sum((left @ weights) ** 2))
+            expected += float(np.sum(weights**2) - np.sum((basis.T @ (raw.T @ weights)) ** 2))
+        return scatter, expected
+
+    def ratio(self, along: Array) -> float:
+        """Variance in a direction (k,) in which it is one by the noise.
+
+        What is known otherwise, the priors included, or by a single stretch, is as uncertain as it says.
+        """
+        weights = [rows @ along for rows in self.rows]
+        scatter = sum(float(own @ left) ** 2 for own, left in zip(weights, self.residuals, strict=True))
+        # The covariance of these sums, were the noise as it says.
+        squares = np.array([float(own @ own) for own in weights])
+        fitted = np.array([rows.T @ own for rows, own in zip(self.raw, weights, strict=True)])
+        covariance = np.diag(squares) - fitted @ self.inverse @ fitted.T
+        expected, square = float(np.trace(covariance)), float(np.sum(covariance**2))
+        freedom = expected**2 / square if square > 0 else 0.0
+        elsewhere = [whole - own for whole, own in zip(self._everywhere, (scatter, expected), strict=True)]
+        believed = max(elsewhere[0] / elsewhere[1], 1.0) if elsewhere[1] > RANK else 1.0
+        told = freedom / (BELIEVED + freedom)
+        return 1 - expected + told * scatter + (1 - told) * believed * expected
+
+
+def _as_without_leverage(rows: Array, inverse: Array) -> Array:
+    """Rows (m, k) of a stretch over (1 - H)^(1/2); nothing of what it alone tells, which leaves no residual."""
+    leverages, turn = np.linalg.eigh(rows @ inverse @ rows.T)
+    free = 1 - leverages
+    weight = np.where(free > RANK, 1 / np.sqrt(np.maximum(free, RANK)), 0.0)
+    return np.asarray((turn * weight) @ (turn.T @ rows))

@@ -157,13 +157,18 @@ class _Place:
             if table.is_there:
                 self.logs[number] = base + table.total - hypotheses[number].price
                 self._costs[number] = table.cost + hypotheses[number].price
-        self._excess, self._own = excess, dict[int, float]()
+        self._own = dict[int, float]()
         self._keep(index, state, excess)
 
     def odds(self, one: int) -> float:
-        """Log odds, evidence tempered: of rivals alike, but of what is none by the scatter of its own rows by that."""
-        compared = tempered(self.logs[one], self._costs[one], self._excess)
-        alone = tempered(self.logs[one], self._costs[one], self._own.get(one, self._excess))
+        """Log odds, evidence tempered: of rivals alike, but of what is none by the scatter of its own rows by that.
+
+        Alike by the scatter beside what fits the rows best. Were it the member's, each of two might be less likely than
+        the other where that one is the member.
+        """
+        scatter = self._own[max(self._own, key=self.logs.__getitem__)]
+        compared = tempered(self.logs[one], self._costs[one], scatter)
+        alone = tempered(self.logs[one], self._costs[one], self._own.get(one, scatter))
         return compared if alone > 0 else min(alone, compared)
 
     def fit_rivals(self) -> None:

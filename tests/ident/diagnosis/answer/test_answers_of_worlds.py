@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ident.diagnosis.answer.answered import _Answer
+from ident.diagnosis.answer.contest import better
 from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.answer.judge import judge
+from ident.diagnosis.answer.standing import Standing
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.problem import Nominal, Problem, Variant
 from ident.diagnosis.search.asked import asked_of
@@ -235,6 +236,6 @@ def test_what_is_hardly_what_stands_there_is_not_named_though_its_likelier_rival
     search = Search(asked.fitter).without(passed_over=lost)
     state = search.run()
     assert [asked.design.hypotheses[index].name for index in state.members] == ["a"]
-    better = _Answer(asked, search, state, seed=1).better()
-    assert better is not None
-    assert not better[1].members
+    left = better(Standing(asked, search, state, seed=1))
+    assert left is not None
+    assert not left[1].members

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from ident.diagnosis.evidence.misfit import excess_of_scatter
+from ident.diagnosis.evidence.misfit import BELIEVED, excess_of_scatter
 
 NOTHING = np.zeros((0, 3)), np.zeros(0)
 STRETCHES = 3000
@@ -51,9 +52,20 @@ def test_the_scatter_of_few_stretches_is_told_though_what_is_fitted_follows_thei
     assert np.mean(ratios, axis=0) == pytest.approx([9.0, 9.0], rel=0.1)
 
 
+def test_few_stretches_say_little_that_the_others_do_not() -> None:
+    """Variances of two degrees of freedom, each shrunk to one that is known to four."""
+    draw, stretch = np.random.default_rng(7), np.repeat(np.arange(60), 10)
+    white = draw.normal(size=(600, 3))
+    white[stretch > 2, 1] = 0.0
+    targets = white @ [2.0, 5.0, -5.0] + draw.normal(size=(400, 600))
+    ratios = [excess_of_scatter(white, target, NOTHING, stretch, [slice(1, 2)])[0] for target in targets]
+    told = 2 / (2 + BELIEVED)
+    assert np.quantile(ratios, 0.95) == pytest.approx(1 + told * (stats.chi2(2).ppf(0.95) / 2 - 1), rel=0.15)
+
+
 def test_what_a_single_stretch_tells_is_taken_as_it_is() -> None:
     draw, stretch = np.random.default_rng(6), np.repeat(np.arange(60), 10)
     white = draw.normal(size=(600, 3))
     white[:, 1] = 1e5 * (stretch == 7)
     target = white @ [2.0, 5e-5, -5.0] + 3.0 * draw.normal(size=600)
-    assert excess_of_scatter(white, target, NOTHING, stretch, [slice(1, 2)]) == [1.0]
+    assert excess_of_scatter(white, target, NOTHING, stretch, [slice(1, 2)]) == pytest.approx([1.0], abs=0.01)
