@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from ident.diagnosis.answer.contest import better
 from ident.diagnosis.answer.findings import Cause, Findings, ordered
-from ident.diagnosis.answer.standing import OPEN, WIDENING, Standing
+from ident.diagnosis.answer.standing import OPEN, Standing
 from ident.diagnosis.check.remainder import repeated, shares
 from ident.diagnosis.diagnosis import LawAnswer, Verdict
 from ident.diagnosis.evidence.state import State
@@ -24,7 +23,8 @@ from ident.diagnosis.search.asked import Asked, asked_beside, asked_beside_a_law
 from ident.diagnosis.search.search import Search
 from ident.stages import Stage, untold
 
-Array = NDArray[np.float64]
+WIDENING: Final = 0.1
+"""Share of the held-out gap by which members may seem to widen it together."""
 
 
 def answer_of(fit: Problem, confirm: Problem, *, seed: int, stage: Stage = untold) -> Findings:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
-from ident.diagnosis.answer.standing import OPEN, WIDENING, Standing
+from ident.diagnosis.answer.standing import OPEN, Standing
 from ident.diagnosis.check.remainder import mostly_tolerated
-from ident.diagnosis.check.sized import SURELY, is_foreign, is_nothing, is_sizeless
+from ident.diagnosis.check.sized import ITS_OWN, SURELY, is_foreign, is_nothing, is_sizeless
 from ident.diagnosis.evidence.state import State
 from ident.diagnosis.law.answer import curve_of
 from ident.diagnosis.search.search import Search
@@ -103,9 +104,13 @@ def _is_tolerated(standing: Standing, place: int) -> bool:
 
 
 def _widening(standing: Standing) -> list[int]:
-    """The member that widens the held-out gap most, if any does."""
-    widened = [place for place, closed in enumerate(standing.fitted.lacking) if closed < -WIDENING]
-    return _closing_least(standing, widened) if standing.is_measurable else []
+    """The member that widens the held-out gap most, if any surely does."""
+    widened = [
+        place
+        for place, index in enumerate(standing.taken.variants)
+        if standing.fitted.widening(place) > ITS_OWN * math.sqrt(standing.slots[index].excess)
+    ]
+    return _closing_least(standing, widened)
 
 
 def _needless(standing: Standing) -> list[int]:

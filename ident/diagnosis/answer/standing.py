@@ -24,9 +24,6 @@ MISTAKEN: Final = 1.0
 OPEN: Final = 0.5
 """Share of the held-out gap that members leave, more being lacking than is tolerated, from which they are no answer."""
 
-WIDENING: Final = 0.1
-"""Share of the held-out gap by which a member, or all of them, may seem to widen it."""
-
 
 class Standing:
     """What is computed of the best set.

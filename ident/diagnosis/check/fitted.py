@@ -194,6 +194,26 @@ class Fitted:
         whole = self._gap_of_means(self.found.variants, labels=labels)
         return whole, self._gap_of_means(self.others(index), held=held, labels=labels).after
 
+    def widening(self, index: int) -> float:
+        """By how many deviations one effect makes the confirming rows less likely, all else refitted without it.
+
+        Were it nothing, what it adds would be independent of the noise there.
+        """
+        models = (self._held_out_models(self.found.variants), self._held_out_models(self.others(index)))
+        left = np.stack([self.rows.target - self.rows.stack(list(one)) for one in models], axis=1)
+        asked = self.rows.confirming & self._within_told
+        whole, without = self.found.whitener.apply(self.rows, left)[asked].T
+        size = float(np.linalg.norm(whole - without))
+        return float(whole @ whole - without @ without) / (2 * size) if size > 0 else 0.0
+
+    @property
+    def _within_told(self) -> NDArray[np.bool_]:
+        """Rows (n,) of which the effects say something."""
+        if not self.told:
+            return np.ones(len(self.rows), dtype=np.bool_)
+        told = zip(self.rows.blocks, self.told, strict=True)
+        return np.concatenate([one[kept.samples].all(axis=0) for (_, kept), one in told])
+
     def held_out(self) -> HeldOut:
         """What was fitted without the confirming rows."""
         confirming = slice(len(self.problems[0].blocks), None)

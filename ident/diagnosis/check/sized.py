@@ -14,7 +14,8 @@ SURELY: Final = 2.0
 """Standard deviations from which a number is not zero."""
 
 ITS_OWN: Final = 3.0
-"""The same, by the scatter of rows, of a size beside what comes along: in thousands of rows a number is worth that."""
+"""The same, by the scatter of rows, of a size beside what comes along, or of what confirming rows speak against: in
+thousands of rows, and of many members, a number is worth that."""
 
 
 def is_sizeless(candidate: Candidate, part: Part) -> bool:

@@ -261,11 +261,14 @@ def test_what_is_of_no_size_is_not_named_beside_another(world: type[Any]) -> Non
     assert _names(judge(*problems, seed=1)) == ["c"]
 
 
-@pytest.mark.parametrize(("confirmed", "named"), [(0.3, ["a"]), (-0.1, [])])
-def test_a_small_cause_that_the_confirming_drive_speaks_against_is_not_named(
-    world: type[Any], confirmed: float, named: list[str]
+@pytest.mark.parametrize(
+    ("fitted", "confirmed", "named"), [(0.15, 0.3, ["a"]), (0.15, -0.1, []), (0.4, 0.0, []), (0.4, 0.1, [])]
+)
+def test_a_cause_that_the_confirming_drive_speaks_against_is_not_named(
+    world: type[Any], fitted: float, confirmed: float, named: list[str]
 ) -> None:
-    fit, confirm = (world(seed=30, true={"a": size}).problem(part) for part, size in enumerate((0.15, confirmed)))
+    """Though it is sure in both together, and the confirming rows alone have no gap to speak of."""
+    fit, confirm = (world(seed=30, true={"a": size}).problem(part) for part, size in enumerate((fitted, confirmed)))
     assert _names(judge(fit, confirm, seed=1)) == named
 
 
