@@ -20,6 +20,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
 from ident.diagnosis.observations.linear import RANK, starts_of
 
@@ -47,9 +48,12 @@ def excess_of_scatter(
         places: columns of every member.
     """
     beside, wanted = known
-    inverse = np.asarray(np.linalg.inv(np.eye(white.shape[1]) + white.T @ white + beside.T @ beside), dtype=np.float64)
+    width = white.shape[1]
+    factor = linalg.cholesky(np.eye(width) + white.T @ white + beside.T @ beside, lower=True)
+    basis = np.asarray(linalg.solve_triangular(factor, np.eye(width), lower=True).T)
+    inverse = basis @ basis.T
     found = inverse @ (white.T @ target + beside.T @ wanted)
-    sandwich = _Sandwich.of(white, target - white @ found, inverse, stretch)
+    sandwich = _Sandwich.of(white, target - white @ found, basis, stretch)
     ratios = []
     for place in places:
         turned = np.linalg.solve(inverse[place, place], found[place])
@@ -66,30 +70,29 @@ class _Sandwich:
         rows: (m, k) of every stretch, over the square root of 1 - H, H their leverage.
         raw: the same as they are.
         residuals: (m,).
-        inverse: (k, k) covariance of the coefficients by the noise.
+        basis: (k, k) independent directions of the coefficients, of unit variance by the noise.
     """
 
     rows: Sequence[Array]
     raw: Sequence[Array]
     residuals: Sequence[Array]
-    inverse: Array
+    basis: Array
 
     @classmethod
-    def of(cls, white: Array, residual: Array, inverse: Array, stretch: NDArray[np.int64]) -> _Sandwich:
+    def of(cls, white: Array, residual: Array, basis: Array, stretch: NDArray[np.int64]) -> _Sandwich:
         """Of rows (n, k) and what is left of them (n,), by numbers of their stretches (n,)."""
         ends = starts_of(stretch)[1:]
         raw = np.split(white, ends)
-        return cls([_as_without_leverage(rows, inverse) for rows in raw], raw, np.split(residual, ends), inverse)
+        return cls([_as_without_leverage(rows, basis) for rows in raw], raw, np.split(residual, ends), basis)
 
     @cached_property
     def _everywhere(self) -> tuple[float, float]:
         """Variance, and what is expected of it by the noise, of all independent directions together."""
         scatter = expected = 0.0
-        basis = np.linalg.cholesky(self.inverse)
         for rows, raw, left in zip(self.rows, self.raw, self.residuals, strict=True):
-            weights = rows @ basis
+            weights = rows @ self.basis
             scatter += float(np.sum((left @ weights) ** 2))
-            expected += float(np.sum(weights**2) - np.sum((basis.T @ (raw.T @ weights)) ** 2))
+            expected += float(np.sum(weights**2) - np.sum((self.basis.T @ (raw.T @ weights)) ** 2))
         return scatter, expected
 
     def ratio(self, along: Array) -> float:
@@ -102,7 +105,7 @@ class _Sandwich:
         # The covariance of these sums, were the noise as it says.
         squares = np.array([float(own @ own) for own in weights])
         fitted = np.array([rows.T @ own for rows, own in zip(self.raw, weights, strict=True)])
-        covariance = np.diag(squares) - fitted @ self.inverse @ fitted.T
+        covariance = np.diag(squares) - (fitted @ self.basis) @ (fitted @ self.basis).T
         expected, square = float(np.trace(covariance)), float(np.sum(covariance**2))
         freedom = expected**2 / square if square > 0 else 0.0
         elsewhere = [whole - own for whole, own in zip(self._everywhere, (scatter, expected), strict=True)]
@@ -111,9 +114,10 @@ class _Sandwich:
         return 1 - expected + told * scatter + (1 - told) * believed * expected
 
 
-def _as_without_leverage(rows: Array, inverse: Array) -> Array:
+def _as_without_leverage(rows: Array, basis: Array) -> Array:
     """Rows (m, k) of a stretch over (1 - H)^(1/2); nothing of what it alone tells, which leaves no residual."""
-    leverages, turn = np.linalg.eigh(rows @ inverse @ rows.T)
+    along = rows @ basis
+    leverages, turn = np.linalg.eigh(along @ along.T)
     free = 1 - leverages
     weight = np.where(free > RANK, 1 / np.sqrt(np.maximum(free, RANK)), 0.0)
     return np.asarray((turn * weight) @ (turn.T @ rows))
