@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from ident.diagnosis.answer.standing import OPEN, Standing
+from ident.diagnosis.check.against import deviations_against
 from ident.diagnosis.check.remainder import mostly_tolerated
 from ident.diagnosis.check.sized import ITS_OWN, SURELY, is_foreign, is_nothing, is_sizeless
 from ident.diagnosis.evidence.state import State
@@ -28,8 +29,8 @@ PAID: Final = 0.05
 def better(standing: Standing) -> tuple[Search, State] | None:
     """The search and its set without members that are no answer; None: all are.
 
-    Less likely there than nothing or than a rival, a trifle, of no size, widening the held-out gap, or making no
-    difference.
+    Less likely there than nothing or than a rival, a trifle, of no size, what confirming rows speak against, or making
+    no difference.
     """
     # The search, in whose other places something else stood, would take again what is doubted.
     if doubted := _doubted(standing):
@@ -39,7 +40,7 @@ def better(standing: Standing) -> tuple[Search, State] | None:
     # What follows asks for exact refits, which a set that loses a member before is not worth.
     if trifling := _trifling(standing):
         return _without(standing, trifling, passed_over=trifling)
-    refuted = _sizeless(standing) or _widening(standing) or _needless(standing)
+    refuted = _sizeless(standing) or _contradicted(standing) or _needless(standing)
     return _without(standing, refuted, refuted=refuted) if refuted else None
 
 
@@ -103,14 +104,14 @@ def _is_tolerated(standing: Standing, place: int) -> bool:
     return all(mostly_tolerated(*pair) for pair in acting) and standing.fitted.lacking[place] <= 0
 
 
-def _widening(standing: Standing) -> list[int]:
-    """The member that widens the held-out gap most, if any surely does."""
-    widened = [
-        place
+def _contradicted(standing: Standing) -> list[int]:
+    """The member that the confirming rows, to which nothing is fitted, surely speak against, and most."""
+    scatter = standing.search.fitter.excess(standing.state, ~standing.fitted.rows.confirming)
+    against = {
+        index: deviations_against(standing.fitted, place) / math.sqrt(scatter[index])
         for place, index in enumerate(standing.taken.variants)
-        if standing.fitted.widening(place) > ITS_OWN * math.sqrt(standing.slots[index].excess)
-    ]
-    return _closing_least(standing, widened)
+    }
+    return [index for index, one in against.items() if one == max(against.values()) > ITS_OWN]
 
 
 def _needless(standing: Standing) -> list[int]:

@@ -130,7 +130,7 @@ class Fitted:
         """The same, values of a model that is judged within what is known of them."""
         if self.found.variants:
             return self.exactly
-        models = self._settled(self._held_out_refit(()))
+        models = self._settled(self.held_out_refit(()))
         return held_out_gap(self.rows, self.floors, models, models, self.told)
 
     @cached_property
@@ -147,8 +147,7 @@ class Fitted:
     def closed(self) -> list[float]:
         """Share of the removable held-out gap that each effect closes, all else refitted without it, as columns.
 
-        Which one is the strongest, and which widens the gap, is judged by this: what a refit can do without an effect
-        is no reason for it.
+        What a refit can do without an effect is no reason for it.
         """
         without = [self.gap(self.others(index)).after for index in range(self.count)]
         return [_share(self.whole, after) for after in without]
@@ -194,31 +193,11 @@ class Fitted:
         whole = self._gap_of_means(self.found.variants, labels=labels)
         return whole, self._gap_of_means(self.others(index), held=held, labels=labels).after
 
-    def widening(self, index: int) -> float:
-        """By how many deviations one effect makes the confirming rows less likely, all else refitted without it.
-
-        Were it nothing, what it adds would be independent of the noise there.
-        """
-        models = (self._held_out_models(self.found.variants), self._held_out_models(self.others(index)))
-        left = np.stack([self.rows.target - self.rows.stack(list(one)) for one in models], axis=1)
-        asked = self.rows.confirming & self._within_told
-        whole, without = self.found.whitener.apply(self.rows, left)[asked].T
-        size = float(np.linalg.norm(whole - without))
-        return float(whole @ whole - without @ without) / (2 * size) if size > 0 else 0.0
-
-    @property
-    def _within_told(self) -> NDArray[np.bool_]:
-        """Rows (n,) of which the effects say something."""
-        if not self.told:
-            return np.ones(len(self.rows), dtype=np.bool_)
-        told = zip(self.rows.blocks, self.told, strict=True)
-        return np.concatenate([one[kept.samples].all(axis=0) for (_, kept), one in told])
-
     def held_out(self) -> HeldOut:
         """What was fitted without the confirming rows."""
         confirming = slice(len(self.problems[0].blocks), None)
         before, after = (tuple(models[confirming]) for models in (self.untouched, self._extended_models))
-        return HeldOut(self.problems[1], self._held_out_refit(()), self._extended, before, after)
+        return HeldOut(self.problems[1], self.held_out_refit(()), self._extended, before, after)
 
     def biased(self, index: int) -> Mapping[str, float]:
         """Shift of every parameter when an effect is left out, in standard deviations."""
@@ -238,7 +217,7 @@ class Fitted:
         """Models of all blocks, fitted without the confirming rows."""
         if not variants and self._is_given:
             return self.judged()
-        return self._held_out_refit(variants, held=held).blocks
+        return self.held_out_refit(variants, held=held).blocks
 
     def _settled(self, found: Refit) -> Sequence[Array]:
         """Models of all blocks, the baseline in confirming ones moved as they ask, within what the fit leaves open.
@@ -259,7 +238,7 @@ class Fitted:
             for index, ((block, _), model) in enumerate(zip(rows.blocks, found.blocks, strict=True))
         ]
 
-    def _held_out_refit(self, variants: Sequence[int], *, held: bool = False) -> Refit:
+    def held_out_refit(self, variants: Sequence[int], *, held: bool = False) -> Refit:
         """With some effects, as their columns, without the confirming rows; several questions need the same one."""
         key = tuple(variants), held
         if key not in self._kept:

@@ -87,7 +87,7 @@ def _gap(
         if left_out or not rows.confirming[rows.block_slices[index]].any():
             continue
         floor = floors[index]
-        known = _known(kept, told[index], means) if told else slice(None)
+        known = told_of(kept, told[index], means=means) if told else slice(None)
         seen = _means if means else _samples
         for place, model in enumerate(models):
             left = seen(kept, block.target - model[index])[known]
@@ -99,8 +99,8 @@ def _gap(
     return Gap(float(mean[0]), float(mean[1]), float(mean[2]), count)
 
 
-def _known(kept: Kept, told: Mask, means: bool) -> Mask:
-    """Which of the rows, or of all their samples, are told."""
+def told_of(kept: Kept, told: Mask, *, means: bool) -> Mask:
+    """Which of the rows, or of all their samples, are told, by samples (N,) of their block."""
     chosen = told[kept.samples]
     return np.asarray(chosen.all(axis=0) if means else chosen.ravel())
 

@@ -164,12 +164,17 @@ class Fitter:
         known = float(np.trace(np.linalg.inv(rows.T @ rows)))
         return Left(target - columns @ found, width - known)
 
-    def excess(self, state: State) -> dict[int, float]:
-        """How far rows scatter beyond their noise along every member, by which its likelihoods are tempered."""
+    def excess(self, state: State, chosen: NDArray[np.bool_] | slice = slice(None)) -> dict[int, float]:
+        """How far rows scatter beyond their noise along every member, by which its likelihoods are tempered.
+
+        Args:
+            state: the set.
+            chosen: (n,) rows that are looked at; all of them.
+        """
         columns, target, expected = self._rows(state)
         white, _ = self._colours.white(np.column_stack([columns, target]), state.evidence.sizes)
-        places = self._places(state.members)
-        ratios = excess_of_scatter(white[:, :-1], white[:, -1], expected, self._colours.stretch, list(places.values()))
+        white, stretch, places = white[chosen], self._colours.stretch[chosen], self._places(state.members)
+        ratios = excess_of_scatter(white[:, :-1], white[:, -1], expected, stretch, list(places.values()))
         return dict(zip(places, ratios, strict=True))
 
     def odds(self, state: State, index: int, bare: State) -> float:

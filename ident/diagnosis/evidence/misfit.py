@@ -40,6 +40,8 @@ def excess_of_scatter(
 ) -> list[float]:
     """Variance of the coefficients along what is found of every member, by the sandwich over that by the noise; >= 1.
 
+    What few stretches tell is shrunk to that of all other directions.
+
     Args:
         white: (n, k) rows in units of the noise, of coefficients of unit variance.
         target: (n,).
@@ -102,11 +104,12 @@ class _Sandwich:
         """
         weights = [rows @ along for rows in self.rows]
         scatter = sum(float(own @ left) ** 2 for own, left in zip(weights, self.residuals, strict=True))
-        # The covariance of these sums, were the noise as it says.
+        # Trace of the covariance of these sums, were the noise as it says, and that of its square.
         squares = np.array([float(own @ own) for own in weights])
-        fitted = np.array([rows.T @ own for rows, own in zip(self.raw, weights, strict=True)])
-        covariance = np.diag(squares) - (fitted @ self.basis) @ (fitted @ self.basis).T
-        expected, square = float(np.trace(covariance)), float(np.sum(covariance**2))
+        fitted = np.array([rows.T @ own for rows, own in zip(self.raw, weights, strict=True)]) @ self.basis
+        shared = np.sum(fitted**2, axis=1)
+        expected = float(np.sum(squares - shared))
+        square = float(np.sum(squares**2 - 2 * squares * shared) + np.sum((fitted.T @ fitted) ** 2))
         freedom = expected**2 / square if square > 0 else 0.0
         elsewhere = [whole - own for whole, own in zip(self._everywhere, (scatter, expected), strict=True)]
         believed = max(elsewhere[0] / elsewhere[1], 1.0) if elsewhere[1] > RANK else 1.0

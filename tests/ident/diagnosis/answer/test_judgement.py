@@ -262,13 +262,22 @@ def test_what_is_of_no_size_is_not_named_beside_another(world: type[Any]) -> Non
 
 
 @pytest.mark.parametrize(
-    ("fitted", "confirmed", "named"), [(0.15, 0.3, ["a"]), (0.15, -0.1, []), (0.4, 0.0, []), (0.4, 0.1, [])]
+    ("samples", "fitted", "confirmed", "named"),
+    [
+        (800, 0.15, 0.3, ["a"]),
+        (800, 0.15, -0.1, []),
+        (800, 0.4, 0.0, []),
+        (800, 0.4, 0.1, []),
+        (300, 0.4, 0.0, []),
+        (300, 0.4, 0.4, ["a"]),
+    ],
 )
 def test_a_cause_that_the_confirming_drive_speaks_against_is_not_named(
-    world: type[Any], fitted: float, confirmed: float, named: list[str]
+    world: type[Any], samples: int, fitted: float, confirmed: float, named: list[str]
 ) -> None:
     """Though it is sure in both together, and the confirming rows alone have no gap to speak of."""
-    fit, confirm = (world(seed=30, true={"a": size}).problem(part) for part, size in enumerate((fitted, confirmed)))
+    made = [world(seed=30, samples=samples, true={"a": size}) for size in (fitted, confirmed)]
+    fit, confirm = (one.problem(part) for part, one in enumerate(made))
     assert _names(judge(fit, confirm, seed=1)) == named
 
 
