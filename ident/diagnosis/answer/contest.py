@@ -106,12 +106,12 @@ def _is_tolerated(standing: Standing, place: int) -> bool:
 
 def _contradicted(standing: Standing) -> list[int]:
     """The member that the confirming rows, to which nothing is fitted, surely speak against, and most."""
-    scatter = standing.search.fitter.excess(standing.state, ~standing.fitted.rows.confirming)
-    against = {
-        index: deviations_against(standing.fitted, place) / math.sqrt(scatter[index])
-        for place, index in enumerate(standing.taken.variants)
-    }
-    return [index for index, one in against.items() if one == max(against.values()) > ITS_OWN]
+    fitted = standing.fitted
+    scatter = standing.search.fitter.excess(standing.state, ~fitted.rows.confirming)
+    found = zip(standing.taken.variants, deviations_against(fitted).tolist(), strict=True)
+    against = {index: deviations / math.sqrt(scatter[index]) for index, deviations in found}
+    surely = [index for index, one in against.items() if one > ITS_OWN]
+    return sorted(surely, key=lambda index: -against[index])[:1]
 
 
 def _needless(standing: Standing) -> list[int]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,38 +12,35 @@ from ident.diagnosis.observations.linear import RANK
 Array = NDArray[np.float64]
 
 
-def deviations_against(fitted: Fitted, index: int) -> float:
-    """By how many deviations an effect makes the confirming rows less likely, all else refitted without it.
+def deviations_against(fitted: Fitted) -> Array:
+    """By how many deviations (K,) each effect makes the confirming rows less likely, all else refitted without it.
 
     The deviation is that of what the noise there, and what the fit leaves open of every number, do to the sum of
     squares.
-
-    Args:
-        fitted: all effects.
-        index: of the one.
     """
-    rows = fitted.rows
-    models = [fitted.held_out_refit(variants).blocks for variants in (fitted.found.variants, fitted.others(index))]
-    left = np.stack([rows.target - rows.stack(list(one)) for one in models], axis=1)
+    rows, sets = fitted.rows, [fitted.found.variants, *(fitted.others(index) for index in range(fitted.count))]
+    models = [rows.stack(list(fitted.held_out_refit(one).blocks)) for one in sets]
+    left = rows.target[:, None] - np.stack(models, axis=1)
     # Where the effects say nothing, the rows shall say nothing of them.
-    untold = ~_told_rows(fitted)
-    left[untold, 0] = left[untold, 1]
-    whole, without = fitted.found.whitener.apply(rows, left)[rows.confirming].T
+    whole = np.where(_told_rows(fitted)[:, None], left[:, :1], left[:, 1:])
+    white = fitted.found.whitener.apply(rows, np.hstack([whole, left[:, 1:]]))[rows.confirming]
+    whole, without = np.hsplit(white, 2)
     added = without - whole
-    variance = float(added @ added) + _left_open(fitted, added)
-    return float(whole @ whole - without @ without) / (2 * math.sqrt(variance)) if variance > 0 else 0.0
+    deviation = 2 * np.sqrt(np.sum(added**2, axis=0) + _left_open(fitted, added))
+    more = np.sum(whole**2, axis=0) - np.sum(without**2, axis=0)
+    return np.asarray(np.divide(more, deviation, out=np.zeros_like(more), where=deviation > 0))
 
 
-def _left_open(fitted: Fitted, added: Array) -> float:
-    """Variance along a series (m,) of white confirming rows of what the fitted rows leave open of the model."""
+def _left_open(fitted: Fitted, added: Array) -> Array:
+    """Variance (k,) along series (m, k) of white confirming rows of what the fitted rows leave open of the model."""
     columns = np.hstack([fitted.rows.baseline, fitted.regression.columns_of(fitted.found.variants)])
     white, confirming = fitted.found.whitener.apply(fitted.rows, columns), fitted.rows.confirming
     design = np.vstack([white[~confirming], fitted.regression.prior_jacobian(white.shape[1])])
     size = np.linalg.norm(design, axis=0)
     size[size == 0] = 1.0
     # The shortest x of Fᵀx = r has the square rᵀ(FᵀF)⁻¹r.
-    shortest = np.linalg.lstsq((design / size).T, white[confirming].T @ added / size, rcond=RANK)[0]
-    return float(shortest @ shortest)
+    shortest = np.linalg.lstsq((design / size).T, white[confirming].T @ added / size[:, None], rcond=RANK)[0]
+    return np.asarray(np.sum(shortest**2, axis=0))
 
 
 def _told_rows(fitted: Fitted) -> NDArray[np.bool_]:

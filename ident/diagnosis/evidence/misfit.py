@@ -52,61 +52,60 @@ def excess_of_scatter(
     beside, wanted = known
     width = white.shape[1]
     factor = linalg.cholesky(np.eye(width) + white.T @ white + beside.T @ beside, lower=True)
+    # Independent directions of the coefficients, of unit variance by the noise.
     basis = np.asarray(linalg.solve_triangular(factor, np.eye(width), lower=True).T)
     inverse = basis @ basis.T
     found = inverse @ (white.T @ target + beside.T @ wanted)
-    sandwich = _Sandwich.of(white, target - white @ found, basis, stretch)
+    sandwich = _Sandwich.of(white @ basis, target - white @ found, stretch)
     ratios = []
     for place in places:
         turned = np.linalg.solve(inverse[place, place], found[place])
-        along, by_noise = inverse[:, place] @ turned, float(found[place] @ turned)
+        by_noise = float(found[place] @ turned)
+        along = basis[place].T @ turned
         ratios.append(max(sandwich.ratio(along / math.sqrt(by_noise)), 1.0) if by_noise > 0 else 1.0)
     return ratios
 
 
 @dataclass(frozen=True)
 class _Sandwich:
-    """Stretches of rows as they are squared and summed.
+    """Stretches of rows, by independent coefficients of unit variance, as they are squared and summed.
 
     Attributes:
-        rows: (m, k) of every stretch, over the square root of 1 - H, H their leverage.
-        raw: the same as they are.
+        rows: (m, k) of every stretch.
+        weighted: the same over the square root of 1 - H, H their leverage.
         residuals: (m,).
-        basis: (k, k) independent directions of the coefficients, of unit variance by the noise.
     """
 
     rows: Sequence[Array]
-    raw: Sequence[Array]
+    weighted: Sequence[Array]
     residuals: Sequence[Array]
-    basis: Array
 
     @classmethod
-    def of(cls, white: Array, residual: Array, basis: Array, stretch: NDArray[np.int64]) -> _Sandwich:
+    def of(cls, rows: Array, residual: Array, stretch: NDArray[np.int64]) -> _Sandwich:
         """Of rows (n, k) and what is left of them (n,), by numbers of their stretches (n,)."""
         ends = starts_of(stretch)[1:]
-        raw = np.split(white, ends)
-        return cls([_as_without_leverage(rows, basis) for rows in raw], raw, np.split(residual, ends), basis)
+        parts = np.split(rows, ends)
+        return cls(parts, [_as_without_leverage(part) for part in parts], np.split(residual, ends))
 
     @cached_property
     def _everywhere(self) -> tuple[float, float]:
-        """Variance, and what is expected of it by the noise, of all independent directions together."""
+        """Variance, and what is expected of it by the noise, of all directions together."""
         scatter = expected = 0.0
-        for rows, raw, left in zip(self.rows, self.raw, self.residuals, strict=True):
-            weights = rows @ self.basis
-            scatter += float(np.sum((left @ weights) ** 2))
-            expected += float(np.sum(weights**2) - np.sum((self.basis.T @ (raw.T @ weights)) ** 2))
+        for rows, weighted, left in zip(self.rows, self.weighted, self.residuals, strict=True):
+            scatter += float(np.sum((left @ weighted) ** 2))
+            expected += float(np.sum(weighted**2) - np.sum((rows.T @ weighted) ** 2))
         return scatter, expected
 
     def ratio(self, along: Array) -> float:
-        """Variance in a direction (k,) in which it is one by the noise.
+        """Variance in a direction (k,) of unit length, in which it is one by the noise.
 
         What is known otherwise, the priors included, or by a single stretch, is as uncertain as it says.
         """
-        weights = [rows @ along for rows in self.rows]
+        weights = [weighted @ along for weighted in self.weighted]
         scatter = sum(float(own @ left) ** 2 for own, left in zip(weights, self.residuals, strict=True))
         # Trace of the covariance of these sums, were the noise as it says, and that of its square.
         squares = np.array([float(own @ own) for own in weights])
-        fitted = np.array([rows.T @ own for rows, own in zip(self.raw, weights, strict=True)]) @ self.basis
+        fitted = np.array([rows.T @ own for rows, own in zip(self.rows, weights, strict=True)])
         shared = np.sum(fitted**2, axis=1)
         expected = float(np.sum(squares - shared))
         square = float(np.sum(squares**2 - 2 * squares * shared) + np.sum((fitted.T @ fitted) ** 2))
@@ -117,10 +116,9 @@ class _Sandwich:
         return 1 - expected + told * scatter + (1 - told) * believed * expected
 
 
-def _as_without_leverage(rows: Array, basis: Array) -> Array:
+def _as_without_leverage(rows: Array) -> Array:
     """Rows (m, k) of a stretch over (1 - H)^(1/2); nothing of what it alone tells, which leaves no residual."""
-    along = rows @ basis
-    leverages, turn = np.linalg.eigh(along @ along.T)
+    leverages, turn = np.linalg.eigh(rows @ rows.T)
     free = 1 - leverages
     weight = np.where(free > RANK, 1 / np.sqrt(np.maximum(free, RANK)), 0.0)
     return np.asarray((turn * weight) @ (turn.T @ rows))

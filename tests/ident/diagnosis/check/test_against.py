@@ -37,7 +37,7 @@ def against(world: Callable[..., Any], asked: Asked, seed: int, changed: Callabl
         Taken(variants_of("b", question), Noise(question.colours, question.colours.usual)),
         1,
     )
-    return deviations_against(fitted, 0)
+    return deviations_against(fitted)[0]
 
 
 def against_and_power(world: Callable[..., Any], asked: Asked, seed: int, confirmed: float) -> tuple[float, float]:
@@ -51,7 +51,7 @@ def against_and_power(world: Callable[..., Any], asked: Asked, seed: int, confir
     fitted = Fitted(problems, question.regression, Taken((variant,), noise), seed=1)
     added = SIZE * question.regression.columns_of([variant])
     white = noise.apply(rows, np.column_stack([added, rows.baseline]))[rows.confirming]
-    return deviations_against(fitted, 0), float(np.sum(white[:, 0] ** 2))
+    return deviations_against(fitted)[0], float(np.sum(white[:, 0] ** 2))
 
 
 @pytest.mark.parametrize("there", [True, False])
