@@ -155,6 +155,7 @@ class Candidate:
         periodic: of a wave over an angle; its variants are then those of the orders that the records show.
         price: log evidence that the choice of its variants costs beyond that of its coefficients.
         noise: log evidence that the noise of what its columns are made of may be for it.
+        as_found: its columns are taken from the rows themselves: a number of its own at every moment.
         usual: its size in practice; inf where nothing is known of it.
     """
 
@@ -177,6 +178,7 @@ class Candidate:
     periodic: Periodic | None = None
     price: float = 0.0
     noise: float = 0.0
+    as_found: bool = False
     usual: float = math.inf
 
     @property

@@ -20,6 +20,7 @@ from ident.diagnosis.law.learning import LENGTHS, Designs
 from ident.diagnosis.law.spline import Knots
 from ident.diagnosis.names import LAW
 from ident.diagnosis.noise.colours import Colours
+from ident.diagnosis.noise.information import information_in
 from ident.diagnosis.observations.linear import ROUNDING
 from ident.diagnosis.observations.regression import Regression
 from ident.diagnosis.observations.rows import Column
@@ -183,6 +184,8 @@ class _Builder:
                 variant = max(candidate.price + weight, 0.0)
                 choice = kinds + math.log(places[str(candidate.effect)])
                 price = choice + variant + candidate.noise
+                if candidate.as_found:
+                    price += sum(information_in(rows.columns[:, one.place][:, 0], self.colours) for one in shown)
                 found.append(Hypothesis(candidate.key, str(candidate.effect), price, choice, blocks, candidate=number))
         return found
 

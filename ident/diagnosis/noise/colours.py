@@ -54,7 +54,8 @@ class Colours:
     Attributes:
         rows: of the problems.
         labels: channel, step and coordinate, of blocks that share what they lack.
-        blocks: rows of every block, by label.
+        blocks: numbers of the blocks, by label.
+        places: rows of every block.
         stretch: (n,) number of the stretch that every row belongs to, rising.
     """
 
@@ -62,14 +63,14 @@ class Colours:
         self.rows: Rows = regression.rows
         self.stretch = regression.stretch
         found: dict[str, list[int]] = {}
-        self._places: list[slice] = []
+        self.places: list[slice] = []
         self._tolerated: list[Array] = []
         self._lacking: list[Array] = []
         alone = None if self.repeats(regression) else _of(regression, left)
         for (block, kept), place in zip(self.rows.blocks, self.rows.block_slices, strict=True):
             if place.stop == place.start:
                 continue
-            found.setdefault(f"{block.channel}/{block.label}", []).append(len(self._places))
+            found.setdefault(f"{block.channel}/{block.label}", []).append(len(self.places))
             group = int(self.rows.group[place.start])
             colour = regression.repeats[group]
             time = kept.samples[0] * block.sample_time
@@ -80,7 +81,7 @@ class Colours:
             # A white share, so that a band without any power is not blown up.
             least = (ROUNDING * rms(self.rows.target[place])) ** 2 * np.eye(len(memory))
             noise = _covariance(predictor, self.rows.run[place]) + least
-            self._places.append(place)
+            self.places.append(place)
             self._tolerated.append(noise + tolerated)
             self._lacking.append(float(np.mean(np.diag(self._tolerated[-1]))) * memory)
         self.labels = tuple(found)
@@ -95,7 +96,7 @@ class Colours:
     @cached_property
     def rows_of_labels(self) -> tuple[NDArray[np.int64], ...]:
         """Numbers of the rows of every label."""
-        places = [[self._places[number] for number in numbers] for numbers in self.blocks]
+        places = [[self.places[number] for number in numbers] for numbers in self.blocks]
         return tuple(np.concatenate([np.arange(one.start, one.stop) for one in own]) for own in places)
 
     @property
@@ -108,14 +109,14 @@ class Colours:
         found, volume = np.array(values, dtype=float), 0.0
         for label, size in enumerate(sizes):
             for number in self.blocks[label]:
-                place = self._places[number]
-                found[place], more = self._whitened(number, size, found[place])
+                place = self.places[number]
+                found[place], more = self.of_block(number, size, found[place])
                 volume += more
         return found, volume
 
     def of_label(self, label: int, size: int, values: Array) -> tuple[Array, float]:
         """White rows of a label alone, of values (n, k) of all rows; and half the log of the determinant."""
-        made = [self._whitened(number, size, values[self._places[number]]) for number in self.blocks[label]]
+        made = [self.of_block(number, size, values[self.places[number]]) for number in self.blocks[label]]
         return np.vstack([white for white, _ in made]), sum(volume for _, volume in made)
 
     def weighted(self, sizes: Sizes, values: Array) -> Array:
@@ -123,11 +124,11 @@ class Colours:
         found = np.array(values, dtype=float)
         for label, size in enumerate(sizes):
             for number in self.blocks[label]:
-                place = self._places[number]
+                place = self.places[number]
                 found[place] = linalg.cho_solve((self._factor(number, size), True), found[place], check_finite=False)
         return found
 
-    def _whitened(self, number: int, size: int, values: Array) -> tuple[Array, float]:
+    def of_block(self, number: int, size: int, values: Array) -> tuple[Array, float]:
         """White rows of a block, of values (m, k) of its rows; and half the log of the determinant."""
         factor = self._factor(number, size)
         white = linalg.solve_triangular(factor, values, lower=True, check_finite=False)

@@ -194,6 +194,7 @@ def _sliding(cause: SlidingCause, sources: Sequence[Source], context: Context) -
         parameters=placed_parameters(cause.name, cause.where),
         variants=(Variant(tuple(side_by_side([column]) for column in slid), lambda _: np.array([friction])),),
         least=0.0,
+        as_found=True,
         spread=(friction * ALONG_STD / ALONG,),
     )
 

@@ -54,6 +54,9 @@ ALONG: Final = 0.8
 ALONG_STD: Final = 0.12
 """Of `ALONG`: between three fifths and all of the cone."""
 
+FILLED: Final = ALONG - 2 * ALONG_STD
+"""Part of its largest traction in a drive that a wheel must have to slide by no more than others creep [-]."""
+
 
 @dataclass(frozen=True)
 class SlidingCause:
@@ -84,13 +87,14 @@ class SlidingCause:
         Where several slide none surely rolls: the one that is least ahead is taken to.
         """
         speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, self.wheels])
-        sense = np.sign(np.stack([traction(inputs, wheel, setting) for wheel in self.wheels], axis=1))
+        pull = np.stack([traction(inputs, wheel, setting) for wheel in self.wheels], axis=1)
+        sense = np.sign(pull)
         if len(self.wheels) == 1:
             forward = sense * ahead_of_the_rest(inputs, setting.geometry, setting.sample_time)[:, self.wheels]
         else:
             forward = sense * ahead_of_others(inputs, setting.geometry, setting.sample_time)
             forward = forward - forward.min(axis=1, keepdims=True)
-        slides = np.stack([_slides(*columns) for columns in zip(forward.T, speed.T, strict=True)], axis=1)
+        slides = np.stack([_slides(*of_wheel) for of_wheel in zip(forward.T, speed.T, pull.T, strict=True)], axis=1)
         sliding = np.flatnonzero(slides.any(axis=0))
         slid = np.where(slides, sense * forward, 0.0)
         if len(sliding) < self.fewest:
@@ -183,10 +187,15 @@ def sliding_times(inputs: Array, setting: Setting) -> Array:
     return np.asarray(setting.sample_time * np.sum(_surely(forward, speed), axis=0))
 
 
-def _slides(forward: Array, speed: Array) -> Mask:
-    """Where (N,) a wheel runs ahead, forward of its traction, if anywhere by more than any creep."""
-    ahead = (forward > CREEPING * speed) & (speed > MOVING)
-    return np.asarray(ahead & _surely(forward, speed).any(), dtype=np.bool_)
+def _slides(forward: Array, speed: Array, pull: Array) -> Mask:
+    """Where (N,) a wheel runs ahead, forward of its traction, if anywhere by more than any creep.
+
+    By less it slides only where its traction is large: what runs ahead in proportion to that gives way, or is dragged
+    aside by a wheel that stands askew.
+    """
+    surely, full = _surely(forward, speed), np.abs(pull) >= FILLED * np.abs(pull).max(initial=0.0)
+    ahead = (forward > CREEPING * speed) & (speed > MOVING) & (surely | full)
+    return np.asarray(ahead & surely.any(), dtype=np.bool_)
 
 
 def _surely(forward: Array, speed: Array) -> Mask:

@@ -10,7 +10,14 @@ from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.vehicle.experiment.ideal import Drive, ideal_record
 from ident.diagnosis.vehicle.records.inputs import SLICES
-from ident.diagnosis.vehicle.records.sliding import adhesion, slides_alone, sliding_cause, sliding_times, traction
+from ident.diagnosis.vehicle.records.sliding import (
+    SLIDING,
+    adhesion,
+    slides_alone,
+    sliding_cause,
+    sliding_times,
+    traction,
+)
 from ident.diagnosis.vehicle.records.sources import Source, sources_of
 from ident.diagnosis.vehicle.records.transforms import Setting, transform_cause
 from ident.estimate.filters import Processing, differentiate, zero_phase
@@ -19,8 +26,11 @@ from ident.vehicle.description import VehicleDescription
 
 Array = NDArray[np.float64]
 
-CREEP = 0.02
-"""Part of its speed by which the sliding wheel runs ahead under load."""
+AHEAD = 0.02
+"""Part of its speed by which the sliding wheel runs ahead at most."""
+
+GRIP = 0.6
+"""Part of its largest traction up to which it holds."""
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +50,8 @@ def sliding(straight: Source, setting: Setting, wheels: list[int], sense: float 
     inputs = straight.inputs.copy()
     pull = traction(inputs, 0, setting)
     rolling = setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"].start]
-    ahead = sense * CREEP * np.abs(rolling) * pull / np.abs(pull).max()
+    beyond = np.maximum(np.abs(pull) / np.abs(pull).max() - GRIP, 0.0) / (1 - GRIP)
+    ahead = sense * AHEAD * np.abs(rolling) * beyond * np.sign(pull)
     for wheel in wheels:
         more = ahead / setting.geometry.wheel_radius
         inputs[:, SLICES["beta_rate"].start + wheel] += more
@@ -68,6 +79,21 @@ def test_a_wheel_that_runs_ahead_the_way_it_pulls_slides_by_as_much(straight: So
     found = sliding_cause("wheel_fr").sliding(inputs, setting)[:, 0]
     large = np.abs(ahead) > 0.3 * np.abs(ahead).max()
     assert found[large] == pytest.approx(ahead[large], rel=0.05)
+
+
+def test_what_gives_way_in_proportion_to_its_traction_slides_only_where_that_is_large(
+    straight: Source, setting: Setting
+) -> None:
+    """By half of a per cent of its speed, as tyres do; beyond that anything that runs ahead slides."""
+    inputs = straight.inputs.copy()
+    pull = traction(inputs, 2, setting)
+    full = np.abs(pull) / np.abs(pull).max()
+    rolling = setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"].start + 2]
+    ahead = 1.2 * SLIDING * np.abs(rolling) * np.sign(pull) * full
+    inputs[:, SLICES["beta_rate"].start + 2] += ahead / setting.geometry.wheel_radius
+    found = sliding_cause("wheel_fr").sliding(inputs, setting)[:, 0]
+    assert np.all(found[full < 0.5] == 0)
+    assert np.any(found[full > 0.9] != 0)
 
 
 def test_the_wheels_beside_a_sliding_one_roll_and_the_floor_is_not_slippery(straight: Source, setting: Setting) -> None:
