@@ -104,7 +104,7 @@ class NamedEffect:
         ambiguity_set: names that these records do not tell apart from it, itself first.
         gap_closed_held_out: share of the removable gap that this effect closes on records that took no part in the
             fit, given the other effects.
-        alternatives: what adds the same to these records, the cause itself left out.
+        alternatives: what adds the same to these records, and where else it may be; the cause itself left out.
         law: of a law, which has no name but `law`.
     """
 
@@ -116,6 +116,11 @@ class NamedEffect:
     gap_closed_held_out: float
     alternatives: tuple[Alternative, ...] = ()
     law: LawAnswer | None = None
+
+    @property
+    def elsewhere(self) -> tuple[str, ...]:
+        """Other places where an effect with this name may be."""
+        return tuple(other.where for other in self.alternatives if other.name == self.name)
 
 
 @dataclass(frozen=True)

@@ -49,10 +49,16 @@ def cause_line(effect: NamedEffect) -> str:
         f"{name} {with_std(quantity.value, quantity.std)} {unit_text(quantity.unit)}".removesuffix(" 1")
         for name, quantity in effect.parameters.items()
     )
-    rivals = [plain(name) for name in effect.ambiguity_set if name != effect.name]
+    rivals = rivals_of(effect)
     rival = f"; might as well be {' or '.join(rivals)}" if rivals else ""
     closes = percent(effect.gap_closed_held_out)
     return f"  {effect.probability:.0%} {effect.name}@{effect.where}: {numbers}; closes {closes} of the gap{rival}"
+
+
+def rivals_of(effect: NamedEffect) -> list[str]:
+    """What a cause might as well be, and where."""
+    names = [plain(name) for name in effect.ambiguity_set if name != effect.name]
+    return [*names, *(f"at {where}" for where in effect.elsewhere)]
 
 
 def gap_line(findings: Findings, diagnosis: Diagnosis) -> str:

@@ -88,10 +88,14 @@ def place_words(where: str) -> str:
 
 
 def _causes(effects: Sequence[NamedEffect]) -> str:
-    texts = [f"{place_words(effect.where)}: {effect_words(effect)}" for effect in effects[:MOST_CAUSES]]
+    texts = [f"{_places(effect)}: {effect_words(effect)}" for effect in effects[:MOST_CAUSES]]
     more = len(effects) - MOST_CAUSES
     text = "; ".join(texts) + (f"; and {more} more" if more > 0 else "")
     return f"{text[:1].upper()}{text[1:]}."
+
+
+def _places(effect: NamedEffect) -> str:
+    return " or ".join(place_words(where) for where in (effect.where, *effect.elsewhere))
 
 
 def _explained(diagnosis: Diagnosis, left: Unseen | None) -> str:

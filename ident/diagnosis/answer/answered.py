@@ -132,11 +132,11 @@ def _invisible(standing: Standing) -> tuple[str, ...]:
 
 def _cause(standing: Standing, place: int, index: int) -> Cause:
     slot, law, hypotheses = standing.slots[index], standing.taken.laws.get(index), standing.design.hypotheses
-    alike = [hypotheses[one].key for one in slot.alike]
+    ranked, dependences = slot.ranked(hypotheses), standing.taken.problems[0].dependences
     return Cause(
         candidate=standing.fitted.candidate(place),
         part=standing.fitted.after.parts[place],
-        ranked=slot.ranked(hypotheses),
+        ranked=ranked,
         probability=slot.probability(hypotheses),
         log_odds=slot.logs[index],
         # Nothing is said to widen a gap within the accidents of its noise.
@@ -145,7 +145,7 @@ def _cause(standing: Standing, place: int, index: int) -> Cause:
         biased=standing.fitted.biased(place),
         law=law,
         law_answer=None if law is None else _law_answer(standing, law, index),
-        alternatives=same_names(alike) if law is None else same_laws(alike, standing.taken.problems[0].dependences),
+        alternatives=same_names(ranked.untold) if law is None else same_laws(ranked.alike, dependences),
     )
 
 

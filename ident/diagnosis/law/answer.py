@@ -75,7 +75,7 @@ def same_laws(keys: Sequence[str], dependences: Sequence[Dependence]) -> tuple[A
 
 
 def same_names(keys: Sequence[str]) -> tuple[Alternative, ...]:
-    """The effects that add the same to these records as the first of them does."""
+    """The effects that these records do not tell from the first of them."""
     pairs = (key.split("@", 1) for key in keys[1:])
     return tuple(Alternative(name, None, where) for name, where in pairs)
 

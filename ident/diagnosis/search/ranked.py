@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 COVERAGE: Final = 0.95
 """Probability that an ambiguity set holds together."""
 
@@ -37,3 +39,13 @@ class Ranked:
             chosen.append(other)
         chosen += [key.split("@")[0] for key in self.alike]
         return tuple(dict.fromkeys(chosen))
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Keys of what is the same in these records, and of its name's places up to `COVERAGE` of their probability."""
+        first = self.alike[0]
+        name = first.split("@")[0]
+        own = {key: each for key, each in self.probabilities.items() if key.split("@")[0] == name}
+        before = np.cumsum([0.0, *own.values()])
+        places = [key for key, less in zip(own, before, strict=False) if less < COVERAGE * before[-1]]
+        return tuple(dict.fromkeys([*self.alike, *places]))

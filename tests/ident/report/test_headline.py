@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import pytest
 
-from ident.diagnosis.diagnosis import Diagnosis, Gap, NamedEffect, Unseen, Verdict
+from ident.diagnosis.diagnosis import Alternative, Diagnosis, Gap, NamedEffect, Unseen, Verdict
 from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.effects import EFFECTS
 from ident.plant.places import CHASSIS, DRIVES, ENCODERS, GROUPS, STEERING, WHEEL_PLACES
+from ident.report.gap_summary import cause_line
 from ident.report.headline import ABOVE, headline, place_words
 from ident.vehicle.quantities import Quantity
 
@@ -37,6 +38,15 @@ def test_a_cause_is_said_with_its_number_and_how_much_of_the_gap_it_explains() -
         "Steering left: 6.110 ± 0.060 Nm more friction at rest, most of it gone above 0.3030 ± 0.0030 rad/s. "
         "It explains 100 % of the gap; what is left is noise."
     )
+
+
+def test_where_else_a_cause_may_be_is_said_before_its_number() -> None:
+    """What people go to look at is the place."""
+    elsewhere = (Alternative("stribeck", None, "steering_right"), Alternative("presliding", None, "steering_left"))
+    effect = replace(STICKS, alternatives=elsewhere)
+    text = headline(answer(Verdict.EFFECT, [effect], (REPEATED, "dynamic", 5.0, 1.02)))
+    assert text.startswith("Steering left or steering right: 6.110 ± 0.060 Nm more friction")
+    assert cause_line(effect).endswith("; might as well be at steering_right")
 
 
 def test_what_a_cause_leaves_of_the_worst_step_is_in_the_same_line() -> None:
