@@ -142,10 +142,13 @@ def _tolerance(source: Source, row: int, target: Array, context: Context) -> flo
 
 
 def _creep(source: Source, context: Context) -> Array:
-    """Columns of creep (N, rows, wheels); zeros in rows that nothing rolls in."""
-    if source.channel is not Channel.KINEMATIC or source.own is not None:
-        return np.zeros((len(source.inputs[:: source.factor]), len(source.coordinates), len(CREEP_NAMES)))
-    return context.filtered(creep_columns(context.inputs(source), source, context.setting(source)), source)
+    """Columns of creep (N, rows, CREEP_NAMES); zeros in rows that nothing rolls in."""
+    shape = (len(source.coordinates), len(CREEP_NAMES))
+    if source.own is not None or source.spec.mode is None:
+        return np.zeros((len(source.inputs[:: source.factor]), *shape))
+    rows = np.repeat(range(shape[0]), shape[1])
+    terms = creep_columns(source, context).reshape(len(source.inputs), -1)
+    return context.in_rows(terms, source, rows.tolist()).reshape(-1, *shape)
 
 
 def _unit(source: Source, coordinate: str) -> str:

@@ -1,7 +1,10 @@
 """Creep: how far a rolling contact gives way under its traction, which no model of rigid rolling has.
 
-A tyre that pulls slips in proportion to its traction over its load, by a number of its own. That is a column for each
-wheel in the rolling rows, fitted with everything else; what is tolerated beyond it is what proportion does not cover.
+A tyre that pulls slips in proportion to its traction over its load, by a number of its own; so does a wheel that stands
+askew on dry ground, whose friction points the less along its plane the less it slips along it. The vehicle moves by as
+much less than its wheels roll: rolling rows show by how much they differ, those of the forces what all have in common,
+a mass times how that changes. Turning on the spot, wheels stand askew otherwise than driving straight, and may all slip
+by another number. What is tolerated in the rolling rows beyond that is what proportion does not cover.
 """
 
 from __future__ import annotations
@@ -14,19 +17,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.observations.linear import rms
+from ident.diagnosis.vehicle.causes.context import Context
 from ident.diagnosis.vehicle.records.inputs import SLICES
-from ident.diagnosis.vehicle.records.rows import in_coordinates
-from ident.diagnosis.vehicle.records.sliding import traction, wheel_load
+from ident.diagnosis.vehicle.records.sliding import roll, traction, wheel_load
 from ident.diagnosis.vehicle.records.sources import Source
 from ident.diagnosis.vehicle.records.transforms import Setting
-from ident.plant import kinematics
 from ident.plant.modes import Mode
 from ident.vehicle.geometry import WHEELS, Geometry
 
 Array = NDArray[np.float64]
 
-CREEP_NAMES: Final = tuple(f"creep_{wheel}" for wheel in WHEELS)
-"""Slip of a wheel, over its rolling speed, for a traction as large as its load [-]."""
+CREEP_NAMES: Final = (*(f"creep_{wheel}" for wheel in WHEELS), "creep_rotation")
+"""Slip of each wheel, over its rolling speed, for a traction as large as its load, and by how much more all of them do
+turning on the spot [-]."""
+
+PROBE: Final = 1e-3
+"""Creep that columns are made with: rows are linear in it."""
 
 CREEP_STD: Final = 0.03
 """Standard deviation of those numbers beforehand: tyres take ten (air) to a hundred times their load for full slip."""
@@ -61,21 +67,16 @@ def contact_speeds(source: Source, geometry: Geometry) -> Array:
     return np.asarray(geometry.wheel_radius * source.inputs[source.moving[0], SLICES["beta_rate"]])
 
 
-def creep_columns(inputs: Array, source: Source, setting: Setting) -> Array:
-    """What the rolling rows of a source have of unit creep of every wheel, (N, rows, 4) [m/s].
-
-    Args:
-        inputs: signals (N, INPUTS).
-        source: kinematic.
-        setting: of the vehicle; its forces are those of the contacts along the wheels' planes.
-    """
-    chassis = kinematics.constraint_matrix(inputs[:, SLICES["alpha"]], setting.geometry)[:, :, :3]
-    slips = np.stack([_slip(inputs, wheel, setting) for wheel in range(len(WHEELS))], axis=1)
-    along = chassis[:, 4:]
-    twists = np.linalg.solve(np.einsum("nki,nkj->nij", chassis, chassis), np.swapaxes(along, 1, 2) * slips[:, None])
-    # (N, row of the wheel, creeping wheel): what no twist of the chassis takes away.
-    left = np.eye(len(WHEELS)) * slips[:, None] - along @ twists
-    return np.stack(in_coordinates(list(np.swapaxes(left, 0, 1)), source.spec), axis=1)
+def creep_columns(source: Source, context: Context) -> Array:
+    """What the rows of a source have of unit creep, before the filter (M, rows, CREEP_NAMES)."""
+    inputs, setting, plain = context.inputs(source), context.setting(source), context.plain(source)
+    columns = []
+    for wheel in range(len(WHEELS)):
+        rolled = inputs.copy()
+        roll(rolled, wheel, PROBE * _slip(inputs, wheel, setting) / setting.geometry.wheel_radius, setting)
+        columns.append((context.rows_of(rolled, source) - plain)[..., 0] / PROBE)
+    turning = float(source.spec.mode is Mode.ROTATION)
+    return np.stack([*columns, turning * np.sum(columns, axis=0)], axis=-1)
 
 
 def _slip(inputs: Array, wheel: int, setting: Setting) -> Array:

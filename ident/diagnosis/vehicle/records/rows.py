@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import casadi as ca
 import numpy as np
@@ -123,11 +123,11 @@ def kinematic_rows(spec: RowsOfStep, z: Inputs, terms: Sequence[EffectTerm]) -> 
 def _rolling(spec: RowsOfStep, z: Inputs, terms: Sequence[EffectTerm], radii: Expression) -> Expression:
     """The same on any radii (4,)."""
     residual = _slip(z, true_steering(terms, z.alpha), radii)
-    return ca.vertcat(*in_coordinates([residual[wheel] for wheel in range(len(WHEELS))], spec))
+    return ca.vertcat(*_in_coordinates([residual[wheel] for wheel in range(len(WHEELS))], spec))
 
 
-def in_coordinates(wheels: Sequence[Any], spec: RowsOfStep) -> list[Any]:
-    """One quantity of the four wheels, symbols or series, as the `kinematic_coordinates` of a step."""
+def _in_coordinates(wheels: Sequence[Expression], spec: RowsOfStep) -> list[Expression]:
+    """One quantity of the four wheels as the `kinematic_coordinates` of a step."""
     if spec.mode is Mode.ALIGNMENT:
         return [wheels[WHEELS.index(name[-2:])] for name in kinematic_coordinates(spec)]
     assert spec.mode is not None

@@ -78,7 +78,7 @@ class SlidingCause:
         changed = inputs.copy()
         slid = self.sliding(inputs, setting)
         for wheel, ahead in zip(self.wheels, slid.T, strict=True):
-            _roll(changed, wheel, sizes[0] * ahead / setting.geometry.wheel_radius, setting)
+            roll(changed, wheel, sizes[0] * ahead / setting.geometry.wheel_radius, setting)
         return changed
 
     def sliding(self, inputs: Array, setting: Setting) -> Array:
@@ -223,8 +223,8 @@ def rolling_rates(inputs: Array, wheels: Sequence[int], geometry: Geometry) -> A
     return np.asarray(inputs[:, SLICES["beta_rate"]][:, wheels] - ahead)
 
 
-def _roll(inputs: Array, wheel: int, ahead: Array, setting: Setting) -> None:
-    """Take `ahead` (N,) [rad/s] off a wheel, and off its drive what it took."""
+def roll(inputs: Array, wheel: int, ahead: Array, setting: Setting) -> None:
+    """Take `ahead` (N,) [rad/s] off a wheel of signals (N, INPUTS), in place, and off its drive what it took."""
     more = differentiate(ahead, setting.sample_time, SEVEN)
     inputs[:, SLICES["beta_rate"].start + wheel] -= ahead
     for name in ("beta_acceleration", "motor_acceleration"):
