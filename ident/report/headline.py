@@ -88,14 +88,19 @@ def place_words(where: str) -> str:
 
 
 def _causes(effects: Sequence[NamedEffect]) -> str:
-    texts = [f"{_places(effect)}: {effect_words(effect)}" for effect in effects[:MOST_CAUSES]]
+    texts = [f"{place_words(one.where)}: {effect_words(one)}{_elsewhere(one)}" for one in effects[:MOST_CAUSES]]
     more = len(effects) - MOST_CAUSES
     text = "; ".join(texts) + (f"; and {more} more" if more > 0 else "")
     return f"{text[:1].upper()}{text[1:]}."
 
 
-def _places(effect: NamedEffect) -> str:
-    return " or ".join(place_words(where) for where in (effect.where, *effect.elsewhere))
+def _elsewhere(effect: NamedEffect) -> str:
+    """Where else it may be, by numbers of its own there."""
+    places = [place_words(where) for where in effect.elsewhere]
+    if not places:
+        return ""
+    where = places[0] if len(places) == 1 else f"one of {len(places)} other places"
+    return f" (or it is at {where}, by another number)"
 
 
 def _explained(diagnosis: Diagnosis, left: Unseen | None) -> str:

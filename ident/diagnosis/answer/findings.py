@@ -38,7 +38,7 @@ class Cause:
             deviations.
         law: as it was learnt, of a law without a name.
         law_answer: as it is written down.
-        alternatives: what adds the same to these records.
+        alternatives: what adds the same to these records, and where else it may be.
     """
 
     candidate: Candidate

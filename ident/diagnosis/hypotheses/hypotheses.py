@@ -185,7 +185,8 @@ class _Builder:
                 choice = kinds + math.log(places[str(candidate.effect)])
                 price = choice + variant + candidate.noise
                 if candidate.as_found:
-                    price += sum(information_in(rows.columns[:, one.place][:, 0], self.colours) for one in shown)
+                    (column,) = shown
+                    price += information_in(rows.columns[:, column.place].sum(axis=1), self.colours)
                 found.append(Hypothesis(candidate.key, str(candidate.effect), price, choice, blocks, candidate=number))
         return found
 

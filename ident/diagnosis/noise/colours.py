@@ -21,8 +21,9 @@ from scipy import linalg
 from ident.diagnosis.noise.autoregression import autocovariance
 from ident.diagnosis.observations.linear import ROUNDING, rms
 from ident.diagnosis.observations.regression import Regression
-from ident.diagnosis.observations.rows import Rows
+from ident.diagnosis.observations.rows import Kept, Rows
 from ident.diagnosis.observations.whitening import Left, Predictor, Whitener, colours_of, predictor_of, whitener_of
+from ident.diagnosis.problem import Block
 
 Array = NDArray[np.float64]
 Sizes = tuple[int, ...]
@@ -55,7 +56,8 @@ class Colours:
         rows: of the problems.
         labels: channel, step and coordinate, of blocks that share what they lack.
         blocks: numbers of the blocks, by label.
-        places: rows of every block.
+        places: rows of every block that has some.
+        kept: those blocks, and which of their samples became rows.
         stretch: (n,) number of the stretch that every row belongs to, rising.
     """
 
@@ -64,6 +66,7 @@ class Colours:
         self.stretch = regression.stretch
         found: dict[str, list[int]] = {}
         self.places: list[slice] = []
+        self.kept: list[tuple[Block, Kept]] = []
         self._tolerated: list[Array] = []
         self._lacking: list[Array] = []
         alone = None if self.repeats(regression) else _of(regression, left)
@@ -82,6 +85,7 @@ class Colours:
             least = (ROUNDING * rms(self.rows.target[place])) ** 2 * np.eye(len(memory))
             noise = _covariance(predictor, self.rows.run[place]) + least
             self.places.append(place)
+            self.kept.append((block, kept))
             self._tolerated.append(noise + tolerated)
             self._lacking.append(float(np.mean(np.diag(self._tolerated[-1]))) * memory)
         self.labels = tuple(found)

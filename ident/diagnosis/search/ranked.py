@@ -47,5 +47,5 @@ class Ranked:
         name = first.split("@")[0]
         own = {key: each for key, each in self.probabilities.items() if key.split("@")[0] == name}
         before = np.cumsum([0.0, *own.values()])
-        places = [key for key, less in zip(own, before, strict=False) if less < COVERAGE * before[-1]]
+        places = [key for key, less in zip(own, before[:-1], strict=True) if less < COVERAGE * before[-1]]
         return tuple(dict.fromkeys([*self.alike, *places]))

@@ -82,13 +82,14 @@ def build_problem(
         replace(found, usual=abs(EFFECTS[found.effect].usual(vehicle, found.where)))
         for found in (candidate_of(cause, columns, sources, tables, context) for cause in causes)
     ]
+    beside = zip(creep_columns(sources, context), lag_columns(sources, context), strict=True)
     slid = slid_by_any(sources, context)
     return Problem(
         names=(*PARAMETER_NAMES, *UNSTATED),
         units=(*PARAMETER_UNITS.values(), *["1"] * len(CREEP_NAMES), "samples"),
         blocks=tuple(
-            replace(block, irregular=series, baseline=np.column_stack([block.baseline, late]))
-            for block, series, late in zip(blocks, slid, lag_columns(sources, context), strict=True)
+            replace(block, irregular=series, baseline=np.column_stack([block.baseline, *columns]))
+            for block, series, columns in zip(blocks, slid, beside, strict=True)
         ),
         candidates=tuple(seen_together(candidates, sources, tables, context)),
         nominal=_nominal(model) if model else None,
@@ -105,7 +106,6 @@ def _nominal(model: Parameters) -> Nominal:
 
 def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
     """One block a coordinate; the target is what baseline and causes add up to."""
-    creep = _creep(source, context)
     for row, name in enumerate(source.coordinates):
         motion = coordinate_motion(source.inputs, source.spec, name, context.geometry)
         position, rate, acceleration = (values[:: source.factor] for values in motion)
@@ -120,7 +120,7 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
             sample_time=source.sample_time * source.factor,
             bandwidth=context.processing.cutoff,
             target=target,
-            baseline=np.hstack([table[:, row, 1:MODEL_COLUMNS], creep[:, row]]),
+            baseline=table[:, row, 1:MODEL_COLUMNS],
             moving=source.moving[row][:: source.factor],
             period=source.period[:: source.factor],
             regions=regions_of(position, rate, acceleration, load),
@@ -139,16 +139,6 @@ def _tolerance(source: Source, row: int, target: Array, context: Context) -> flo
         shaken = SHAKEN if source.travels and source.rattles.any() else 0.0
         return math.hypot(shaken, INEXACT) * rms(target[used])
     return tolerated_creep(source, source.coordinates[row], context.geometry)
-
-
-def _creep(source: Source, context: Context) -> Array:
-    """Columns of creep (N, rows, CREEP_NAMES); zeros in rows that nothing rolls in."""
-    shape = (len(source.coordinates), len(CREEP_NAMES))
-    if source.own is not None or source.spec.mode is None:
-        return np.zeros((len(source.inputs[:: source.factor]), *shape))
-    rows = np.repeat(range(shape[0]), shape[1])
-    terms = creep_columns(source, context).reshape(len(source.inputs), -1)
-    return context.in_rows(terms, source, rows.tolist()).reshape(-1, *shape)
 
 
 def _unit(source: Source, coordinate: str) -> str:

@@ -40,13 +40,23 @@ def test_a_cause_is_said_with_its_number_and_how_much_of_the_gap_it_explains() -
     )
 
 
-def test_where_else_a_cause_may_be_is_said_before_its_number() -> None:
-    """What people go to look at is the place."""
-    elsewhere = (Alternative("stribeck", None, "steering_right"), Alternative("presliding", None, "steering_left"))
-    effect = replace(STICKS, alternatives=elsewhere)
-    text = headline(answer(Verdict.EFFECT, [effect], (REPEATED, "dynamic", 5.0, 1.02)))
-    assert text.startswith("Steering left or steering right: 6.110 ± 0.060 Nm more friction")
+def test_where_else_a_cause_may_be_is_said_without_its_number() -> None:
+    """What people go to look at is the place; of an encoder at the other side the angle has the other sign."""
+    angle = {"offset": Quantity(3.1e-4, "rad", "", 2e-5)}
+    offset = NamedEffect("steering_offset", "steering_left", angle, 0.97, ("steering_offset",), 0.98)
+    right = Alternative("steering_offset", None, "steering_right")
+    effect = replace(offset, alternatives=(right, Alternative("wheel_radius", None, "wheel_fl")))
+    held_out = (REPEATED, "dynamic", 5.0, 1.02)
+    alone, text = (headline(answer(Verdict.EFFECT, [one], held_out)) for one in (offset, effect))
+    said, rest = alone.split(". It explains")
+    assert text == f"{said} (or it is at steering right, by another number). It explains{rest}"
     assert cause_line(effect).endswith("; might as well be at steering_right")
+
+
+def test_of_many_other_places_the_first_line_says_how_many() -> None:
+    wheels = tuple(Alternative("stribeck", None, wheel) for wheel in WHEEL_PLACES)
+    text = headline(answer(Verdict.EFFECT, [replace(STICKS, alternatives=wheels)], (REPEATED, "dynamic", 5.0, 1.02)))
+    assert "(or it is at one of 4 other places, by another number)" in text
 
 
 def test_what_a_cause_leaves_of_the_worst_step_is_in_the_same_line() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from ident.diagnosis.vehicle.causes.context import Context
 from ident.diagnosis.vehicle.causes.library import TermCause
 from ident.diagnosis.vehicle.records.sliding import SlidingCause
 from ident.diagnosis.vehicle.records.sources import Source
-from ident.diagnosis.vehicle.records.transforms import TransformCause
+from ident.diagnosis.vehicle.records.transforms import Setting, TransformCause
 from ident.plant.prepared import Prepared
 from ident.vehicle.parameters import PARAMETER_NAMES
 
@@ -22,8 +23,15 @@ Array = NDArray[np.float64]
 Cause = TermCause | TransformCause | BristleCause | SlidingCause
 
 
+class InSignals(Protocol):
+    """What is taken out of the recorded signals."""
+
+    def without(self, inputs: Array, sizes: Array, setting: Setting) -> Array:
+        """Signals (N, INPUTS) as they were without it, of numbers of its own."""
+
+
 def contribution_of(
-    cause: Cause, acting: Sequence[bool], sources: Sequence[Source], context: Context
+    cause: TermCause | InSignals, acting: Sequence[bool], sources: Sequence[Source], context: Context
 ) -> Callable[[Array, Array], Sequence[Array | None]]:
     """What the cause adds to every block, exactly, for numbers of its own and of the baseline, the model's in front."""
     if isinstance(cause, TermCause):

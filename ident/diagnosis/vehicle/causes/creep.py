@@ -1,15 +1,16 @@
 """Creep: how far a rolling contact gives way under its traction, which no model of rigid rolling has.
 
-A tyre that pulls slips in proportion to its traction over its load, by a number of its own; so does a wheel that stands
-askew on dry ground, whose friction points the less along its plane the less it slips along it. The vehicle moves by as
+A tyre that pulls slips in proportion to its traction over its load, by a number of its own. The vehicle moves by as
 much less than its wheels roll: rolling rows show by how much they differ, those of the forces what all have in common,
-a mass times how that changes. Turning on the spot, wheels stand askew otherwise than driving straight, and may all slip
-by another number. What is tolerated in the rolling rows beyond that is what proportion does not cover.
+a mass times how that changes. Turning on the spot all of them may slip by another number. That is a column for each in
+the rows, fitted with everything else; what is tolerated in the rolling rows beyond it is what proportion does not
+cover.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.observations.linear import rms
 from ident.diagnosis.vehicle.causes.context import Context
+from ident.diagnosis.vehicle.causes.contribution import contribution_of
 from ident.diagnosis.vehicle.records.inputs import SLICES
 from ident.diagnosis.vehicle.records.sliding import roll, traction, wheel_load
 from ident.diagnosis.vehicle.records.sources import Source
@@ -32,7 +34,7 @@ CREEP_NAMES: Final = (*(f"creep_{wheel}" for wheel in WHEELS), "creep_rotation")
 turning on the spot [-]."""
 
 PROBE: Final = 1e-3
-"""Creep that columns are made with: rows are linear in it."""
+"""Creep that columns are made with, a tenth of what is found: rows are as good as linear in it."""
 
 CREEP_STD: Final = 0.03
 """Standard deviation of those numbers beforehand: tyres take ten (air) to a hundred times their load for full slip."""
@@ -67,19 +69,32 @@ def contact_speeds(source: Source, geometry: Geometry) -> Array:
     return np.asarray(geometry.wheel_radius * source.inputs[source.moving[0], SLICES["beta_rate"]])
 
 
-def creep_columns(source: Source, context: Context) -> Array:
-    """What the rows of a source have of unit creep, before the filter (M, rows, CREEP_NAMES)."""
-    inputs, setting, plain = context.inputs(source), context.setting(source), context.plain(source)
-    columns = []
-    for wheel in range(len(WHEELS)):
-        rolled = inputs.copy()
-        roll(rolled, wheel, PROBE * _slip(inputs, wheel, setting) / setting.geometry.wheel_radius, setting)
-        columns.append((context.rows_of(rolled, source) - plain)[..., 0] / PROBE)
-    turning = float(source.spec.mode is Mode.ROTATION)
-    return np.stack([*columns, turning * np.sum(columns, axis=0)], axis=-1)
+@dataclass(frozen=True)
+class Creep:
+    """Creep of a wheel; its size is the slip, over the rolling speed, for a traction as large as the load."""
+
+    wheel: int
+
+    def without(self, inputs: Array, sizes: Array, setting: Setting) -> Array:
+        """Signals (N, INPUTS) as if it had rolled."""
+        speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, self.wheel])
+        slip = sizes[0] * speed * traction(inputs, self.wheel, setting) / wheel_load(inputs, setting)
+        changed = inputs.copy()
+        roll(changed, self.wheel, slip / setting.geometry.wheel_radius, setting)
+        return changed
 
 
-def _slip(inputs: Array, wheel: int, setting: Setting) -> Array:
-    """Slip of a wheel (N,) under its traction for unit creep [m/s]."""
-    speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, wheel])
-    return np.asarray(speed * traction(inputs, wheel, setting) / wheel_load(inputs, setting))
+def creep_columns(sources: Sequence[Source], context: Context) -> list[Array]:
+    """What unit creep adds to the rows of every block, (N, CREEP_NAMES) to first order [m/s, N or Nm]."""
+    acting = [source.own is None and source.spec.mode is not None for source in sources]
+    wheels = [
+        contribution_of(Creep(wheel), acting, sources, context)(np.array([PROBE]), context.parameters)
+        for wheel in range(len(WHEELS))
+    ]
+    found, blocks = [], [source for source in sources for _ in source.coordinates]
+    for source, *added in zip(blocks, *wheels, strict=True):
+        nothing = np.zeros(len(source.inputs[:: source.factor]))
+        columns = [nothing if one is None else one / PROBE for one in added]
+        turning = np.sum(columns, axis=0) if source.spec.mode is Mode.ROTATION else nothing
+        found.append(np.column_stack([*columns, turning]))
+    return found

@@ -4,7 +4,7 @@ Dry friction acts against the sliding velocity, so a wheel slides the way its tr
 begins to slide and when it ends is decided by forces that no record holds: the wheels of a vehicle never point to one
 centre exactly, and what they push each other aside with fills part of every friction cone. So the sliding is not
 foretold but found: a wheel slides as long as it runs ahead of what the others roll, in the direction of its traction,
-by more than creep. How far a friction coefficient can be told from that, see `ALONG`.
+by more than any creep, or where its traction is large. How far that tells a friction coefficient, see `ALONG`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 CREEPING: Final = 3e-4
-"""Part of its speed by which a wheel that rolls may run ahead: sliding begins and ends there [-]."""
+"""Part of its speed by which a wheel that rolls may run ahead: less is no sliding at any traction [-]."""
 
 SLIDING: Final = 5e-3
 """Part of its speed that a wheel must run ahead by somewhere in a step for it to have slid in it [-]."""
@@ -55,7 +55,7 @@ ALONG_STD: Final = 0.12
 """Of `ALONG`: between three fifths and all of the cone."""
 
 FILLED: Final = ALONG - 2 * ALONG_STD
-"""Part of its largest traction in a drive that a wheel must have to slide by no more than others creep [-]."""
+"""Traction, over its largest in a drive, from which on a wheel slides that runs ahead by less than `SLIDING` [-]."""
 
 
 @dataclass(frozen=True)

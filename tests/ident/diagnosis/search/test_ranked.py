@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from ident.diagnosis.search.ranked import Ranked
 
 
@@ -25,6 +27,13 @@ def test_a_place_that_holds_95_percent_of_its_name_is_the_only_one() -> None:
     """Whatever else has another name stands in the set of names."""
     found = ranked({"slip@wheel_rl": 0.7, "backlash@drive_rl": 0.25, "slip@chassis": 0.03}, "slip@wheel_rl").untold
     assert found == ("slip@wheel_rl",)
+
+
+@pytest.mark.parametrize(("most", "named"), [(0.90, 2), (0.96, 1)])
+def test_places_are_listed_until_95_percent_of_the_name_are(most: float, named: int) -> None:
+    keys = [f"quadratic_drag@wheel_{corner}" for corner in ("fl", "rl", "fr")]
+    found = ranked(dict(zip(keys, [most, 0.95 - most + 0.01, 0.01], strict=True)), keys[0]).untold
+    assert len(found) == named
 
 
 def test_what_adds_the_same_is_never_left_out() -> None:

@@ -85,7 +85,7 @@ def noisy(record: Record, seed: int, load: float = 0.01) -> Record:
         slow = signal.lfilter([np.sqrt(1 - memory**2)], [1, -memory], generator.normal(size=len(segment)))
         shared = np.linalg.svd(segment.motor_torques, full_matrices=False)[2][0]
         # Its sign is that of rounding, and with it that of the noise.
-        shared *= np.sign(shared @ np.arange(1, 5))
+        shared *= np.sign(shared @ np.arange(1, 5) ** 2)
         reading = 0.002 * generator.normal(size=segment.motor_torques.shape)
         segments.append(with_torques(segment, 2 * load * slow[:, None] * shared + reading))
     return replace(record, segments=segments)
