@@ -68,7 +68,9 @@ def gap_line(findings: Findings, diagnosis: Diagnosis) -> str:
     if diagnosis.verdict is Verdict.NONE:
         return f"{before}."
     rest = "; the rest has no name" if findings.lacking and diagnosis.verdict.explains else ""
-    return f"{before}, {significant(gap.after)} with the causes in the model: {percent(gap.closed)} of it closed{rest}."
+    # Below its noise a gap is closed; by how much it is below is the noise's accident.
+    closed = percent(min(gap.closed, 1.0))
+    return f"{before}, {significant(gap.after)} with the causes in the model: {closed} of it closed{rest}."
 
 
 def unseen_lines(diagnosis: Diagnosis) -> list[str]:

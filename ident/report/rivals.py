@@ -116,7 +116,9 @@ def _standing(key: str, taken: str, same: frozenset[str]) -> Standing:
 
 def _probability(key: str, cause: Cause, same: frozenset[str]) -> str:
     if key == cause.candidate.key:
-        return percent(cause.probability)
+        # Of this place, where others have its name as well.
+        here = sum(cause.ranked.probabilities.get(one, 0.0) for one in cause.ranked.alike)
+        return percent(min(cause.probability, here))
     if key in same:
         return "the same in these records"
     probability = cause.ranked.probabilities.get(key)

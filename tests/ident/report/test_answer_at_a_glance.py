@@ -154,6 +154,15 @@ def test_rivals_come_by_their_odds_and_the_one_taken_is_among_them(name: str, re
     assert taken.value == pytest.approx(cause.log_odds)
 
 
+def test_a_place_has_the_probability_of_its_place_and_not_of_its_name(drag: Findings) -> None:
+    (cause,) = drag.causes
+    key, other = cause.candidate.key, "quadratic_drag@steering_right"
+    shares = {key: 0.5, other: 0.45}
+    ranked = replace(cause.ranked, probabilities=shares, log_odds={key: 20.0, other: 19.9}, alike=(key,))
+    bars = rival_charts(replace(drag, causes=(replace(cause, probability=0.95, ranked=ranked),)))[0].bars
+    assert [bar.probability for bar in bars] == ["50 %", "45 %"]
+
+
 def test_what_is_not_believed_and_nothing_make_one(drag: Findings) -> None:
     shares = (0.3, 0.1, 0.08, 0.06, 0.05, 0.04)
     doubtful = {f"stribeck@axis_{number}": share for number, share in enumerate(shares)}

@@ -20,7 +20,7 @@ from ident.effects import EffectParameter
 from ident.report.commands import Asked
 from ident.report.gap import GapReport, render_gap_report
 from ident.report.gap_figures import map_figure, residual_figures
-from ident.report.gap_summary import summary_lines
+from ident.report.gap_summary import gap_line, summary_lines
 from ident.vehicle.quantities import Quantity
 
 Array = NDArray[np.float64]
@@ -83,6 +83,13 @@ def values(series: Any) -> Array:
     if isinstance(series, dict):
         return np.frombuffer(base64.b64decode(series["bdata"]), dtype=series["dtype"]).astype(float)
     return np.asarray(series, dtype=float)
+
+
+def test_no_more_than_all_of_a_gap_is_said_to_be_closed(findings: Findings) -> None:
+    """A gap just above its noise that ends just below it."""
+    diagnosis = replace(findings.diagnosis(), gap=Gap(1.01, 0.95, 1.0))
+    assert diagnosis.gap.closed > 4
+    assert "100 % of it closed" in gap_line(findings, diagnosis)
 
 
 def test_the_largest_gap_over_its_noise_comes_first_whatever_its_share_of_the_signal(findings: Findings) -> None:

@@ -18,7 +18,7 @@ POSTURE: Final = 0.1
 """Largest mean deviation of a steering angle from that of its step [rad]; no misadjusted encoder is as far off."""
 
 ROLLING: Final = 0.25
-"""Largest relative deviation of the way that both wheels of a side roll while it steers; no worn tyre is as far off."""
+"""Largest relative deviation of the way that a wheel rolls while its side steers; no worn tyre is as far off."""
 
 TURNED: Final = 0.05
 """Rms of the steering angle from which its wheels can be compared with it [rad]."""
@@ -64,7 +64,8 @@ def _of_rolling(segment: Segment, geometry: Geometry) -> str:
     wheels = segment.wheel_angles[:, 2 * side : 2 * side + 2]
     ratios = (wheels - wheels.mean(axis=0)).T @ angle / float(angle @ angle)
     expected = geometry.wheel_offset / geometry.wheel_radius
-    found = (-1) ** side * float(ratios[1] - ratios[0]) / 2
+    # A wheel on slippery ground rolls as it likes; of another vehicle neither rolls like this one's.
+    found = min(((-1) ** side * ratios * (-1, 1)).tolist(), key=lambda ratio: abs(ratio - expected))
     if abs(found / expected - 1) > ROLLING:
         return f"its wheels roll {found:.2f} rad per rad of steering, which for this vehicle is {expected:.2f}"
     return ""
