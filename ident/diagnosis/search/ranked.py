@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Final
-
-import numpy as np
 
 COVERAGE: Final = 0.95
 """Probability that an ambiguity set holds together."""
@@ -31,21 +30,22 @@ class Ranked:
 
     def ambiguity_set(self, name: str) -> tuple[str, ...]:
         """Names up to a probability of `COVERAGE`, and those of candidates that are the same; `name` first."""
-        total, chosen, reached = sum(self.names.values()), [name], 0.0
-        for other, probability in self.names.items():
-            if total == 0 or reached >= COVERAGE * total:
-                break
-            reached += probability
-            chosen.append(other)
-        chosen += [key.split("@")[0] for key in self.alike]
-        return tuple(dict.fromkeys(chosen))
+        return tuple(dict.fromkeys([name, *_covering(self.names), *map(_name_of, self.alike)]))
 
     @property
     def untold(self) -> tuple[str, ...]:
         """Keys of what is the same in these records, and of its name's places up to `COVERAGE` of their probability."""
-        first = self.alike[0]
-        name = first.split("@")[0]
-        own = {key: each for key, each in self.probabilities.items() if key.split("@")[0] == name}
-        before = np.cumsum([0.0, *own.values()])
-        places = [key for key, less in zip(own, before[:-1], strict=True) if less < COVERAGE * before[-1]]
-        return tuple(dict.fromkeys([*self.alike, *places]))
+        name = _name_of(self.alike[0])
+        places = {key: each for key, each in self.probabilities.items() if _name_of(key) == name}
+        return tuple(dict.fromkeys([*self.alike, *_covering(places)]))
+
+
+def _covering(probabilities: Mapping[str, float]) -> list[str]:
+    """The first of them that make up `COVERAGE` of all; none where all are zero."""
+    before = accumulate(probabilities.values(), initial=0.0)
+    total = sum(probabilities.values())
+    return [one for one, reached in zip(probabilities, before, strict=False) if reached < COVERAGE * total]
+
+
+def _name_of(key: str) -> str:
+    return key.split("@")[0]

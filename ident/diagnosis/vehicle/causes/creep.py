@@ -33,9 +33,6 @@ CREEP_NAMES: Final = (*(f"creep_{wheel}" for wheel in WHEELS), "creep_rotation")
 """Slip of each wheel, over its rolling speed, for a traction as large as its load, and by how much more all of them do
 turning on the spot [-]."""
 
-PROBE: Final = 1e-3
-"""Creep that columns are made with, a tenth of what is found: rows are as good as linear in it."""
-
 CREEP_STD: Final = 0.03
 """Standard deviation of those numbers beforehand: tyres take ten (air) to a hundred times their load for full slip."""
 
@@ -85,16 +82,19 @@ class Creep:
 
 
 def creep_columns(sources: Sequence[Source], context: Context) -> list[Array]:
-    """What unit creep adds to the rows of every block, (N, CREEP_NAMES) to first order [m/s, N or Nm]."""
+    """What unit creep adds to the rows of every block, (N, CREEP_NAMES) [m/s, N or Nm].
+
+    To first order: of a creep as small as `GRANTED`.
+    """
     acting = [source.own is None and source.spec.mode is not None for source in sources]
     wheels = [
-        contribution_of(Creep(wheel), acting, sources, context)(np.array([PROBE]), context.parameters)
+        contribution_of(Creep(wheel), acting, sources, context)(np.array([GRANTED]), context.parameters)
         for wheel in range(len(WHEELS))
     ]
     found, blocks = [], [source for source in sources for _ in source.coordinates]
     for source, *added in zip(blocks, *wheels, strict=True):
         nothing = np.zeros(len(source.inputs[:: source.factor]))
-        columns = [nothing if one is None else one / PROBE for one in added]
+        columns = [nothing if one is None else one / GRANTED for one in added]
         turning = np.sum(columns, axis=0) if source.spec.mode is Mode.ROTATION else nothing
         found.append(np.column_stack([*columns, turning]))
     return found
