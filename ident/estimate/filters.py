@@ -64,14 +64,28 @@ def zero_phase(values: Array, cutoff: float, sample_time: float, unjudged: int =
     judged = np.asarray(values, dtype=float)[unjudged : len(values) - unjudged]
     sides = [(unjudged + _BEYOND, unjudged + _BEYOND)] + [(0, 0)] * (judged.ndim - 1)
     continued = np.pad(judged, sides, mode="reflect", reflect_type="odd")
-    filtered = signal.sosfiltfilt(butterworth(FILTER_ORDER, cutoff, sample_time), continued, axis=0, padtype=None)
-    return np.asarray(filtered[_BEYOND:-_BEYOND])
+    forwards = _settled(continued, cutoff, sample_time)
+    return np.asarray(_settled(forwards[::-1], cutoff, sample_time)[::-1][_BEYOND:-_BEYOND])
+
+
+def _settled(values: Array, cutoff: float, sample_time: float) -> Array:
+    """One pass of the filter, which has seen the first sample (1, ...) for ever."""
+    states = _states(FILTER_ORDER, cutoff, sample_time)
+    begun = states.reshape(*states.shape, *[1] * (values.ndim - 1)) * values[:1]
+    filtered, _ = signal.sosfilt(butterworth(FILTER_ORDER, cutoff, sample_time), values, axis=0, zi=begun)
+    return np.asarray(filtered)
 
 
 @lru_cache(maxsize=32)
 def butterworth(order: int, cutoff: float, sample_time: float) -> Array:
     """Second-order sections (k, 6) of a low-pass, cutoff in rad/s; one array for all who ask, to be read only."""
     return np.asarray(signal.butter(order, cutoff / (2 * math.pi), fs=1 / sample_time, output="sos"))
+
+
+@lru_cache(maxsize=32)
+def _states(order: int, cutoff: float, sample_time: float) -> Array:
+    """States (k, 2) of its sections under a one that has lasted; as for `butterworth`."""
+    return np.asarray(signal.sosfilt_zi(butterworth(order, cutoff, sample_time)))
 
 
 MEMORY: Final = 50.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -35,21 +36,35 @@ NOISE: Final = 0.01
 """Noise of a generalized torque, in units of its rms; that of the rolling rows is what they tolerate."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sight:
     """What an experiment shows of one cause.
 
     Attributes:
-        visible: whether the baseline leaves anything of it.
-        alike: keys of other causes that look the same.
+        key: of the cause.
+        left: orthonormal bases of what the baseline leaves of every cause's columns, by key.
     """
 
-    visible: bool
-    alike: tuple[str, ...]
+    key: str
+    left: Mapping[str, Sequence[Array]]
 
-    def alike_effects(self, own: str) -> tuple[str, ...]:
+    @property
+    def visible(self) -> bool:
+        """Whether the baseline leaves anything of it."""
+        return any(basis.shape[1] > 0 for basis in self.left[self.key])
+
+    @cached_property
+    def alike(self) -> tuple[str, ...]:
+        """Keys of other causes that look the same."""
+        return tuple(sorted(key for key in self.left if key != self.key and self._looks_like(key)))
+
+    def alike_effects(self) -> tuple[str, ...]:
         """Names of other effects among them."""
+        own = self.key.partition("@")[0]
         return tuple(dict.fromkeys(name for key in self.alike if (name := key.partition("@")[0]) != own))
+
+    def _looks_like(self, other: str) -> bool:
+        return any(_are_alike(mine, theirs) for mine in self.left[self.key] for theirs in self.left[other])
 
 
 def sights(problem: Problem, further: Problem | None = None) -> Mapping[str, Sight]:
@@ -58,15 +73,11 @@ def sights(problem: Problem, further: Problem | None = None) -> Mapping[str, Sig
     scale = row_noise(rows)
     free = [column for column, name in enumerate(problem.names) if name != LAG_NAME]
     baseline = orthonormal(rows.baseline[:, free] / scale[:, None], RANK)
-    found = [_left(rows.columns[:, column.own] / scale[:, None], baseline) for column in rows.layout]
-    owners = [problem.candidates[column.candidate].key for column in rows.layout]
-    return {
-        candidate.key: Sight(
-            any(basis.shape[1] > 0 for basis, owner in zip(found, owners, strict=True) if owner == candidate.key),
-            _twins(candidate.key, found, owners),
-        )
-        for candidate in problem.candidates
-    }
+    left: dict[str, list[Array]] = {candidate.key: [] for candidate in problem.candidates}
+    for column in rows.layout:
+        key = problem.candidates[column.candidate].key
+        left[key].append(_left(rows.columns[:, column.own] / scale[:, None], baseline))
+    return {key: Sight(key, left) for key in left}
 
 
 def row_noise(rows: Rows) -> Array:
@@ -88,16 +99,6 @@ def _left(columns: Array, baseline: Array) -> Array:
     powers, turn = np.linalg.eigh(left.T @ left)
     seen = powers > VISIBLE**2
     return np.asarray(left @ (turn[:, seen] / np.sqrt(powers[seen])))
-
-
-def _twins(key: str, found: Sequence[Array], owners: Sequence[str]) -> tuple[str, ...]:
-    own = [basis for basis, owner in zip(found, owners, strict=True) if owner == key]
-    alike = {
-        owner
-        for basis, owner in zip(found, owners, strict=True)
-        if owner != key and any(_are_alike(mine, basis) for mine in own)
-    }
-    return tuple(sorted(alike))
 
 
 def _are_alike(first: Array, second: Array) -> bool:

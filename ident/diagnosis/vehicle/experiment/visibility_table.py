@@ -80,7 +80,7 @@ def _mark(name: EffectName, keys: Sequence[str], sights: Mapping[str, Sight]) ->
     entries = [sights[key] for key in keys]
     if not all(entry.visible for entry in entries):
         return "-"
-    if any(entry.alike_effects(name) for entry in entries):
+    if any(entry.alike_effects() for entry in entries):
         return "seen"
     return "split" if any(entry.alike for entry in entries) else "placed"
 
