@@ -7,6 +7,7 @@ instructions numpy is about ten times faster.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -80,10 +81,22 @@ class Vectorised:
         pattern = function.sparsity_out(0)
         self.places = (np.array(pattern.row(), dtype=np.int64), np.array(pattern.get_col(), dtype=np.int64))
         self.program = [_instruction(function, index) for index in range(function.n_instructions())]
-        self.inputs = frozenset(sources for code, sources, *_ in self.program if code == ca.OP_INPUT)
+        self.inputs = _inputs(self.program)
         unknown = {code for code, *_ in self.program} - OPERATIONS.keys() - {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST}
         if unknown:
             raise ValueError(f"no numpy counterpart of the CasADi operations {sorted(unknown)}")
+
+    def only(self, columns: Sequence[int]) -> Vectorised:
+        """The same function with some columns of its output alone, in this order, and of its program what they need."""
+        entries = [entry for column in columns for entry in np.flatnonzero(self.places[1] == column).tolist()]
+        found = copy(self)
+        found.shape = self.shape[0], len(columns)
+        place = {column: number for number, column in enumerate(columns)}
+        rows, whole = self.places[0][entries], self.places[1][entries].tolist()
+        found.places = rows, np.array([place[column] for column in whole], dtype=np.int64)
+        found.program = _needed(self.program, {entry: number for number, entry in enumerate(entries)})
+        found.inputs = _inputs(found.program)
+        return found
 
     def __call__(self, *arguments: Array) -> Array:
         """Outputs (N, rows, columns) for arguments (N, n), or (n,) where they are the same for all samples."""
@@ -135,6 +148,26 @@ def value_of(instruction: Instruction, inputs: Inputs, work: Mapping[int, Any]) 
         return inputs[sources[0]][sources[1]] if code == ca.OP_INPUT else constant
     # There are hundreds of thousands of these calls.
     return operation(work[sources[0]], work[sources[1]]) if len(sources) == 2 else operation(work[sources[0]])
+
+
+def _inputs(program: Sequence[Instruction]) -> frozenset[tuple[int, ...]]:
+    return frozenset(sources for code, sources, *_ in program if code == ca.OP_INPUT)
+
+
+def _needed(program: Sequence[Instruction], outputs: Mapping[int, int]) -> list[Instruction]:
+    """Instructions that some outputs need; `outputs` are the numbers that those have, by those that they had."""
+    wanted, found = set[int](), list[Instruction]()
+    for code, sources, targets, constant in reversed(program):
+        if code == ca.OP_OUTPUT:
+            if targets[1] in outputs:
+                found.append((code, sources, (targets[0], outputs[targets[1]]), constant))
+                wanted.add(sources[0])
+        elif targets[0] in wanted:
+            # Places are used again: what stood here before is none of these outputs' unless it is asked for further up.
+            wanted.discard(targets[0])
+            found.append((code, sources, targets, constant))
+            wanted.update(sources if code not in (ca.OP_INPUT, ca.OP_CONST) else ())
+    return found[::-1]
 
 
 def _instruction(function: Any, index: int) -> Instruction:

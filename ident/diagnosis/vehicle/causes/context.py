@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.names import MEMORIES, EffectName
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.vehicle.causes.bending import BristleCause
+from ident.diagnosis.vehicle.causes.library import every_unit
 from ident.diagnosis.vehicle.records import rows
 from ident.diagnosis.vehicle.records.sliding import SlidingCause, sliding_cause
 from ident.diagnosis.vehicle.records.sources import Source
@@ -182,7 +183,7 @@ def _frozen(term: EffectTerm) -> _FrozenTerm:
 
 @lru_cache(maxsize=FORMULAS_KEPT)
 def _formulas(given: tuple[_FrozenTerm, ...]) -> rows.Formulas:
-    return rows.Formulas([effect_term(name, where, dict(values)) for name, where, values in given])
+    return rows.Formulas([effect_term(name, where, dict(values)) for name, where, values in given], every_unit())
 
 
 def _memory(effect: Effect) -> tuple[Remembering, Array]:

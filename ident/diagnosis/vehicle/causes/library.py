@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from types import MappingProxyType
 from typing import Final
 
@@ -151,12 +152,22 @@ def placed_parameters(name: EffectName, where: str) -> tuple[EffectParameter, ..
 
 def term_causes(names: Sequence[EffectName]) -> list[TermCause]:
     """All places of the effects named that are terms."""
-    return [
-        TermCause(name, where, tuple(_variants(name, where)))
-        for name in names
-        if name in SHAPES
-        for where in places_of(name)
-    ]
+    return [cause for name in names for cause in _term_causes_of(EffectName(name))]
+
+
+@cache
+def every_unit() -> tuple[UnitTerm, ...]:
+    """Of all places of all effects that are terms."""
+    causes = term_causes(tuple(EffectName))
+    return tuple(unit for cause in causes for variant in cause.variants for unit in variant.units)
+
+
+@cache
+def _term_causes_of(name: EffectName) -> tuple[TermCause, ...]:
+    """Symbols are equal to none but themselves: they are made once."""
+    if name not in SHAPES:
+        return ()
+    return tuple(TermCause(name, where, tuple(_variants(name, where))) for where in places_of(name))
 
 
 def _variants(name: EffectName, where: str) -> list[UnitVariant]:

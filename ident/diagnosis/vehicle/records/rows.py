@@ -190,12 +190,15 @@ class Formulas:
 
     Args:
         given: effects that are known to be there, part of the model itself.
+        units: every term that a column may be asked of.
     """
 
-    def __init__(self, given: Sequence[EffectTerm] = ()) -> None:
-        self._given = tuple(given)
+    def __init__(self, given: Sequence[EffectTerm] = (), units: Sequence[UnitTerm] = ()) -> None:
+        self._given, self._units = tuple(given), tuple(units)
+        self._numbers = {unit: 1 + len(PARAMETER_NAMES) + number for number, unit in enumerate(units)}
         self._exact: dict[tuple[Channel, RowsOfStep, EffectName | None, str], Vectorised] = {}
         self._rolled: dict[RowsOfStep, Vectorised] = {}
+        self._whole: dict[tuple[Channel, RowsOfStep], Vectorised] = {}
         self._linearised: dict[tuple[Channel, RowsOfStep, tuple[UnitTerm, ...]], Vectorised] = {}
 
     def linearised(self, channel: Channel, spec: RowsOfStep, units: Sequence[UnitTerm]) -> Vectorised:
@@ -206,10 +209,18 @@ class Formulas:
         """
         key = (channel, spec, tuple(units))
         if key not in self._linearised:
-            z, p = symbolic_inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
-            rows = _rows(channel, spec, z, p, [*(unit.term for unit in units), *self._given])
-            self._linearised[key] = _linearise(rows, z, p, units, shared=spec.mode is not None)
+            columns = [*range(1 + len(PARAMETER_NAMES)), *(self._numbers[unit] for unit in units)]
+            self._linearised[key] = self._with_all(channel, spec).only(columns)
         return self._linearised[key]
+
+    def _with_all(self, channel: Channel, spec: RowsOfStep) -> Vectorised:
+        """The same of all units: deriving the equations takes longer than leaving out what is not asked for."""
+        key = (channel, spec)
+        if key not in self._whole:
+            z, p = symbolic_inputs(), ca.SX.sym("p", len(PARAMETER_NAMES))
+            rows = _rows(channel, spec, z, p, [*(unit.term for unit in self._units), *self._given])
+            self._whole[key] = _linearise(rows, z, p, self._units, shared=spec.mode is not None)
+        return self._whole[key]
 
     def exact(self, channel: Channel, spec: RowsOfStep, name: EffectName | None = None, where: str = "") -> Vectorised:
         """(z, geometry, ε, p, values) -> (N, rows, 1): the rows of a step with one effect more, or with none."""
