@@ -141,7 +141,7 @@ def _by_sampling(cause: Cause, sources: Sequence[Source]) -> tuple[float, float]
     """Sizes of a delay or a filter [s], as a lead and as itself, up to which sampling may be what it is."""
     if cause.name not in LATE:
         return 0.0, 0.0
-    held = HELD * max((source.sample_time for source in sources), default=0.0)
+    held = HELD * max((source.interval for source in sources), default=0.0)
     return held, held if cause.where == "drives" else 0.0
 
 

@@ -29,12 +29,12 @@ LAG_STD: Final = 0.25
 def lag_columns(sources: Sequence[Source], context: Context) -> list[Array]:
     """What a lag of one sample adds to the rows of every block, (N,) to first order."""
     late = contribution_of(transform_cause(EffectName.TIME_DELAY, "drives"), [True] * len(sources), sources, context)
-    probe = min(source.sample_time for source in sources) / 2
+    probe = min(source.interval for source in sources) / 2
     found: list[Array] = []
     series = iter(late(np.array([probe]), context.parameters))
     for source in sources:
         for _ in source.coordinates:
             column = next(series)
             length = len(source.inputs[:: source.factor])
-            found.append(np.zeros(length) if column is None else column * source.sample_time / probe)
+            found.append(np.zeros(length) if column is None else column * source.interval / probe)
     return found

@@ -49,6 +49,7 @@ class Source:
         spec: rows that the step has.
         inputs: (M, INPUTS) at a rate that the smoothed signals allow; wheels whose motors rattle roll as the others do.
         sample_time: of them [s].
+        interval: at which they were recorded [s], which is what sampling is as late as.
         factor: every how manieth becomes a row of a block.
         moving: rows to be used (M,), a mask for each of its coordinates.
         holds: (M, rows) samples in which the equation of each holds: none of its joints sticks.
@@ -64,6 +65,7 @@ class Source:
     spec: RowsOfStep
     inputs: Array
     sample_time: float
+    interval: float
     factor: int
     moving: tuple[NDArray[np.bool_], ...]
     holds: NDArray[np.bool_]
@@ -165,6 +167,7 @@ def _sources(
         "spec": spec,
         "inputs": thinned(loose.inputs, stride),
         "sample_time": segment.sample_time * stride,
+        "interval": segment.sample_time,
         "factor": factor // stride,
         "period": segment.period[::stride],
         "record": signals.record,
