@@ -70,7 +70,7 @@ def zero_phase(values: Array, cutoff: float, sample_time: float, unjudged: int =
 
 def _settled(values: Array, cutoff: float, sample_time: float) -> Array:
     """One pass of the filter, which has seen the first sample (1, ...) for ever."""
-    states = _states(FILTER_ORDER, cutoff, sample_time)
+    states = _states(cutoff, sample_time)
     begun = states.reshape(*states.shape, *[1] * (values.ndim - 1)) * values[:1]
     filtered, _ = signal.sosfilt(butterworth(FILTER_ORDER, cutoff, sample_time), values, axis=0, zi=begun)
     return np.asarray(filtered)
@@ -83,9 +83,9 @@ def butterworth(order: int, cutoff: float, sample_time: float) -> Array:
 
 
 @lru_cache(maxsize=32)
-def _states(order: int, cutoff: float, sample_time: float) -> Array:
+def _states(cutoff: float, sample_time: float) -> Array:
     """States (k, 2) of its sections under a one that has lasted; as for `butterworth`."""
-    return np.asarray(signal.sosfilt_zi(butterworth(order, cutoff, sample_time)))
+    return np.asarray(signal.sosfilt_zi(butterworth(FILTER_ORDER, cutoff, sample_time)))
 
 
 MEMORY: Final = 50.0

@@ -87,7 +87,11 @@ class Vectorised:
             raise ValueError(f"no numpy counterpart of the CasADi operations {sorted(unknown)}")
 
     def only(self, columns: Sequence[int]) -> Vectorised:
-        """The same function with some columns of its output alone, in this order, and of its program what they need."""
+        """The same function with some columns of its output alone, in this order, and of its program what they need.
+
+        Args:
+            columns: their numbers, each once.
+        """
         entries = [entry for column in columns for entry in np.flatnonzero(self.places[1] == column).tolist()]
         found = copy(self)
         found.shape = self.shape[0], len(columns)
@@ -163,7 +167,7 @@ def _needed(program: Sequence[Instruction], outputs: Mapping[int, int]) -> list[
                 found.append((code, sources, (targets[0], outputs[targets[1]]), constant))
                 wanted.add(sources[0])
         elif targets[0] in wanted:
-            # Places are used again: what stood here before is none of these outputs' unless it is asked for further up.
+            # Places are used again: an earlier value in this one is another.
             wanted.discard(targets[0])
             found.append((code, sources, targets, constant))
             wanted.update(sources if code not in (ca.OP_INPUT, ca.OP_CONST) else ())

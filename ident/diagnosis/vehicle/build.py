@@ -15,7 +15,7 @@ from ident.diagnosis.names import EffectName, refuse_strangers
 from ident.diagnosis.observations.linear import rms
 from ident.diagnosis.problem import Block, Channel, Nominal, Problem
 from ident.diagnosis.vehicle.causes.candidates import candidate_of, causes_of, seen_together, slid_by_any
-from ident.diagnosis.vehicle.causes.context import MODEL_COLUMNS, Context, fitted_parameters, make_context, table_of
+from ident.diagnosis.vehicle.causes.context import Context, fitted_parameters, make_context, table_of
 from ident.diagnosis.vehicle.causes.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
 from ident.diagnosis.vehicle.causes.dependences import vehicle_dependences
 from ident.diagnosis.vehicle.causes.lag import LAG_NAME, LAG_STD, lag_columns
@@ -24,6 +24,7 @@ from ident.diagnosis.vehicle.records.inputs import SLICES
 from ident.diagnosis.vehicle.records.moments import apart_from_moments
 from ident.diagnosis.vehicle.records.rattling import SHAKEN
 from ident.diagnosis.vehicle.records.regions import coordinate_motion, features_of, regions_of
+from ident.diagnosis.vehicle.records.rows import MODEL_COLUMNS
 from ident.diagnosis.vehicle.records.sources import DIAGNOSED, Source, processing_of, sources_of
 from ident.effects import EFFECTS, Effect
 from ident.estimate.filters import Processing

@@ -18,7 +18,7 @@ from ident.diagnosis.problem import Candidate, Variant
 from ident.diagnosis.vehicle.causes.askew import MODES, Travelling, sliding_aside, with_shares
 from ident.diagnosis.vehicle.causes.bending import BristleCause
 from ident.diagnosis.vehicle.causes.bristles import bristle_candidate, bristle_causes
-from ident.diagnosis.vehicle.causes.context import FORMULAS_KEPT, MODEL_COLUMNS, Context
+from ident.diagnosis.vehicle.causes.context import FORMULAS_KEPT, Context
 from ident.diagnosis.vehicle.causes.contribution import Cause, acting_in, contribution_of, side_by_side
 from ident.diagnosis.vehicle.causes.library import (
     DRIFTS,
@@ -30,6 +30,7 @@ from ident.diagnosis.vehicle.causes.library import (
     term_causes,
 )
 from ident.diagnosis.vehicle.records.inputs import SLICES
+from ident.diagnosis.vehicle.records.rows import MODEL_COLUMNS
 from ident.diagnosis.vehicle.records.sliding import (
     ALONG,
     ALONG_STD,

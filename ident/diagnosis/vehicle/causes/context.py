@@ -41,9 +41,6 @@ FORMULAS_KEPT: Final = 4
 AT_ONCE: Final = 16
 """Columns that pass the filter together: it makes several copies of them."""
 
-MODEL_COLUMNS: Final = 1 + len(PARAMETER_NAMES)
-"""Columns of a table before those of the causes: residual at p = 0, then Θ."""
-
 
 @dataclass(frozen=True)
 class Context:
@@ -156,7 +153,7 @@ def fitted_parameters(sources: Sequence[Source], vehicle: VehicleDescription, co
             table = table_of(source, context, [])
             for row, moving in enumerate(source.moving):
                 kept = table[moving[:: source.factor], row]
-                theta = kept[:, 1:MODEL_COLUMNS] * prior
+                theta = kept[:, 1 : rows.MODEL_COLUMNS] * prior
                 normal += theta.T @ theta
                 right += theta.T @ (-kept[:, 0] - theta.sum(axis=1))
     scale = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
@@ -168,7 +165,7 @@ def table_of(source: Source, context: Context, units: Sequence[rows.UnitTerm]) -
     """Filtered residual at p = 0, regressor and columns of a source: (N, rows, 12 + units)."""
     if source.own is not None:
         plain = context.filtered(context.plain(source), source)
-        return np.concatenate([plain, np.zeros((*plain.shape[:2], MODEL_COLUMNS - 1 + len(units)))], axis=2)
+        return np.concatenate([plain, np.zeros((*plain.shape[:2], rows.MODEL_COLUMNS - 1 + len(units)))], axis=2)
     function = context.formulas.linearised(source.channel, source.spec, units)
     entries = function.entries(context.inputs(source), *context.constants, context.asked)
     return function.matrices(context.in_rows(entries.T, source, function.places[0].tolist()).T)

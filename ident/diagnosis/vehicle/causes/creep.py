@@ -84,7 +84,7 @@ class Creep:
 def creep_columns(sources: Sequence[Source], context: Context) -> list[Array]:
     """What unit creep adds to the rows of every block, (N, CREEP_NAMES) [m/s, N or Nm].
 
-    To first order: of a creep as small as `GRANTED`.
+    To first order: by a finite difference at `GRANTED`.
     """
     acting = [source.own is None and source.spec.mode is not None for source in sources]
     wheels = [

@@ -172,6 +172,10 @@ def _on_the_floor(z: Inputs, alpha: Expression, radii: Expression) -> tuple[Expr
     )
 
 
+MODEL_COLUMNS: Final = 1 + len(PARAMETER_NAMES)
+"""Columns of a table before those of the causes: residual at p = 0, then Θ."""
+
+
 @dataclass(frozen=True, eq=False)
 class UnitTerm:
     """A term that is linear in one number: what one column of a candidate stands for. Equal to none but itself.
@@ -195,7 +199,7 @@ class Formulas:
 
     def __init__(self, given: Sequence[EffectTerm] = (), units: Sequence[UnitTerm] = ()) -> None:
         self._given, self._units = tuple(given), tuple(units)
-        self._numbers = {unit: 1 + len(PARAMETER_NAMES) + number for number, unit in enumerate(units)}
+        self._numbers = {unit: MODEL_COLUMNS + number for number, unit in enumerate(units)}
         self._exact: dict[tuple[Channel, RowsOfStep, EffectName | None, str], Vectorised] = {}
         self._rolled: dict[RowsOfStep, Vectorised] = {}
         self._whole: dict[tuple[Channel, RowsOfStep], Vectorised] = {}
@@ -206,10 +210,13 @@ class Formulas:
 
         In columns of gains and of friction under load stand the torques that the rows ask for by p₀, where motors share
         a row.
+
+        Raises:
+            KeyError: a unit is none of those that the formulas were made with.
         """
         key = (channel, spec, tuple(units))
         if key not in self._linearised:
-            columns = [*range(1 + len(PARAMETER_NAMES)), *(self._numbers[unit] for unit in units)]
+            columns = [*range(MODEL_COLUMNS), *(self._numbers[unit] for unit in units)]
             self._linearised[key] = self._with_all(channel, spec).only(columns)
         return self._linearised[key]
 

@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from ident.diagnosis.vehicle.records.inputs import INPUTS, SLICES
 from ident.errors import RecordError
@@ -131,16 +130,6 @@ def decimation(segment: Segment, cutoff: float) -> int:
     starts = [int(np.argmax(segment.period == number)) for number in segment.periods]
     gaps = [*lengths, *np.diff(starts)]
     return next(factor for factor in range(most, 0, -1) if all(gap % factor == 0 for gap in gaps))
-
-
-def thinned(values: Array, stride: int) -> Array:
-    """Every so manieth of some samples (N, ...), each a mean about it, in which what would pass for standstill is gone.
-
-    An acceleration is noise above all, and most of it is fast. Without the mean, whatever is near the new rate would be
-    as slow as the rows.
-    """
-    weights = np.convolve(np.ones(stride), np.ones(stride)) / stride**2
-    return np.asarray(ndimage.convolve1d(values, weights, axis=0)[::stride])
 
 
 def shifted(values: Array, delay: float, sample_time: float) -> Array:

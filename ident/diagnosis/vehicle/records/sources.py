@@ -15,7 +15,7 @@ from ident.diagnosis.vehicle.records import rows
 from ident.diagnosis.vehicle.records.inputs import SLICES
 from ident.diagnosis.vehicle.records.loose import as_it_was, near_middle, taken_apart
 from ident.diagnosis.vehicle.records.resting import WIDE, resting_wheel
-from ident.diagnosis.vehicle.records.signals import Signals, decimation, signals_of, thinned
+from ident.diagnosis.vehicle.records.signals import Signals, decimation, signals_of
 from ident.diagnosis.vehicle.records.wandering import wanders
 from ident.errors import RecordError
 from ident.estimate.equations import ROWS, RowsOfStep
@@ -29,8 +29,8 @@ Array = NDArray[np.float64]
 DIAGNOSED: Final = tuple(step for step in ROWS if step is not Step.LANE_CHANGE)
 """Steps that causes are looked for in; the lane change is kept for judging what was found."""
 
-OVERSAMPLED: Final = 1.5
-"""Rate at which rows are evaluated, at least, in units of the estimate's cutoff of its signals over π."""
+OVERSAMPLED: Final = 3.0
+"""Rate at which rows are evaluated, in units of the cutoff of the smoothed signals over π."""
 
 SIGNAL_BANDWIDTH: Final = 1000.0
 """Of the signals [rad/s]: motors on the compliance of their gears' teeth rattle more slowly than that."""
@@ -155,7 +155,7 @@ def _sources(
 ) -> Iterable[Source]:
     segment = signals.segment
     factor = decimation(segment, processing.cutoff)
-    most = max(1, int(np.pi / (OVERSAMPLED * Processing().signal_cutoff * segment.sample_time)))
+    most = max(1, int(np.pi / (OVERSAMPLED * processing.signal_cutoff * segment.sample_time)))
     stride = next(stride for stride in range(min(most, factor), 0, -1) if factor % stride == 0)
     recorded = signals.as_inputs()
     recorded[:, SLICES["torques"]] = zero_phase(
@@ -165,7 +165,7 @@ def _sources(
     common = {
         "step": segment.step,
         "spec": spec,
-        "inputs": thinned(loose.inputs, stride),
+        "inputs": loose.inputs[::stride],
         "sample_time": segment.sample_time * stride,
         "interval": segment.sample_time,
         "factor": factor // stride,

@@ -20,7 +20,7 @@ from tests.ident.diagnosis.vehicle.flaws import rippled, sticky
 Drives = Callable[..., tuple[Record, Record]]
 
 SLOWLY = (Drive(Step.STEERING_RIGHT, "slow"),)
-"""Beside the four steps, which tell a friction near standstill to a fifth: with its speed it trades."""
+"""Amplitude and speed of a Stribeck friction trade: the four steps alone tell each to a fifth."""
 
 
 def plain(segment: Segment, vehicle: VehicleDescription) -> Segment:
