@@ -92,13 +92,12 @@ class Vectorised:
         Args:
             columns: their numbers, each once.
         """
-        entries = [entry for column in columns for entry in np.flatnonzero(self.places[1] == column).tolist()]
+        kept = [np.flatnonzero(self.places[1] == column) for column in columns]
+        entries = np.concatenate(kept)
         found = copy(self)
         found.shape = self.shape[0], len(columns)
-        place = {column: number for number, column in enumerate(columns)}
-        rows, whole = self.places[0][entries], self.places[1][entries].tolist()
-        found.places = rows, np.array([place[column] for column in whole], dtype=np.int64)
-        found.program = _needed(self.program, {entry: number for number, entry in enumerate(entries)})
+        found.places = self.places[0][entries], np.repeat(np.arange(len(columns)), [len(one) for one in kept])
+        found.program = _needed(self.program, {entry: number for number, entry in enumerate(entries.tolist())})
         found.inputs = _inputs(found.program)
         return found
 

@@ -75,7 +75,7 @@ def build_problem(
     if model and EffectName.TORQUE_GAIN in effects:
         context = replace(context, asked=fitted_parameters(sources, vehicle, context))
     causes = causes_of(tuple(effects), model is not None)
-    units = [unit for cause in causes if isinstance(cause, TermCause) for v in cause.variants for unit in v.units]
+    units = [unit for cause in causes if isinstance(cause, TermCause) for unit in cause.units]
     tables = [table_of(source, context, units) for source in sources]
     blocks = [block for source, table in zip(sources, tables, strict=True) for block in _blocks(source, table, context)]
     columns = iter(range(MODEL_COLUMNS, MODEL_COLUMNS + len(units)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
@@ -18,7 +17,7 @@ from ident.diagnosis.problem import Candidate, Variant
 from ident.diagnosis.vehicle.causes.askew import MODES, Travelling, sliding_aside, with_shares
 from ident.diagnosis.vehicle.causes.bending import BristleCause
 from ident.diagnosis.vehicle.causes.bristles import bristle_candidate, bristle_causes
-from ident.diagnosis.vehicle.causes.context import FORMULAS_KEPT, Context
+from ident.diagnosis.vehicle.causes.context import Context
 from ident.diagnosis.vehicle.causes.contribution import Cause, acting_in, contribution_of, side_by_side
 from ident.diagnosis.vehicle.causes.library import (
     DRIFTS,
@@ -96,7 +95,6 @@ SPREADS: Final[Mapping[tuple[EffectName, str], float]] = MappingProxyType(
 """Standard deviations of sizes beyond the scatter of the rows, by effect and place, in their units."""
 
 
-@lru_cache(maxsize=FORMULAS_KEPT)
 def causes_of(effects: tuple[EffectName, ...], judged: bool) -> tuple[Cause, ...]:
     """Causes with these names, changed values only where a model is judged."""
     names = tuple(name for name in effects if judged or name not in DRIFTS)

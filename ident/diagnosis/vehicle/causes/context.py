@@ -36,7 +36,7 @@ HELD: Final = 1.0
 """The same of a parameter that stays at the guess."""
 
 FORMULAS_KEPT: Final = 4
-"""Libraries of causes, and sets of given effects, whose generated formulas a process keeps."""
+"""Sets of given effects whose generated formulas a process keeps."""
 
 AT_ONCE: Final = 16
 """Columns that pass the filter together: it makes several copies of them."""

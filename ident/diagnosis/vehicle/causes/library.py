@@ -140,6 +140,11 @@ class TermCause:
         """As listed in the table of effects, with the units of this place."""
         return placed_parameters(self.name, self.where)
 
+    @property
+    def units(self) -> tuple[UnitTerm, ...]:
+        """Of all variants, in their order."""
+        return tuple(unit for variant in self.variants for unit in variant.units)
+
 
 def placed_parameters(name: EffectName, where: str) -> tuple[EffectParameter, ...]:
     """Parameters of an effect, with the units that they have at a place."""
@@ -158,8 +163,7 @@ def term_causes(names: Sequence[EffectName]) -> list[TermCause]:
 @cache
 def every_unit() -> tuple[UnitTerm, ...]:
     """Of all places of all effects that are terms."""
-    causes = term_causes(tuple(EffectName))
-    return tuple(unit for cause in causes for variant in cause.variants for unit in variant.units)
+    return tuple(unit for cause in term_causes(tuple(EffectName)) for unit in cause.units)
 
 
 @cache

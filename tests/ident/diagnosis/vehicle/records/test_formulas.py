@@ -23,7 +23,7 @@ NAMES = (EffectName.QUADRATIC_DRAG, EffectName.WHEEL_RADIUS, EffectName.TORQUE_G
 def test_columns_are_the_same_whatever_else_the_equations_were_derived_with(
     channel: Channel, step: Step, prototype: VehicleDescription
 ) -> None:
-    units = [unit for cause in term_causes(NAMES) for variant in cause.variants for unit in variant.units]
+    units = [unit for cause in term_causes(NAMES) for unit in cause.units]
     inputs = np.random.default_rng(1).normal(size=(20, INPUTS))
     p = prototype.prior.values
     arguments = inputs, prototype.geometry.as_vector(), np.array([COULOMB_EPSILON]), p, p
