@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Final
 
 SIGNIFICANT: Final = 2
@@ -11,10 +12,19 @@ SIGNIFICANT: Final = 2
 BEYOND: Final = 1e4
 """Multiple from which its size says nothing."""
 
+SMALL: Final = 0.1
+"""Size below which a length, time, angle or torque is written with a prefix: 12.7 μm."""
+
 MISSING: Final = "–"
 """Stands where there is no number."""
 
 _SUPERSCRIPTS: Final = {"^2": "²", "^3": "³"}
+
+_PREFIXES: Final = ("", "m", "μ", "n")
+"""Of a thousandth each."""
+
+_PREFIXED: Final = frozenset({"m", "s", "rad", "Nm"})
+"""Units that people write with them."""
 
 
 def digits(value: float, std: float) -> str:
@@ -30,6 +40,32 @@ def digits(value: float, std: float) -> str:
 def with_std(value: float, std: float) -> str:
     """`value ± std`, or the value alone where there is no std."""
     return f"{digits(value, std)} ± {digits(std, std)}" if std > 0 else digits(value, std)
+
+
+def quantity_text(value: float, std: float, unit: str) -> str:
+    """`value ± std unit`, small ones with a prefix."""
+    factor, shown = _prefixed(abs(value), unit)
+    return f"{with_std(factor * value, factor * std)} {shown}".rstrip()
+
+
+def value_text(value: float, unit: str, count: int = 3) -> str:
+    """`value unit`, small ones with a prefix, of `count` significant digits."""
+    factor, shown = _prefixed(abs(value), unit)
+    return f"{significant(factor * value, count)} {shown}".rstrip()
+
+
+def range_text(low: float, high: float, unit: str, count: int = 3) -> str:
+    """`low to high unit`, small ones with a prefix, of `count` significant digits."""
+    factor, shown = _prefixed(max(abs(low), abs(high)), unit)
+    return f"{significant(factor * low, count)} to {significant(factor * high, count)} {shown}".rstrip()
+
+
+def _prefixed(size: float, unit: str) -> tuple[float, str]:
+    """What numbers as large as this are multiplied by, and the unit that they have then; that of a share is none."""
+    first, power = re.split("[ /]", unit)[0], 0
+    if first in _PREFIXED and 0 < size < SMALL:
+        power = min(math.ceil(-math.log10(size) / 3), len(_PREFIXES) - 1)
+    return 1000.0**power, "" if unit == "1" else _PREFIXES[power] + unit_text(unit)
 
 
 def percent(share: float, *, signed: bool = False) -> str:

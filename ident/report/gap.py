@@ -178,7 +178,7 @@ def _row(cause: Cause, content: GapReport) -> Row:
         name=name,
         where=cause.candidate.where,
         probability=cause.probability,
-        numbers=", ".join(f"{p.name} {digits.with_std(v, s)} {digits.unit_text(p.unit)}" for p, v, s in values),
+        numbers=", ".join(f"{p.name} {digits.quantity_text(v, s, p.unit)}" for p, v, s in values),
         log_odds=cause.log_odds,
         closed=cause.closed,
         rivals=", ".join(rivals) or "–",

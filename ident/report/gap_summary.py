@@ -8,7 +8,7 @@ from typing import Final
 from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Share, Verdict
 from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
-from ident.report.digits import percent, plain, significant, unit_text, with_std
+from ident.report.digits import percent, plain, quantity_text, significant
 from ident.report.headline import headline
 from ident.report.law_text import law_line
 
@@ -46,7 +46,7 @@ def cause_line(effect: NamedEffect) -> str:
     if effect.law is not None:
         return law_line(effect, effect.law)
     numbers = ", ".join(
-        f"{name} {with_std(quantity.value, quantity.std)} {unit_text(quantity.unit)}".removesuffix(" 1")
+        f"{name} {quantity_text(quantity.value, quantity.std, quantity.unit)}"
         for name, quantity in effect.parameters.items()
     )
     rivals = rivals_of(effect)

@@ -10,7 +10,7 @@ from typing import Final
 from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Unseen, Verdict
 from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.effects import EFFECTS
-from ident.report.digits import percent, plain, significant, unit_text, with_std
+from ident.report.digits import percent, plain, quantity_text, significant
 from ident.report.law_text import law_words
 from ident.vehicle.quantities import Quantity
 
@@ -139,7 +139,7 @@ def _at_noise(left: Unseen) -> str:
 
 
 def _number(quantity: Quantity) -> str:
-    return f"{with_std(quantity.value, quantity.std)} {unit_text(quantity.unit)}".removesuffix(" 1")
+    return quantity_text(quantity.value, quantity.std, quantity.unit)
 
 
 def _fields(words: str) -> frozenset[str]:

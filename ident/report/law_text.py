@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from ident.diagnosis.diagnosis import LawAnswer, NamedEffect
-from ident.report.digits import percent, plain, significant, unit_text
+from ident.report.digits import percent, plain, range_text, unit_text, value_text
 
 _FORCES: Final = MappingProxyType(
     {
@@ -60,8 +60,8 @@ def variable_name(variable: str, of: str = "") -> str:
 def law_line(effect: NamedEffect, law: LawAnswer) -> str:
     """A law as a line under the verdict: how large, as what formula, what it closes, what else it may be."""
     std = law.curve[:, 2]
-    formula = f", {law.formula} of x = {variable_text(law)}" if law.formula else ""
-    sure = f" (± {significant(float(np.median(std)))})"
+    formula = f", {law.formula} {unit_text(law.unit_y)} of x = {variable_text(law)}" if law.formula else ""
+    sure = f" (± {value_text(float(np.median(std)), law.unit_y)})"
     others = ", ".join(f"{other.variable or other.name}@{other.where}" for other in effect.alternatives)
     other = f"; might as well be {others}" if others else ""
     near = "" if law.nearest is None else f"; nearest name {law.nearest}, which misses {percent(law.distance or 0.0)}"
@@ -72,4 +72,4 @@ def law_line(effect: NamedEffect, law: LawAnswer) -> str:
 
 def _swing(law: LawAnswer) -> str:
     y = law.curve[:, 1]
-    return f"from {significant(float(y.min()))} to {significant(float(y.max()))} {unit_text(law.unit_y)}"
+    return f"from {range_text(float(y.min()), float(y.max()), law.unit_y)}"

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from ident.diagnosis.diagnosis import NamedEffect
 from ident.plant.places import CHASSIS, DRIVES, ENCODERS, OF_PARAMETERS, STEERING, WHEEL_PLACES, members
-from ident.report.digits import plain, significant, unit_text
+from ident.report.digits import plain, range_text, value_text
 from ident.report.headline import place_words
 from ident.vehicle.geometry import WHEELS, Geometry
 
@@ -79,11 +79,9 @@ def mark_of(number: int, effect: NamedEffect) -> Mark:
     """An effect as the sketch says it: what it is and how large."""
     if effect.law is not None:
         y = effect.law.curve[:, 1]
-        size = f"{significant(float(y.min()), 2)} to {significant(float(y.max()), 2)} {unit_text(effect.law.unit_y)}"
-        return Mark(number, effect.where, ("a law", size))
+        return Mark(number, effect.where, ("a law", range_text(float(y.min()), float(y.max()), effect.law.unit_y, 2)))
     quantity = next(iter(effect.parameters.values()))
-    size = f"{significant(quantity.value)} {unit_text(quantity.unit)}".removesuffix(" 1")
-    return Mark(number, effect.where, (plain(effect.name), size))
+    return Mark(number, effect.where, (plain(effect.name), value_text(quantity.value, quantity.unit)))
 
 
 def vehicle_sketch(marks: Sequence[Mark], geometry: Geometry | None) -> Markup:

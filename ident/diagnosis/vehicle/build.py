@@ -16,7 +16,13 @@ from ident.diagnosis.observations.linear import rms
 from ident.diagnosis.problem import Block, Channel, Nominal, Problem
 from ident.diagnosis.vehicle.causes.candidates import candidate_of, causes_of, seen_together, slid_by_any
 from ident.diagnosis.vehicle.causes.context import Context, fitted_parameters, make_context, table_of
-from ident.diagnosis.vehicle.causes.creep import CREEP_NAMES, CREEP_STD, creep_columns, tolerated_creep
+from ident.diagnosis.vehicle.causes.creep import (
+    CREEP_NAMES,
+    CREEP_STD,
+    creep_columns,
+    creep_over_time,
+    tolerated_creep,
+)
 from ident.diagnosis.vehicle.causes.dependences import vehicle_dependences
 from ident.diagnosis.vehicle.causes.lag import LAG_NAME, LAG_STD, lag_columns
 from ident.diagnosis.vehicle.causes.library import TermCause
@@ -127,6 +133,7 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
             regions=regions_of(position, rate, acceleration, load),
             features=features_of(position, rate, acceleration, load),
             tolerance=_tolerance(source, row, target, context),
+            tolerated=creep_over_time(source) if source.channel is Channel.KINEMATIC and source.own is None else None,
         )
 
 

@@ -11,7 +11,17 @@ from hypothesis import strategies as st
 
 from ident.estimate.result import Identification
 from ident.records.record import Record
-from ident.report.digits import MISSING, digits, percent, significant, unit_text, with_std
+from ident.report.digits import (
+    MISSING,
+    digits,
+    percent,
+    quantity_text,
+    range_text,
+    significant,
+    unit_text,
+    value_text,
+    with_std,
+)
 from ident.report.paper import load_paper_result
 from ident.report.rows import Role, parameter_rows, role_of, step_rows
 from ident.report.summary import summarise
@@ -61,6 +71,37 @@ def test_percentages_and_units_read_naturally() -> None:
         "0",
     ]
     assert unit_text("kg m^2") == "kg m²"
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "unit", "text"),
+    [
+        (0.0039, 0.00012, "s", "3.90 ± 0.12 ms"),
+        (1.9e-5, 3e-7, "rad/Nm", "19.00 ± 0.30 μrad/Nm"),
+        (-7.6e-6, 0.0, "m", "-7.6 μm"),
+        (0.003, 0.001, "Nm", "3.0 ± 1.0 mNm"),
+        (1e-3, 0.0, "s", "1 ms"),
+        (1e-14, 0.0, "m", "1e-05 nm"),
+        (6.1, 0.1, "Nm", "6.10 ± 0.10 Nm"),
+        (0.0, 0.01, "rad", "0.000 ± 0.010 rad"),
+        (0.02, 0.004, "1", "0.0200 ± 0.0040"),
+        (0.05, 0.01, "kg m^2", "0.050 ± 0.010 kg m²"),
+    ],
+)
+def test_small_lengths_times_angles_and_torques_have_a_prefix(value: float, std: float, unit: str, text: str) -> None:
+    assert quantity_text(value, std, unit) == text
+
+
+def test_both_ends_of_a_range_have_the_prefix_of_the_larger() -> None:
+    assert range_text(-1.27e-5, 1.11e-6, "m") == "-12.7 to 1.11 μm"
+    assert range_text(-0.02, 6.1, "Nm", 2) == "-0.020 to 6.1 Nm"
+    assert value_text(0.0451, "rad", 2) == "45 mrad"
+
+
+@given(st.floats(1e-9, 0.0999))
+def test_a_prefix_leaves_one_to_a_thousand_before_it(size: float) -> None:
+    number = float(value_text(size, "m", 6).split()[0])
+    assert 1 <= number <= 1000
 
 
 def test_the_shipped_table_2_is_that_of_the_paper() -> None:

@@ -61,6 +61,13 @@ def tolerated_creep(source: Source, coordinate: str, geometry: Geometry) -> floa
     return LEFT_OVER.get(coordinate, TURNING) * rms(contact_speeds(source, geometry))
 
 
+def creep_over_time(source: Source) -> Array:
+    """How much of that is tolerated when (N,), of rms one in the moving rows of a source: contacts creep as they roll."""
+    speeds = np.sqrt(np.mean(source.inputs[:: source.factor, SLICES["beta_rate"]] ** 2, axis=1))
+    usual = rms(speeds[source.moving[0][:: source.factor]])
+    return np.asarray(speeds / usual if usual > 0 else np.ones_like(speeds))
+
+
 def contact_speeds(source: Source, geometry: Geometry) -> Array:
     """At which the wheels roll in the moving rows of a kinematic source (N, 4) [m/s]."""
     return np.asarray(geometry.wheel_radius * source.inputs[source.moving[0], SLICES["beta_rate"]])
