@@ -62,10 +62,14 @@ def tolerated_creep(source: Source, coordinate: str, geometry: Geometry) -> floa
 
 
 def creep_over_time(source: Source) -> Array:
-    """How much of that is tolerated when (N,), of rms one in the moving rows: contacts creep as they roll."""
+    """How much of that is tolerated when (N,), of rms one in the moving rows: half of its power as contacts roll.
+
+    The other half at every moment: where steering or driving reverses, contacts are pushed, and sampling is late.
+    """
     speeds = np.sqrt(np.mean(source.inputs[:: source.factor, SLICES["beta_rate"]] ** 2, axis=1))
     usual = rms(speeds[source.moving[0][:: source.factor]])
-    return np.asarray(speeds / usual if usual > 0 else np.ones_like(speeds))
+    shares = speeds / usual if usual > 0 else np.ones_like(speeds)
+    return np.asarray(np.sqrt((1 + shares**2) / 2))
 
 
 def contact_speeds(source: Source, geometry: Geometry) -> Array:
