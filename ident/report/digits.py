@@ -44,7 +44,7 @@ def with_std(value: float, std: float) -> str:
 
 def quantity_text(value: float, std: float, unit: str) -> str:
     """`value ± std unit`, small ones with a prefix."""
-    factor, shown = _prefixed(abs(value), unit)
+    factor, shown = _prefixed(max(abs(value), std), unit)
     return f"{with_std(factor * value, factor * std)} {shown}".rstrip()
 
 

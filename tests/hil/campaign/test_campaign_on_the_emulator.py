@@ -19,8 +19,6 @@ from hil.campaign.study import TOLERANCES
 from hil.frames.recorder import finished_steps
 from ident.assessment import Assessment
 from ident.campaign.steps import ORDER
-from ident.diagnosis.diagnosis import Verdict
-from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
 from ident.estimate.identify import identify
 from ident.estimate.result import Identification
 from ident.parameters_file import Identified, read_model, write_model
@@ -137,13 +135,6 @@ def test_a_plain_record_gives_the_same_estimate(
     read = identify(read_any(path, run.network), run.plan.vehicle.geometry)
     np.testing.assert_allclose(read.values, result.values, rtol=1e-7)
     np.testing.assert_allclose([e.std for e in read.estimates], [e.std for e in result.estimates], rtol=1e-4)
-
-
-def test_nothing_is_missing_from_the_model_by_that_record_alone(record: Record, run: Run) -> None:
-    """Without a model and without another record: contacts that give way where it turns fast are no law."""
-    findings = diagnose_vehicle([record], [], run.plan.vehicle).findings
-    assert findings.verdict is Verdict.NONE
-    assert findings.gap.after < 1.2
 
 
 def test_the_result_file_reads_back_and_states_everything(result: Identification, run: Run, tmp_path: Path) -> None:
