@@ -57,7 +57,7 @@ class Block:
         regions: masks (N,) by name (`low_speed`, `forward`, ...) in which the gap is counted; they may overlap.
         features: (N, f) states that an unknown cause might depend on (speeds, angles, accelerations); any scale.
         tolerance: rms up to which a gap means nothing, however well it repeats, in the unit of the target.
-        tolerated: (N,) how much of the tolerance there is at every moment, of rms one in the rows used; None: all.
+        tolerated: (N,) factor on the tolerance at every moment, of rms one in the moving rows; None: one throughout.
         irregular: (N,) part of the target that may differ between repeats and is no noise; None: nothing.
     """
 

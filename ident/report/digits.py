@@ -13,7 +13,7 @@ BEYOND: Final = 1e4
 """Multiple from which its size says nothing."""
 
 SMALL: Final = 0.1
-"""Size below which a length, time, angle or torque is written with a prefix: 12.7 μm."""
+"""Size below which what is a length, time, angle or torque, or so much of it a something, has a prefix: 12.7 μm."""
 
 MISSING: Final = "–"
 """Stands where there is no number."""
@@ -21,10 +21,10 @@ MISSING: Final = "–"
 _SUPERSCRIPTS: Final = {"^2": "²", "^3": "³"}
 
 _PREFIXES: Final = ("", "m", "μ", "n")
-"""Of a thousandth each."""
+"""Each a thousandth of the one before."""
 
 _PREFIXED: Final = frozenset({"m", "s", "rad", "Nm"})
-"""Units that people write with them."""
+"""First factors of units that people write with them."""
 
 
 def digits(value: float, std: float) -> str:
@@ -44,27 +44,34 @@ def with_std(value: float, std: float) -> str:
 
 def quantity_text(value: float, std: float, unit: str) -> str:
     """`value ± std unit`, small ones with a prefix."""
-    factor, shown = _prefixed(max(abs(value), std), unit)
+    factor, shown = _prefixed(_size(value, std), unit)
     return f"{with_std(factor * value, factor * std)} {shown}".rstrip()
 
 
-def value_text(value: float, unit: str, count: int = 3) -> str:
-    """`value unit`, small ones with a prefix, of `count` significant digits."""
-    factor, shown = _prefixed(abs(value), unit)
+def value_text(value: float, unit: str, count: int = 3, beside: float = 0.0) -> str:
+    """`value unit` of `count` significant digits, with the prefix of the larger of it and of what is beside it."""
+    factor, shown = _prefixed(_size(value, beside), unit)
     return f"{significant(factor * value, count)} {shown}".rstrip()
 
 
 def range_text(low: float, high: float, unit: str, count: int = 3) -> str:
-    """`low to high unit`, small ones with a prefix, of `count` significant digits."""
-    factor, shown = _prefixed(max(abs(low), abs(high)), unit)
-    return f"{significant(factor * low, count)} to {significant(factor * high, count)} {shown}".rstrip()
+    """`low to high unit`, both with the prefix and the decimals of the larger, which has `count` significant digits."""
+    size = _size(low, high)
+    factor, shown = _prefixed(size, unit)
+    decimals = max(0, count - 1 - math.floor(math.log10(factor * size))) if size > 0 else 0
+    return f"{factor * low:z.{decimals}f} to {factor * high:z.{decimals}f} {shown}".rstrip()
+
+
+def _size(*values: float) -> float:
+    """The largest of those that are numbers."""
+    return max((abs(value) for value in values if math.isfinite(value)), default=0.0)
 
 
 def _prefixed(size: float, unit: str) -> tuple[float, str]:
     """What numbers as large as this are multiplied by, and the unit that they have then; that of a share is none."""
-    first, power = re.split("[ /]", unit)[0], 0
-    if first in _PREFIXED and 0 < size < SMALL:
-        power = min(math.ceil(-math.log10(size) / 3), len(_PREFIXES) - 1)
+    first, rounded, power = re.split("[ /]", unit)[0], float(f"{size:.2e}"), 0
+    if first in _PREFIXED and 0 < rounded < SMALL:
+        power = min(math.ceil(-math.log10(rounded) / 3), len(_PREFIXES) - 1)
     return 1000.0**power, "" if unit == "1" else _PREFIXES[power] + unit_text(unit)
 
 

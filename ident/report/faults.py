@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ident.faults import Fault
-from ident.report.digits import with_std
+from ident.report.digits import quantity_text
 from ident.report.page import render
 from ident.writing import write_whole
 
@@ -32,7 +32,7 @@ def evidence_text(fault: Fault) -> str:
 
 
 def _number(fault: Fault) -> str:
-    return f"{with_std(fault.value, fault.std)} {fault.unit} ".replace(" 1 ", " ") if fault.std > 0 else ""
+    return f"{quantity_text(fault.value, fault.std, fault.unit)} " if fault.std > 0 else ""
 
 
 def _also(fault: Fault) -> str:

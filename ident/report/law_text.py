@@ -59,9 +59,9 @@ def variable_name(variable: str, of: str = "") -> str:
 
 def law_line(effect: NamedEffect, law: LawAnswer) -> str:
     """A law as a line under the verdict: how large, as what formula, what it closes, what else it may be."""
-    std = law.curve[:, 2]
-    formula = f", {law.formula} {unit_text(law.unit_y)} of x = {variable_text(law)}" if law.formula else ""
-    sure = f" (± {value_text(float(np.median(std)), law.unit_y)})"
+    _, y, std = law.curve.T
+    formula = f", {law.formula} [{unit_text(law.unit_y)}] of x = {variable_text(law)}" if law.formula else ""
+    sure = f" (± {value_text(float(np.median(std)), law.unit_y, beside=float(np.abs(y).max()))})"
     others = ", ".join(f"{other.variable or other.name}@{other.where}" for other in effect.alternatives)
     other = f"; might as well be {others}" if others else ""
     near = "" if law.nearest is None else f"; nearest name {law.nearest}, which misses {percent(law.distance or 0.0)}"

@@ -81,7 +81,9 @@ def mark_of(number: int, effect: NamedEffect) -> Mark:
         y = effect.law.curve[:, 1]
         return Mark(number, effect.where, ("a law", range_text(float(y.min()), float(y.max()), effect.law.unit_y, 2)))
     quantity = next(iter(effect.parameters.values()))
-    return Mark(number, effect.where, (plain(effect.name), value_text(quantity.value, quantity.unit)))
+    return Mark(
+        number, effect.where, (plain(effect.name), value_text(quantity.value, quantity.unit, beside=quantity.std))
+    )
 
 
 def vehicle_sketch(marks: Sequence[Mark], geometry: Geometry | None) -> Markup:

@@ -1,11 +1,11 @@
 """Noise of the rows: what differs between repeats, and what a model may lack beside it.
 
-Rows of a block have the covariance R + t² C. R is that of the mean over the repeats, by what differs between them;
+Rows of a block have the covariance R + t tᵀ ∘ C. R is that of the mean over the repeats, by what differs between them;
 without any, that of what the baseline and the strongest candidates leave, or a set that was found (`Left`). t is what a
-model may have wrong at most (`Block.tolerance`), a process that remembers, as slow as the motion or faster. Where the
-rows say so, more is lacking: q times as much as noise and tolerance are together, of the same memory. There is one q
-for all blocks of a step and a coordinate, the most likely beside the hypotheses that are taken; each next one has a
-price.
+model may have wrong at most in each row (`Block.tolerance`, and where something repeats `Block.tolerated`), a process
+that remembers, as slow as the motion or faster. Where the rows say so, more is lacking: q times as much as noise and
+tolerance are together in each row, of the same memory. There is one q for all blocks of a step and a coordinate, the
+most likely beside the hypotheses that are taken; each next one has a price.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class Colours:
             memory = _remembering(np.abs(np.subtract.outer(time, time)))
             # What nothing that repeats tells apart has what is tolerated in it.
             predictor = predictor_of(colour) if alone is None or colour.count else alone.predictors[group]
-            tolerated = _of_sizes(_tolerated(block, kept), memory) if colour.count else np.zeros_like(memory)
+            tolerated = _of_sizes(_deviations(block, kept), memory) if colour.count else np.zeros_like(memory)
             # A white share, so that a band without any power is not blown up.
             least = (ROUNDING * rms(self.rows.target[place])) ** 2 * np.eye(len(memory))
             noise = _covariance(predictor, self.rows.run[place]) + least
@@ -223,7 +223,7 @@ def _of(regression: Regression, left: Left | None) -> Whitener:
     return whitener_of(regression.rows, colours_of(regression.rows, left, autocovariance))
 
 
-def _tolerated(block: Block, kept: Kept) -> Array:
+def _deviations(block: Block, kept: Kept) -> Array:
     """(m,) what a model may have wrong in every row, rms in the unit of the target."""
     if block.tolerated is None:
         return np.full(kept.samples.shape[1], block.tolerance)

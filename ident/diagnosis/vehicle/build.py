@@ -20,8 +20,8 @@ from ident.diagnosis.vehicle.causes.creep import (
     CREEP_NAMES,
     CREEP_STD,
     creep_columns,
-    creep_over_time,
     tolerated_creep,
+    tolerated_over_time,
 )
 from ident.diagnosis.vehicle.causes.dependences import vehicle_dependences
 from ident.diagnosis.vehicle.causes.lag import LAG_NAME, LAG_STD, lag_columns
@@ -113,6 +113,8 @@ def _nominal(model: Parameters) -> Nominal:
 
 def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
     """One block a coordinate; the target is what baseline and causes add up to."""
+    rolls = source.channel is Channel.KINEMATIC and source.own is None
+    tolerated = tolerated_over_time(source) if rolls else None
     for row, name in enumerate(source.coordinates):
         motion = coordinate_motion(source.inputs, source.spec, name, context.geometry)
         position, rate, acceleration = (values[:: source.factor] for values in motion)
@@ -133,7 +135,7 @@ def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:
             regions=regions_of(position, rate, acceleration, load),
             features=features_of(position, rate, acceleration, load),
             tolerance=_tolerance(source, row, target, context),
-            tolerated=creep_over_time(source) if source.channel is Channel.KINEMATIC and source.own is None else None,
+            tolerated=tolerated,
         )
 
 

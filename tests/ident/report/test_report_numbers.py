@@ -81,7 +81,8 @@ def test_percentages_and_units_read_naturally() -> None:
         (-7.6e-6, 0.0, "m", "-7.6 μm"),
         (0.003, 0.001, "Nm", "3.0 ± 1.0 mNm"),
         (1e-3, 0.0, "s", "1 ms"),
-        (1e-14, 0.0, "m", "1e-05 nm"),
+        (9.9996e-4, 0.0, "m", "1 mm"),
+        (9.9999e-4, 1e-6, "s", "1.0000 ± 0.0010 ms"),
         (6.1, 0.1, "Nm", "6.10 ± 0.10 Nm"),
         (0.0, 0.01, "rad", "0 ± 10 mrad"),
         (1e-9, 0.2, "rad", "0.00 ± 0.20 rad"),
@@ -95,15 +96,19 @@ def test_small_lengths_times_angles_and_torques_have_a_prefix(value: float, std:
 
 
 def test_both_ends_of_a_range_have_the_prefix_of_the_larger() -> None:
-    assert range_text(-1.27e-5, 1.11e-6, "m") == "-12.7 to 1.11 μm"
-    assert range_text(-0.02, 6.1, "Nm", 2) == "-0.020 to 6.1 Nm"
+    assert range_text(-1.27e-5, 1.11e-6, "m") == "-12.7 to 1.1 μm"
+    assert range_text(-0.02, 6.1, "Nm", 2) == "0.0 to 6.1 Nm"
+    assert range_text(1e-9, 0.05, "kg m^2") == "0.0000 to 0.0500 kg m²"
+    assert range_text(0.0, 0.0, "m") == "0 to 0 m"
     assert value_text(0.0451, "rad", 2) == "45 mrad"
+    assert value_text(9e-7, "m", beside=1.2e-5) == "0.900 μm"
 
 
 @given(st.floats(1e-9, 0.0999))
 def test_a_prefix_leaves_one_to_a_thousand_before_it(size: float) -> None:
-    number = float(value_text(size, "m", 6).split()[0])
-    assert 1 <= number <= 1000
+    number, unit = value_text(size, "m", 6).split()
+    assert 0.995 <= float(number) < 1000
+    assert float(number) * {"mm": 1e-3, "μm": 1e-6, "nm": 1e-9}.get(unit, 1.0) == pytest.approx(size, rel=1e-5)
 
 
 def test_the_shipped_table_2_is_that_of_the_paper() -> None:

@@ -61,10 +61,11 @@ def tolerated_creep(source: Source, coordinate: str, geometry: Geometry) -> floa
     return LEFT_OVER.get(coordinate, TURNING) * rms(contact_speeds(source, geometry))
 
 
-def creep_over_time(source: Source) -> Array:
-    """How much of that is tolerated when (N,), of rms one in the moving rows: half of its power as contacts roll.
+def tolerated_over_time(source: Source) -> Array:
+    """What is tolerated in every sample (N,) over `tolerated_creep`, of rms one in the moving rows.
 
-    The other half at every moment: where steering or driving reverses, contacts are pushed, and sampling is late.
+    Half of its power goes with the square of the rolling speed. Half is there at every moment: where steering or
+    driving reverses, contacts are pushed, and sampling is late.
     """
     speeds = np.sqrt(np.mean(source.inputs[:: source.factor, SLICES["beta_rate"]] ** 2, axis=1))
     usual = rms(speeds[source.moving[0][:: source.factor]])

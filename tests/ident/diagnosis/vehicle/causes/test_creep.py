@@ -133,13 +133,13 @@ def test_less_is_tolerated_than_wheels_may_creep(problem: Problem, prototype: Ve
 
 def test_contacts_may_give_way_more_the_faster_they_roll(problem: Problem) -> None:
     """Of rms one over the rows that are used; half of its power at rest as well."""
-    rolling = [block for block in problem.blocks if block.channel is Channel.KINEMATIC]
-    assert rolling
-    for block in rolling:
+    rolls = [block for block in problem.blocks if block.channel is Channel.KINEMATIC]
+    assert rolls
+    for block in rolls:
         assert block.tolerated is not None
         assert np.sqrt(np.mean(block.tolerated[block.moving] ** 2)) == pytest.approx(1.0)
-        assert block.tolerated.min() >= np.sqrt(0.5)
-    straight = next(block for block in rolling if block.step == Step.STRAIGHT)
+        assert block.tolerated.min() == pytest.approx(np.sqrt(0.5), rel=1e-3)
+    straight = next(block for block in rolls if block.step == Step.STRAIGHT)
     assert straight.tolerated is not None
     assert straight.features is not None
     power = straight.features[:, 1] ** 2
