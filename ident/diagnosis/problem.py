@@ -79,6 +79,11 @@ class Block:
     irregular: Array | None = None
 
     @property
+    def tolerances(self) -> Array:
+        """What a model may have wrong at every moment (N,), rms in the unit of the target."""
+        return self.tolerance * (np.ones_like(self.target) if self.tolerated is None else self.tolerated)
+
+    @property
     def regular(self) -> Array:
         """The target (N,) without what is irregular."""
         return self.target if self.irregular is None else self.target - self.irregular

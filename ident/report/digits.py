@@ -33,8 +33,7 @@ def digits(value: float, std: float) -> str:
         return MISSING
     if not (std > 0 and math.isfinite(std)):
         return f"{value:.4g}"
-    decimals = max(0, SIGNIFICANT - 1 - math.floor(math.log10(std)))
-    return f"{value:.{decimals}f}"
+    return f"{value:.{_decimals(std, SIGNIFICANT)}f}"
 
 
 def with_std(value: float, std: float) -> str:
@@ -58,7 +57,7 @@ def range_text(low: float, high: float, unit: str, count: int = 3) -> str:
     """`low to high unit`, both with the prefix and the decimals of the larger, which has `count` significant digits."""
     size = _size(low, high)
     factor, shown = _prefixed(size, unit)
-    decimals = max(0, count - 1 - math.floor(math.log10(factor * size))) if size > 0 else 0
+    decimals = _decimals(factor * size, count) if size > 0 else 0
     return f"{factor * low:z.{decimals}f} to {factor * high:z.{decimals}f} {shown}".rstrip()
 
 
@@ -90,8 +89,12 @@ def significant(value: float, count: int = 3) -> str:
         return MISSING
     if value == 0:
         return "0"
-    decimals = max(0, count - 1 - math.floor(math.log10(abs(value))))
-    return f"{value:.{decimals}f}"
+    return f"{value:.{_decimals(abs(value), count)}f}"
+
+
+def _decimals(size: float, count: int) -> int:
+    """That leave `count` significant digits of a size."""
+    return max(0, count - 1 - math.floor(math.log10(size)))
 
 
 def times(value: float) -> str:

@@ -17,7 +17,7 @@ from ident.report import digits
 from ident.report.commands import Asked, next_commands
 from ident.report.curves import cause_curves
 from ident.report.gap_figures import map_figure, residual_figures
-from ident.report.gap_summary import next_text, rivals_of
+from ident.report.gap_summary import next_text, numbers_text, rivals_of
 from ident.report.headline import ABOVE, effect_words, headline, place_words
 from ident.report.judged import judged_steps, scale_ticks
 from ident.report.page import render, script_json
@@ -172,13 +172,12 @@ def _row(cause: Cause, content: GapReport) -> Row:
     name = str(cause.candidate.effect)
     named = next((e for e in content.diagnosis.effects if (e.name, e.where) == (name, cause.candidate.where)), None)
     rivals = rivals_of(named) if named else []
-    values = zip(cause.candidate.parameters, cause.part.values, cause.part.std, strict=True)
     biased = [(symbol, shift) for symbol, shift in cause.biased.items() if abs(shift) > BIASED]
     return Row(
         name=name,
         where=cause.candidate.where,
         probability=cause.probability,
-        numbers=", ".join(f"{p.name} {digits.quantity_text(v, s, p.unit)}" for p, v, s in values),
+        numbers=numbers_text(cause.quantities),
         log_odds=cause.log_odds,
         closed=cause.closed,
         rivals=", ".join(rivals) or "–",

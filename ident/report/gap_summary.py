@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from ident.diagnosis.answer.findings import Findings
@@ -11,6 +11,7 @@ from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.report.digits import percent, plain, quantity_text, significant
 from ident.report.headline import headline
 from ident.report.law_text import law_line
+from ident.vehicle.quantities import Quantity
 
 MOST_LINES: Final = 10
 
@@ -45,14 +46,15 @@ def cause_line(effect: NamedEffect) -> str:
     """A cause with its probability, its numbers and its rivals."""
     if effect.law is not None:
         return law_line(effect, effect.law)
-    numbers = ", ".join(
-        f"{name} {quantity_text(quantity.value, quantity.std, quantity.unit)}"
-        for name, quantity in effect.parameters.items()
-    )
     rivals = rivals_of(effect)
     rival = f"; might as well be {' or '.join(rivals)}" if rivals else ""
-    closes = percent(effect.gap_closed_held_out)
+    closes, numbers = percent(effect.gap_closed_held_out), numbers_text(effect.parameters)
     return f"  {effect.probability:.0%} {effect.name}@{effect.where}: {numbers}; closes {closes} of the gap{rival}"
+
+
+def numbers_text(quantities: Mapping[str, Quantity]) -> str:
+    """The numbers of a cause, by name."""
+    return ", ".join(f"{name} {quantity_text(one.value, one.std, one.unit)}" for name, one in quantities.items())
 
 
 def rivals_of(effect: NamedEffect) -> list[str]:

@@ -12,7 +12,6 @@ from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.effects import EFFECTS
 from ident.report.digits import percent, plain, quantity_text, significant
 from ident.report.law_text import law_words
-from ident.vehicle.quantities import Quantity
 
 ABOVE: Final = 1.5
 """Times the noise from which a held-out step is said to be unexplained."""
@@ -72,7 +71,7 @@ def effect_words(effect: NamedEffect) -> str:
     """A cause in words, with its numbers and without its place."""
     if effect.law is not None:
         return law_words(effect.law)
-    numbers = {name: _number(quantity) for name, quantity in effect.parameters.items()}
+    numbers = {name: quantity_text(one.value, one.std, one.unit) for name, one in effect.parameters.items()}
     kind = EFFECTS.get(effect.name)
     if kind is not None and _fields(kind.words) <= numbers.keys():
         return kind.words.format_map(numbers)
@@ -136,10 +135,6 @@ def _nothing(left: Unseen | None) -> str:
 def _at_noise(left: Unseen) -> str:
     size = significant(left.gap.after, 2)
     return f"the {CHANNELS[left.channel]} of {STEPS[left.steps]} are at {size} times the noise"
-
-
-def _number(quantity: Quantity) -> str:
-    return quantity_text(quantity.value, quantity.std, quantity.unit)
 
 
 def _fields(words: str) -> frozenset[str]:

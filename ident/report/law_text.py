@@ -38,7 +38,7 @@ VARIABLES: Final = MappingProxyType(
 
 def law_words(law: LawAnswer) -> str:
     """What it is and how large, as part of a sentence."""
-    return f"{law_kind(law.partner, law.variable, law.of)}, {_swing(law)}"
+    return f"{law_kind(law.partner, law.variable, law.of)}, from {swing_text(law)}"
 
 
 def law_kind(partner: str, variable: str, of: str = "") -> str:
@@ -66,10 +66,11 @@ def law_line(effect: NamedEffect, law: LawAnswer) -> str:
     other = f"; might as well be {others}" if others else ""
     near = "" if law.nearest is None else f"; nearest name {law.nearest}, which misses {percent(law.distance or 0.0)}"
     closes = percent(effect.gap_closed_held_out)
-    head = f"  {effect.probability:.0%} law@{effect.where}: {_swing(law)}{sure} over {variable_text(law)}{formula}"
-    return f"{head}; closes {closes} of the gap{other}{near}"
+    head = f"  {effect.probability:.0%} law@{effect.where}: from {swing_text(law)}{sure} over {variable_text(law)}"
+    return f"{head}{formula}; closes {closes} of the gap{other}{near}"
 
 
-def _swing(law: LawAnswer) -> str:
+def swing_text(law: LawAnswer, count: int = 3) -> str:
+    """From where to where its curve goes, of `count` significant digits."""
     y = law.curve[:, 1]
-    return f"from {range_text(float(y.min()), float(y.max()), law.unit_y)}"
+    return range_text(float(y.min()), float(y.max()), law.unit_y, count)

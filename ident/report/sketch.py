@@ -11,8 +11,9 @@ from markupsafe import Markup
 
 from ident.diagnosis.diagnosis import NamedEffect
 from ident.plant.places import CHASSIS, DRIVES, ENCODERS, OF_PARAMETERS, STEERING, WHEEL_PLACES, members
-from ident.report.digits import plain, range_text, value_text
+from ident.report.digits import plain, value_text
 from ident.report.headline import place_words
+from ident.report.law_text import swing_text
 from ident.vehicle.geometry import WHEELS, Geometry
 
 LENGTH: Final = 250.0
@@ -78,12 +79,10 @@ def joint_of(where: str) -> str:
 def mark_of(number: int, effect: NamedEffect) -> Mark:
     """An effect as the sketch says it: what it is and how large."""
     if effect.law is not None:
-        y = effect.law.curve[:, 1]
-        return Mark(number, effect.where, ("a law", range_text(float(y.min()), float(y.max()), effect.law.unit_y, 2)))
+        return Mark(number, effect.where, ("a law", swing_text(effect.law, 2)))
     quantity = next(iter(effect.parameters.values()))
-    return Mark(
-        number, effect.where, (plain(effect.name), value_text(quantity.value, quantity.unit, beside=quantity.std))
-    )
+    size = value_text(quantity.value, quantity.unit, beside=quantity.std)
+    return Mark(number, effect.where, (plain(effect.name), size))
 
 
 def vehicle_sketch(marks: Sequence[Mark], geometry: Geometry | None) -> Markup:

@@ -80,7 +80,7 @@ class Colours:
             memory = _remembering(np.abs(np.subtract.outer(time, time)))
             # What nothing that repeats tells apart has what is tolerated in it.
             predictor = predictor_of(colour) if alone is None or colour.count else alone.predictors[group]
-            tolerated = _of_sizes(_deviations(block, kept), memory) if colour.count else np.zeros_like(memory)
+            tolerated = _of_sizes(kept.mean(block.tolerances), memory) if colour.count else np.zeros_like(memory)
             # A white share, so that a band without any power is not blown up.
             least = (ROUNDING * rms(self.rows.target[place])) ** 2 * np.eye(len(memory))
             noise = _covariance(predictor, self.rows.run[place]) + least
@@ -221,13 +221,6 @@ def _of(regression: Regression, left: Left | None) -> Whitener:
     if left is None:
         left = regression.left_beside(regression.columns_of(regression.strongest))
     return whitener_of(regression.rows, colours_of(regression.rows, left, autocovariance))
-
-
-def _deviations(block: Block, kept: Kept) -> Array:
-    """(m,) what a model may have wrong in every row, rms in the unit of the target."""
-    if block.tolerated is None:
-        return np.full(kept.samples.shape[1], block.tolerance)
-    return block.tolerance * kept.mean(block.tolerated)
 
 
 def _of_sizes(deviations: Array, correlation: Array) -> Array:

@@ -67,10 +67,9 @@ def tolerated_over_time(source: Source) -> Array:
     Half of its power goes with the square of the rolling speed. Half is there at every moment: where steering or
     driving reverses, contacts are pushed, and sampling is late.
     """
-    speeds = np.sqrt(np.mean(source.inputs[:: source.factor, SLICES["beta_rate"]] ** 2, axis=1))
-    usual = rms(speeds[source.moving[0][:: source.factor]])
-    shares = speeds / usual if usual > 0 else np.ones_like(speeds)
-    return np.asarray(np.sqrt((1 + shares**2) / 2))
+    rates = source.inputs[:: source.factor, SLICES["beta_rate"]]
+    power, usual = np.mean(rates**2, axis=1), rms(rates[source.moving[0][:: source.factor]]) ** 2
+    return np.asarray(np.sqrt((1 + power / usual) / 2 if usual > 0 else np.ones_like(power)))
 
 
 def contact_speeds(source: Source, geometry: Geometry) -> Array:
