@@ -147,8 +147,9 @@ def _doubtful(findings: Findings) -> Chart | None:
     listed = dict(list(found.items())[: MOST - 2])
     rest = sum(found.values()) - sum(listed.values())
     shares = {NOTHING: max(1 - sum(found.values()), 0.0)} | listed | ({OTHERS: rest} if rest > HIDDEN else {})
+    laws = _laws(findings)
     bars = tuple(
-        Bar(_name(key, {}), Standing.TAKEN if key == NOTHING else Standing.OTHER, value, value, _small(value))
+        Bar(_name(key, laws), Standing.TAKEN if key == NOTHING else Standing.OTHER, value, value, _small(value))
         for key, value in sorted(shares.items(), key=lambda entry: -entry[1])
     )
     title = "Beside the causes" if findings.causes else "In the place of nothing"

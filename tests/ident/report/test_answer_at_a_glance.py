@@ -173,6 +173,15 @@ def test_what_is_not_believed_and_nothing_make_one(drag: Findings) -> None:
     assert chart.bars[0].value == pytest.approx(1 - sum(doubtful.values()))
 
 
+def test_laws_that_are_not_believed_are_said_in_words(drag: Findings) -> None:
+    """Also those of another motion than the place's own."""
+    (rate,) = drag.problem.dependences
+    turn = replace(rate, variable=Variable.ANGLE, of="wheel")
+    problem = replace(drag.problem, dependences=(turn,))
+    chart = rival_charts(replace(drag, causes=(), problem=problem, doubtful={turn.key: 0.9}))[-1]
+    assert chart.bars[0].name == "a force that depends on the position (wheel), steering left"
+
+
 def test_every_step_that_was_judged_has_a_line_on_one_scale() -> None:
     gaps = [(REPEATED, "kinematic", 0.2, 0.1), (REPEATED, "dynamic", 5.0, 1.02), (LANE_CHANGE, "outcome", 1e7, 3.0)]
     unseen = tuple(Unseen(steps, channel, Gap(before, after, 1.0)) for steps, channel, before, after in gaps)
