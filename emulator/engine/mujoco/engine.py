@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from emulator.as_built import AsBuilt
 from emulator.engine.layout import JOINTS, in_world, joint_coulomb, planar_twist, turned_to
-from emulator.engine.mujoco.mjcf import DEFAULT_SOLVER, SolverSettings, generate_mjcf, overlap
+from emulator.engine.mujoco.mjcf import DEFAULT_SOLVER, SolverSettings, generate_mjcf, overlap, quarter_weight
+from emulator.engine.mujoco.patches import Patches
 from emulator.engine.protocol import STAND_CLEARANCE
 from emulator.rigid_bodies import RigidBody
 from ident.vehicle.geometry import WHEELS
@@ -72,6 +73,8 @@ class MuJoCoEngine:
         self.data = mujoco.MjData(self.model)
         self._dry = self.model.pair_friction.copy()
         self._give_tyres_their_stiffness()
+        resistance = np.array([wheel.patch_torque for wheel in self._built.wheels]) / quarter_weight(self._prototype)
+        self._patches = None if on_stand or not resistance.any() else Patches(self.model, resistance)
         # A unit's steering joint comes before its rolling joint, and both behind what floats: views, made once.
         self._joint_torques = self.data.qfrc_applied[-8:]
         self._joint_angles = self.data.qpos[-8:]
@@ -117,7 +120,11 @@ class MuJoCoEngine:
     def step(self, torques: Sequence[float]) -> None:
         """One engine step under the joint torques (8,) [Nm]."""
         self._joint_torques[:] = by_unit(torques)
+        if self._patches is not None:
+            self._patches.resist(self.data)
         mujoco.mj_step(self.model, self.data)
+        if self._patches is not None:
+            self._patches.feel(self.data)
         if self._pushed:
             self.data.xfrc_applied[self._chassis] = 0.0
             self._pushed = False
@@ -219,7 +226,9 @@ class MuJoCoEngine:
         """Everything that the next steps depend on; `restore` goes on from it bit by bit."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return np.concatenate([state, self._previous, self._joint_friction, self.model.pair_friction.ravel()])
+        loads = [] if self._patches is None else self._patches.loads
+        grip = self.model.pair_friction.ravel()
+        return np.concatenate([state, self._previous, self._joint_friction, grip, loads])
 
     def restore(self, saved: NDArray[np.float64]) -> None:
         """Go on from what `save` gave, of a vehicle that was built and placed alike."""
@@ -228,7 +237,10 @@ class MuJoCoEngine:
         self._read()
         self._previous = saved[size : size + 8].tolist()
         self._joint_friction[:] = saved[size + 8 : size + 16]
-        self.model.pair_friction[:] = saved[size + 16 :].reshape(self.model.pair_friction.shape)
+        grip = self.model.pair_friction
+        grip[:] = saved[size + 16 : size + 16 + grip.size].reshape(grip.shape)
+        if self._patches is not None:
+            self._patches.loads[:] = saved[size + 16 + grip.size :]
 
     def close(self) -> None:
         """Close the window, if there is one."""

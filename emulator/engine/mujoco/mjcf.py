@@ -188,13 +188,12 @@ def _tyre(prototype: Prototype, wheel: str, build: WheelBuild, settings: SolverS
 
 
 def _pair(prototype: Prototype, wheel: str, build: WheelBuild, step_size: float, settings: SolverSettings) -> str:
-    """Contact of a tyre with the floor: two directions of friction, and the turning resistance of its patch."""
+    """Contact of a tyre with the floor: two directions of friction."""
     grip = prototype.floor_friction * build.grip
-    spin = build.patch_torque / quarter_weight(prototype)
     impedance = settings.contact_impedance
     return (
-        f'<pair name="{wheel}" geom1="floor" geom2="tyre_{wheel}" condim="{4 if spin else 3}" '
-        f'friction="{_numbers(grip, grip, spin, 0, 0)}" solimp="{_numbers(impedance, impedance, 1e-3, 0.5, 2)}" '
+        f'<pair name="{wheel}" geom1="floor" geom2="tyre_{wheel}" condim="3" '
+        f'friction="{_numbers(grip, grip, 0, 0, 0)}" solimp="{_numbers(impedance, impedance, 1e-3, 0.5, 2)}" '
         f'solreffriction="{_numbers(2 * step_size, 1)}"/>'
     )
 

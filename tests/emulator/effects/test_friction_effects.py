@@ -77,14 +77,19 @@ def test_drag_grows_with_the_square_of_the_speed(make: Make, rate: float) -> Non
     assert np.sum(torque) == pytest.approx(plain + wheel + body, rel=2e-3)
 
 
-def test_scrub_resists_turning_on_the_spot_and_not_driving_straight(make: Make) -> None:
-    scrubbing, plain = make("scrub@steering_left=4Nm"), make()
-    g, rate = plain.prototype.geometry, 0.5
+@pytest.mark.parametrize(("torque", "rate"), [(4.0, 0.3), (0.6, 0.3), (0.6, 0.1), (0.6, -0.1)])
+def test_scrub_is_a_dry_resistance_to_turning_on_the_spot(make: Make, torque: float, rate: float) -> None:
+    """As much at a slow turn as at a fast one, however small it is."""
+    scrubbing, plain = make(f"scrub@steering_left={torque}Nm"), make()
+    g = plain.prototype.geometry
     ratio = g.wheel_offset / g.wheel_radius
     rates = [-ratio * rate, ratio * rate, 0.0, 0.0]
-    with_scrub, without = (m.hold_speed(rates, 1.5) for m in (scrubbing, plain))
-    steering = [-ratio * (torque[0] - torque[1]) for torque in (with_scrub, without)]
-    assert steering[0] - steering[1] == pytest.approx(4.0, rel=0.02)
+    with_scrub, without = (m.hold_speed(rates, 0.6 / abs(rate)) for m in (scrubbing, plain))
+    steering = [-ratio * (torques[0] - torques[1]) for torques in (with_scrub, without)]
+    assert steering[0] - steering[1] == pytest.approx(math.copysign(torque, rate), rel=0.02)
+
+
+def test_scrub_does_not_resist_driving_straight(make: Make) -> None:
     straight = [m.hold_speed([2.0] * 4, 3.0) for m in (make("scrub@steering_left=4Nm"), make())]
     assert straight[0].sum() == pytest.approx(straight[1].sum(), rel=1e-3)
 
