@@ -226,7 +226,7 @@ class MuJoCoEngine:
         """Everything that the next steps depend on; `restore` goes on from it bit by bit."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        loads = [] if self._patches is None else self._patches.loads
+        loads = np.zeros(0) if self._patches is None else self._patches.loads
         grip = self.model.pair_friction.ravel()
         return np.concatenate([state, self._previous, self._joint_friction, grip, loads])
 

@@ -7,7 +7,8 @@ So in one drive it follows the side that is askew and in another the side that i
 it shows twice in one and not at all in the other. Every kind of drive therefore has a share of its own; over driving
 straight and turning on the spot, in which the same side drags the other way, shares are one on average.
 
-That is so of an angle that stays. What a coupling gives way by follows the traction, and has no share.
+That is so of an angle that stays. What a coupling gives way by follows the traction, and has no share; but the wheel
+behind it drags as well, by the grip of the ground times the angle by which it stands askew.
 """
 
 from __future__ import annotations
@@ -172,3 +173,22 @@ def _expected(values: Array, dragging: float) -> Array:
     offset, drag, above = float(values[0]), float(values[1]), values[3:]
     whole = ADHESION * dragging * max(abs(offset), NONE)
     return np.concatenate([[drag / whole - 1], above / SHARE_STD, [above[:2].mean() / MEAN_STD]])
+
+
+def with_drag(candidate: Candidate, dragging: float) -> Candidate:
+    """A coupling that gives way, whose rear wheel then drags.
+
+    Behind its compliance comes the friction of that wheel, over the torque that the coupling passes on [-].
+
+    Args:
+        candidate: of these two numbers.
+        dragging: friction of a wheel that drags on a floor of unit friction, by the angle [Nm/rad].
+    """
+
+    def expected(values: Array) -> Array:
+        if len(values) == 1:
+            return np.zeros(0)
+        compliance, drag = values.tolist()
+        return np.array([drag / (ADHESION * dragging * max(abs(compliance), NONE)) - 1])
+
+    return replace(candidate, expected=expected)

@@ -14,7 +14,7 @@ from ident.diagnosis.names import LATE, EffectName
 from ident.diagnosis.observations.delays import HELD, RARER
 from ident.diagnosis.observations.linear import ROUNDING
 from ident.diagnosis.problem import Candidate, Variant
-from ident.diagnosis.vehicle.causes.askew import MODES, Travelling, sliding_aside, with_shares
+from ident.diagnosis.vehicle.causes.askew import MODES, Travelling, sliding_aside, with_drag, with_shares
 from ident.diagnosis.vehicle.causes.bending import BristleCause
 from ident.diagnosis.vehicle.causes.bristles import bristle_candidate, bristle_causes
 from ident.diagnosis.vehicle.causes.context import Context
@@ -43,7 +43,7 @@ from ident.diagnosis.vehicle.records.sliding import (
 )
 from ident.diagnosis.vehicle.records.sources import Source
 from ident.diagnosis.vehicle.records.transforms import TransformCause, transform_causes
-from ident.plant.places import DRIVES, STEERING, WHEEL_PLACES
+from ident.plant.places import DRIVES, STEERING, WHEEL_PLACES, indices
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import PARAMETER_NAMES
 from ident.vehicle.quantities import GRAVITY
@@ -157,14 +157,17 @@ def seen_together(
     inputs, settings = [context.inputs(one) for one in driving], [context.setting(one) for one in driving]
     times = np.sum([np.zeros(len(WHEEL_PLACES)), *map(sliding_times, inputs, settings)], axis=0)
     blocks = list(_travelling(sources, tables, context.geometry))
-    # Two of the four wheels slide by the whole angle, or all by half of it.
-    dragging = context.known[PARAMETER_NAMES.index("m_ch")] * GRAVITY / 4 * context.geometry.wheel_radius / 2
+    dragging = context.known[PARAMETER_NAMES.index("m_ch")] * GRAVITY / 4 * context.geometry.wheel_radius
     for candidate in candidates:
         if candidate.effect == EffectName.SLIP:
             yield replace(candidate, excluded=not slides_alone(sliding_cause(candidate.where), times))
+        elif candidate.effect == EffectName.STEERING_OFFSET:
+            # Two of the four wheels slide by the whole angle, or all by half of it.
+            yield with_shares(candidate, blocks, dragging / 2)
+        elif candidate.effect == EffectName.ELASTICITY and indices(candidate.where, STEERING):
+            yield with_drag(candidate, dragging)
         else:
-            askew = candidate.effect == EffectName.STEERING_OFFSET
-            yield with_shares(candidate, blocks, dragging) if askew else candidate
+            yield candidate
 
 
 def _travelling(sources: Sequence[Source], tables: Sequence[Array], geometry: Geometry) -> Iterator[Travelling | None]:

@@ -121,9 +121,14 @@ def _across_at_rest(inputs: Array, wheel: int, gap: float, yielded: Array) -> Ar
 
 
 def _soft_coupling(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
-    (compliance,) = sizes
+    """The rear unit as it is, and its wheel without what it drags with: standing askew, it slides aside."""
+    compliance, dragging = sizes
     passed = _play(_coupling_load(inputs, place, setting), _unit_friction(place, setting))
-    return _rear_behind_front(inputs, place, compliance * passed, setting)
+    changed = _rear_behind_front(inputs, place, compliance * passed, setting)
+    rear = 2 * place + 1
+    against = np.tanh(inputs[:, SLICES["beta_rate"].start + rear] / COULOMB_EPSILON)
+    changed[:, SLICES["torques"].start + rear] -= dragging * np.abs(passed) * against / setting.geometry.gear_ratio
+    return changed
 
 
 def _coupling_with_play(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
@@ -245,7 +250,7 @@ _TRANSFORMS: Final[Mapping[tuple[EffectName, str], tuple[Transform, tuple[float,
         (EffectName.TORQUE_FILTER, _DRIVE): (_following_torque, (1e-3,)),
         (EffectName.TIME_DELAY, _SIDE): (_earlier_angle, (1e-3,)),
         (EffectName.ELASTICITY, _DRIVE): (_soft_gear, (1e-4,)),
-        (EffectName.ELASTICITY, _SIDE): (_soft_coupling, (1e-5,)),
+        (EffectName.ELASTICITY, _SIDE): (_soft_coupling, (1e-5, 1e-3)),
         (EffectName.BACKLASH, _DRIVE): (_gear_with_play, (1e-3, 1e-5)),
         (EffectName.BACKLASH, _SIDE): (_coupling_with_play, (1e-3, 1e-5)),
     }
