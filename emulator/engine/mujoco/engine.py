@@ -90,6 +90,7 @@ class MuJoCoEngine:
         self._joint_angles[:] = by_unit(angles)
         self.set_friction(self.coulomb)
         mujoco.mj_forward(self.model, self.data)
+        self._load_patches()
         self._pushed = False
         self._read()
         self._previous = self._rates
@@ -114,6 +115,7 @@ class MuJoCoEngine:
         self._joint_rates[:] = by_unit(rates)
         self.data.qacc_warmstart[:] = 0.0
         mujoco.mj_forward(self.model, self.data)
+        self._load_patches()
         self._read()
         self._previous = self._rates
 
@@ -123,8 +125,7 @@ class MuJoCoEngine:
         if self._patches is not None:
             self._patches.resist(self.data)
         mujoco.mj_step(self.model, self.data)
-        if self._patches is not None:
-            self._patches.feel(self.data)
+        self._load_patches()
         if self._pushed:
             self.data.xfrc_applied[self._chassis] = 0.0
             self._pushed = False
@@ -197,13 +198,13 @@ class MuJoCoEngine:
 
     def floor_forces(self) -> list[tuple[float, float]]:
         """Normal and friction force of the floor on each wheel (4,) [N, N]."""
-        forces, force = [(0.0, 0.0)] * len(WHEELS), np.zeros(6)
+        forces, force = np.zeros((len(WHEELS), 3)), np.zeros(6)
         tyres = [self.model.geom(f"tyre_{wheel}").id for wheel in WHEELS]
         for index in range(self.data.ncon):
             mujoco.mj_contactForce(self.model, self.data, index, force)
-            normal, one, other = force[:3].tolist()
-            forces[tyres.index(int(self.data.contact[index].geom2))] = (normal, math.hypot(one, other))
-        return forces
+            # A cylinder touches the floor twice.
+            forces[tyres.index(int(self.data.contact[index].geom2))] += force[:3]
+        return [(normal, math.hypot(one, other)) for normal, one, other in forces.tolist()]
 
     def bodies(self) -> Mapping[str, RigidBody]:
         """Chassis, knuckles and wheels: mass, centre of mass in the world, inertias."""
@@ -247,6 +248,10 @@ class MuJoCoEngine:
         if self._viewer is not None:
             self._viewer.close()
             self._viewer = None
+
+    def _load_patches(self) -> None:
+        if self._patches is not None:
+            self._patches.loads[:] = [normal for normal, _ in self.floor_forces()]
 
     def _read(self) -> None:
         angles, rates = self._joint_angles.tolist(), self._joint_rates.tolist()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -18,9 +19,18 @@ from emulator.engine.mujoco.engine import MuJoCoEngine
 STEP = 1e-3
 
 
-@pytest.fixture(params=["prototype", "compact"])
+PATCH = 3.0
+"""Torque with which a patch resists turning [Nm]."""
+
+
+def built(name: str, patch_torque: float = 0.0) -> AsBuilt:
+    plain = AsBuilt.of(load_prototype(name))
+    return replace(plain, wheels=tuple(replace(wheel, patch_torque=patch_torque) for wheel in plain.wheels))
+
+
+@pytest.fixture(params=[("prototype", 0.0), ("prototype", PATCH), ("compact", 0.0)], ids=str)
 def engine(request: pytest.FixtureRequest) -> Iterator[MuJoCoEngine]:
-    engine = MuJoCoEngine(AsBuilt.of(load_prototype(request.param)), step_size=STEP, gui=False)
+    engine = MuJoCoEngine(built(*request.param), step_size=STEP, gui=False)
     run(engine, [0.0] * 8, 0.5)
     yield engine
     engine.close()
@@ -66,3 +76,14 @@ def test_the_solver_converges_before_it_runs_out_of_iterations(engine: MuJoCoEng
         engine.step([0.0] * 4 + [25.0 * math.sin(0.01 * index), 12.0, -9.0, 15.0])
         worst = max(worst, int(engine.data.solver_niter[0]))
     assert worst < engine.model.opt.iterations / 2
+
+
+@pytest.mark.parametrize("share", [0.95, 1.05])
+def test_a_patch_holds_what_it_can_and_does_not_creep(share: float) -> None:
+    """Two units of a side that are turned, front against rear, by nearly the resistance of their patches, or more."""
+    engine = MuJoCoEngine(built("prototype", PATCH), step_size=STEP, gui=False)
+    engine.set_friction([0.0] * 8)
+    run(engine, [share * PATCH, -share * PATCH] + [0.0] * 6, 0.3)
+    rate = abs(engine.rates()[0])
+    engine.close()
+    assert rate < 1e-9 if share < 1 else rate > 0.1

@@ -77,7 +77,7 @@ Blocks = Sequence[Travelling | None]
 """What each block is of drives in which wheels roll; None for others."""
 
 
-def sliding_aside(mode: Mode, geometry: Geometry) -> float:
+def sliding_aside(mode: Mode | None, geometry: Geometry) -> float:
     """Speed of the steering axes in a mode, over that at which the contacts roll: wheels turned aside slide with those.
 
     Contacts stand beside the axes, and roll faster in turns.
@@ -171,14 +171,19 @@ def _expected(values: Array, dragging: float) -> Array:
     if len(values) == 1:
         return np.zeros(0)
     offset, drag, above = float(values[0]), float(values[1]), values[3:]
-    whole = ADHESION * dragging * max(abs(offset), NONE)
-    return np.concatenate([[drag / whole - 1], above / SHARE_STD, [above[:2].mean() / MEAN_STD]])
+    beyond = _beyond_expected(drag, offset, dragging)
+    return np.concatenate([[beyond], above / SHARE_STD, [above[:2].mean() / MEAN_STD]])
+
+
+def _beyond_expected(drag: float, angle: float, dragging: float) -> float:
+    """How far a drag is from that of wheels at an angle, in standard deviations, which are as large as it."""
+    return drag / (ADHESION * dragging * max(abs(angle), NONE)) - 1
 
 
 def with_drag(candidate: Candidate, dragging: float) -> Candidate:
     """A coupling that gives way, whose rear wheel then drags.
 
-    Behind its compliance comes the friction of that wheel, over the torque that the coupling passes on [-].
+    The friction of that wheel, over the torque that the coupling passes on [-], comes behind the compliance.
 
     Args:
         candidate: of these two numbers.
@@ -189,6 +194,6 @@ def with_drag(candidate: Candidate, dragging: float) -> Candidate:
         if len(values) == 1:
             return np.zeros(0)
         compliance, drag = values.tolist()
-        return np.array([drag / (ADHESION * dragging * max(abs(compliance), NONE)) - 1])
+        return np.array([_beyond_expected(drag, compliance, dragging)])
 
     return replace(candidate, expected=expected)

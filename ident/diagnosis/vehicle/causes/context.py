@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.names import MEMORIES, EffectName
 from ident.diagnosis.problem import Channel
+from ident.diagnosis.vehicle.causes.askew import sliding_aside
 from ident.diagnosis.vehicle.causes.bending import BristleCause
 from ident.diagnosis.vehicle.causes.library import every_unit
 from ident.diagnosis.vehicle.records import rows
@@ -74,7 +75,8 @@ class Context:
 
     def setting(self, source: Source) -> Setting:
         """What effects with a memory need beside the signals of a source."""
-        return Setting(self.geometry, self.known, source.sample_time)
+        aside = sliding_aside(source.spec.mode, self.geometry)
+        return Setting(self.geometry, self.known, source.sample_time, aside)
 
     def inputs(self, source: Source) -> Array:
         """Measured signals of a source, the given effects with a memory taken out."""

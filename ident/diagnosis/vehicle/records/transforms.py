@@ -51,11 +51,13 @@ class Setting:
         geometry: of the vehicle.
         parameters: p (11,).
         sample_time: [s].
+        aside: speed of the steering axes over that at which contacts roll: wheels askew slide aside with those [-].
     """
 
     geometry: Geometry
     parameters: Array
     sample_time: float
+    aside: float = 1.0
 
     def __getitem__(self, name: str) -> float:
         return float(self.parameters[PARAMETER_NAMES.index(name)])
@@ -121,13 +123,17 @@ def _across_at_rest(inputs: Array, wheel: int, gap: float, yielded: Array) -> Ar
 
 
 def _soft_coupling(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
-    """The rear unit as it is, and its wheel without what it drags with: standing askew, it slides aside."""
+    """The rear unit as it is, and the torque of its wheel without what that drags with: askew, it slides aside.
+
+    The drag [Nm] is a part of the torque that the coupling passes on.
+    """
     compliance, dragging = sizes
     passed = _play(_coupling_load(inputs, place, setting), _unit_friction(place, setting))
     changed = _rear_behind_front(inputs, place, compliance * passed, setting)
     rear = 2 * place + 1
     against = np.tanh(inputs[:, SLICES["beta_rate"].start + rear] / COULOMB_EPSILON)
-    changed[:, SLICES["torques"].start + rear] -= dragging * np.abs(passed) * against / setting.geometry.gear_ratio
+    drag = setting.aside * dragging * np.abs(passed) * against
+    changed[:, SLICES["torques"].start + rear] -= drag / setting.geometry.gear_ratio
     return changed
 
 

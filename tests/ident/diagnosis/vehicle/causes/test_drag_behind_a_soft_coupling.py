@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install mujoco")
+
 from hil.exam.plans import plan_exam
 from hil.exam.worlds import EmulatedWorld
 from hil.network import load_network
@@ -40,9 +42,9 @@ def problem(prototype: VehicleDescription) -> Problem:
     return build_problem([record], prototype, WORLD.truth(), effects=[EffectName.ELASTICITY])
 
 
-def parts(problem: Problem) -> tuple[Array, Array, Array]:
-    """Of the force of the straight drive: what the true parameters leave, what unit drag adds, and unit creep."""
-    (number,) = (index for index, block in enumerate(problem.blocks) if block.coordinate == "x")
+def parts(problem: Problem, coordinate: str) -> tuple[Array, Array, Array]:
+    """Of a force that drives: what the true parameters leave, what unit drag adds, and unit creep."""
+    (number,) = (index for index, block in enumerate(problem.blocks) if block.coordinate == coordinate)
     block = problem.blocks[number]
     contribution = problem.candidate("elasticity@steering_left").contribution
     assert contribution is not None
@@ -61,16 +63,20 @@ def by_the_grip(vehicle: VehicleDescription) -> float:
     return WORLD.emulated().prototype.floor_friction * load * vehicle.geometry.wheel_radius * COMPLIANCE
 
 
+@pytest.mark.parametrize("coordinate", ["x", "gamma"])
 def test_the_drag_is_the_grip_of_a_wheel_times_the_angle_by_which_it_stands_askew(
-    problem: Problem, prototype: VehicleDescription
+    problem: Problem, prototype: VehicleDescription, coordinate: str
 ) -> None:
-    rest, drag, creep = parts(problem)
+    rest, drag, creep = parts(problem, coordinate)
     columns = np.column_stack([drag, creep])
     scale = np.linalg.norm(columns, axis=0).clip(min=1e-12)
     found = np.linalg.lstsq(columns / scale, rest, rcond=None)[0][0] / scale[0]
     assert found == pytest.approx(by_the_grip(prototype), rel=0.25)
 
 
-def test_it_is_most_of_the_force_that_a_soft_coupling_takes(problem: Problem, prototype: VehicleDescription) -> None:
-    rest, drag, _ = parts(problem)
+@pytest.mark.parametrize("coordinate", ["x", "gamma"])
+def test_it_is_most_of_the_force_that_a_soft_coupling_takes(
+    problem: Problem, prototype: VehicleDescription, coordinate: str
+) -> None:
+    rest, drag, _ = parts(problem, coordinate)
     assert rms(rest) > 2 * rms(rest - by_the_grip(prototype) * drag)
