@@ -152,7 +152,7 @@ def slid_by_any(sources: Sequence[Source], context: Context) -> Sequence[Array |
 def seen_together(
     candidates: Sequence[Candidate], sources: Sequence[Source], tables: Sequence[Array], context: Context
 ) -> Iterator[Candidate]:
-    """The candidates: offsets of the steering with shares, soft couplings with drag, slip of wheels that do so alone."""
+    """The candidates: offsets of the steering with shares, couplings with drag, slip of wheels that slide alone."""
     driving = [source for source in sources if source.rolls and not source.rattles.any()]
     inputs, settings = [context.inputs(one) for one in driving], [context.setting(one) for one in driving]
     times = np.sum([np.zeros(len(WHEEL_PLACES)), *map(sliding_times, inputs, settings)], axis=0)
