@@ -56,6 +56,7 @@ def build_problem(
     effects: Sequence[EffectName] = tuple(EffectName),
     steps: Sequence[Step] = DIAGNOSED,
     processing: Processing | None = None,
+    obeyed: bool = False,
 ) -> Problem:
     """Rows and causes of some records.
 
@@ -67,6 +68,7 @@ def build_problem(
         effects: that are looked for.
         steps: whose rows are used, variants of them included.
         processing: filters and thresholds; None: those of the estimate, signals as fast as the records allow.
+        obeyed: whether the records are known to obey the model; else torques are asked for as the rows would have them.
 
     Raises:
         RecordError: none of the steps is in a record.
@@ -78,7 +80,7 @@ def build_problem(
     found = [sources_of(record, lengths, steps, processing) for record in records]
     sources = [source for each in found for source in apart_from_moments(each, lengths, processing)]
     context = make_context(sources, vehicle, model, given, processing)
-    if model and EffectName.TORQUE_GAIN in effects:
+    if model and not obeyed and EffectName.TORQUE_GAIN in effects:
         context = replace(context, asked=fitted_parameters(sources, vehicle, context))
     causes = causes_of(tuple(effects), model is not None)
     units = [unit for cause in causes if isinstance(cause, TermCause) for unit in cause.units]

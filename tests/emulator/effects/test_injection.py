@@ -56,6 +56,7 @@ def test_effects_that_exclude_each_other_are_refused(texts: tuple[str, str]) -> 
         ("slip@chassis=0", "positive"),
         ("time_delay@drive_fl=-1ms", "before its cause"),
         ("backlash@drive_fl=-1mrad", "not negative"),
+        ("scrub@steering_left=-1Nm", "not negative"),
         ("payload@chassis=-5kg", "negative"),
         ("com_offset@chassis=2m", "tip over"),
         ("steering_unit_mass@chassis=500kg", "do not fit"),

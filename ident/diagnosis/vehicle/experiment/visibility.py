@@ -156,9 +156,8 @@ def _problem(
 ) -> Problem:
     # At the vehicle file's parameters: an experiment of few steps does not show all of them.
     names = [name for name in EffectName if name in effects and name in FORETOLD]
-    problem = build_problem(
-        [ideal_record(drives, vehicle, periods=1)], vehicle, vehicle.prior, given=given, effects=names
-    )
+    record = ideal_record(drives, vehicle, periods=1)
+    problem = build_problem([record], vehicle, vehicle.prior, given=given, effects=names, obeyed=True)
     return replace(problem, nominal=None)
 
 
