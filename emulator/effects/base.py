@@ -45,6 +45,17 @@ class Placed:
     def __getitem__(self, parameter: str) -> float:
         return self.effect[parameter]
 
+    def not_negative(self, parameter: str) -> float:
+        """A number of it, SI.
+
+        Raises:
+            UserError: it is negative.
+        """
+        value = self[parameter]
+        if value < 0:
+            raise UserError(f"{self}: its {parameter} is not negative.", "Give a positive number.")
+        return value
+
     def __str__(self) -> str:
         return f"{self.effect.name}@{self.effect.where}"
 

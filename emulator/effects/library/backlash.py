@@ -8,13 +8,10 @@ from typing import Final
 from emulator.effects.base import Injector, Placed
 from emulator.effects.injection import Injection
 from emulator.effects.places import EACH_DRIVE, EACH_SIDE, STEERING
-from ident.errors import UserError
 
 
 def _inject(injection: Injection, effect: Placed) -> Injection:
-    more = effect["gap"]
-    if more < 0:
-        raise UserError(f"{effect}: play and compliance are not negative.", "Give a positive number.")
+    more = effect.not_negative("gap")
     if effect.where in STEERING:
         return injection.with_coupling(effect.where, lambda soft: replace(soft, gap=soft.gap + more))
     return injection.with_drive(effect.where, lambda flaws: replace(flaws, gap=flaws.gap + more))

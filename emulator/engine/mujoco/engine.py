@@ -72,6 +72,7 @@ class MuJoCoEngine:
         self.model = mujoco.MjModel.from_xml_string(text)
         self.data = mujoco.MjData(self.model)
         self._dry = self.model.pair_friction.copy()
+        self._tyres = [int(self.model.geom(f"tyre_{wheel}").id) for wheel in WHEELS]
         self._give_tyres_their_stiffness()
         resistance = np.array([wheel.patch_torque for wheel in self._built.wheels]) / quarter_weight(self._prototype)
         self._patches = None if on_stand or not resistance.any() else Patches(self.model, resistance)
@@ -199,11 +200,10 @@ class MuJoCoEngine:
     def floor_forces(self) -> list[tuple[float, float]]:
         """Normal and friction force of the floor on each wheel (4,) [N, N]."""
         forces, force = np.zeros((len(WHEELS), 3)), np.zeros(6)
-        tyres = [self.model.geom(f"tyre_{wheel}").id for wheel in WHEELS]
         for index in range(self.data.ncon):
             mujoco.mj_contactForce(self.model, self.data, index, force)
             # A cylinder touches the floor twice.
-            forces[tyres.index(int(self.data.contact[index].geom2))] += force[:3]
+            forces[self._tyres.index(int(self.data.contact[index].geom2))] += force[:3]
         return [(normal, math.hypot(one, other)) for normal, one, other in forces.tolist()]
 
     def bodies(self) -> Mapping[str, RigidBody]:

@@ -249,6 +249,9 @@ class TransformCause:
         return inputs
 
 
+YIELDING: Final = 1e-5
+"""Compliance [rad/Nm], and drag [-], at which columns are taken: they are in proportion to either."""
+
 _DRIVE, _SIDE = "drive", "side"
 _TRANSFORMS: Final[Mapping[tuple[EffectName, str], tuple[Transform, tuple[float, ...]]]] = MappingProxyType(
     {
@@ -256,9 +259,9 @@ _TRANSFORMS: Final[Mapping[tuple[EffectName, str], tuple[Transform, tuple[float,
         (EffectName.TORQUE_FILTER, _DRIVE): (_following_torque, (1e-3,)),
         (EffectName.TIME_DELAY, _SIDE): (_earlier_angle, (1e-3,)),
         (EffectName.ELASTICITY, _DRIVE): (_soft_gear, (1e-4,)),
-        (EffectName.ELASTICITY, _SIDE): (_soft_coupling, (1e-5, 1e-3)),
-        (EffectName.BACKLASH, _DRIVE): (_gear_with_play, (1e-3, 1e-5)),
-        (EffectName.BACKLASH, _SIDE): (_coupling_with_play, (1e-3, 1e-5)),
+        (EffectName.ELASTICITY, _SIDE): (_soft_coupling, (YIELDING, YIELDING)),
+        (EffectName.BACKLASH, _DRIVE): (_gear_with_play, (1e-3, YIELDING)),
+        (EffectName.BACKLASH, _SIDE): (_coupling_with_play, (1e-3, YIELDING)),
     }
 )
 
