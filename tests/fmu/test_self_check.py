@@ -7,6 +7,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -16,14 +17,18 @@ import numpy as np
 import pytest
 from fmpy.util import read_csv, read_ref_opt_file
 
-from fmu.compiling import HEADERS
+from fmu.compiling import HEADERS, find_compiler
 from fmu.description import FmiVersion
+from fmu.packaging import Order, build_fmu
 from fmu.picture import picture_of
 from fmu.platforms import host_platform
+from fmu.source import ModelSource
 from fmu.variables import Inputs
+from ident.errors import UserError
 from ident.plant import kinematics
 from ident.vehicle.description import load_vehicle
 from ident.vehicle.geometry import WHEELS
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 Build = Callable[[FmiVersion, Inputs], Path]
 
@@ -130,3 +135,10 @@ def test_cmake_says_what_is_missing(build: Build, need: Callable[[str], str], tm
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode != 0
     assert "set FMI_HEADERS" in done.stderr
+
+
+def test_a_model_that_runs_away_makes_no_fmu(source: ModelSource) -> None:
+    driven = source.parameters.values * np.where(np.array(PARAMETER_NAMES) == "d_vl", -1000.0, 1.0)
+    run_away = replace(source, parameters=Parameters(driven, source.parameters.std))
+    with pytest.raises(UserError, match="cannot be integrated over the drive"):
+        build_fmu(run_away, Order(FmiVersion.FMI2, Inputs.TORQUE, (host_platform(),)), find_compiler())

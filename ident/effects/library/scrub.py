@@ -6,7 +6,7 @@ from typing import ClassVar, Final
 
 import casadi as ca
 
-from ident.effects.base import EffectKind, EffectParameter, EffectTerm, coulomb_friction, sign_of
+from ident.effects.base import EffectKind, EffectParameter, EffectTerm, Sign, coulomb_friction, sign_of
 from ident.plant.places import CHASSIS, STEERING, with_groups
 from ident.plant.symbolic import Expression
 from ident.plant.terms import State
@@ -43,4 +43,5 @@ EFFECT: Final = EffectKind(
     term=_Scrub,
     words="contact patches that resist turning on the spot by {torque}",
     usual=_usual,
+    sign=Sign.NOT_NEGATIVE,
 )

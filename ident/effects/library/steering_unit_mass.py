@@ -6,7 +6,7 @@ from typing import ClassVar, Final
 
 import casadi as ca
 
-from ident.effects.base import EffectKind, EffectParameter, EffectTerm
+from ident.effects.base import EffectKind, EffectParameter, EffectTerm, Sign
 from ident.plant.places import CHASSIS
 from ident.plant.symbolic import CORNERS, LENGTHS, Expression
 from ident.plant.terms import Masses, State, acceleration_at, cross, left_of
@@ -45,4 +45,5 @@ EFFECT: Final = EffectKind(
     term=_SteeringUnitMass,
     words="{mass} of each wheel unit off its steering axis",
     usual=lambda vehicle, where: 0.01 * vehicle.prior["m_ch"],
+    sign=Sign.NOT_NEGATIVE,
 )

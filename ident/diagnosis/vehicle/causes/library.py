@@ -18,6 +18,7 @@ from ident.diagnosis.names import EffectName, places_of
 from ident.diagnosis.problem import Periodic
 from ident.diagnosis.vehicle.records.rows import UnitTerm
 from ident.effects import EFFECTS, EffectParameter, effect_term
+from ident.effects.base import Sign
 from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]
@@ -74,19 +75,10 @@ SHAPES: Final[Mapping[EffectName, Shape]] = MappingProxyType(
 DRIFTS: Final = (EffectName.PARAMETER_CHANGE, EffectName.PAYLOAD)
 """Effects that a refit of the parameters absorbs: causes only where the model's values are given."""
 
-
-ONE_SIDED: Final = (
-    EffectName.BACKLASH,
-    EffectName.ELASTICITY,
-    EffectName.FRICTION_LOAD,
-    EffectName.PRESLIDING,
-    EffectName.TORQUE_FILTER,
-    EffectName.SCRUB,
-    EffectName.STEERING_UNIT_MASS,
-)
+ONE_SIDED: Final = frozenset(EffectName(name) for name, kind in EFFECTS.items() if kind.sign is Sign.NOT_NEGATIVE)
 """Effects whose size cannot be negative."""
 
-POSITIVE: Final = (*ONE_SIDED, EffectName.PAYLOAD)
+POSITIVE: Final = ONE_SIDED | {EffectName.PAYLOAD}
 """Effects that stand for no change in the other direction: nobody takes off a load that is not there."""
 
 
