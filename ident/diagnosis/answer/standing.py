@@ -61,10 +61,17 @@ class Standing:
 
     @cached_property
     def odds_beside(self) -> dict[int, float]:
-        """Log odds of everything that can be there beside the set, evidence not tempered."""
-        tables = self.search.fitter.among_all(self.state).tables()
-        hypotheses = self.design.hypotheses
-        return {index: one.total - hypotheses[index].price for index, one in tables.items() if one.is_there}
+        """Log odds of everything that can be there beside the set; evidence for it is tempered, as a member's is."""
+        fitter, state, hypotheses = self.search.fitter, self.state, self.design.hypotheses
+        found = dict[int, float]()
+        for index, table in fitter.among_all(state).tables().items():
+            if table.is_there:
+                log = table.total - hypotheses[index].price
+                # Tempering makes it no likelier.
+                if log > 0:
+                    log = fitter.odds(fitter.state({**state.members, index: table.best}, state), index, state)
+                found[index] = log
+        return found
 
     @cached_property
     def is_lacking(self) -> bool:

@@ -86,6 +86,26 @@ def test_probabilities_are_of_what_may_stand_there(world: World) -> None:
     assert 0.5 < cause.probability < 1.0
 
 
+def wandering(made: Any, size: float) -> list[Problem]:
+    """The world's problems, with a share of column `b` that is another one in every stretch, and zero in the mean."""
+    problems = [made.problem(part) for part in (0, 1)]
+    for part, problem in enumerate(problems):
+        generator = np.random.default_rng([made.seed, part, 9])
+        for block, column in zip(problem.blocks, problem.candidate("b@place").variants[0].columns, strict=True):
+            assert column is not None
+            share = np.repeat(generator.normal(size=len(column) // 100), 100)
+            block.target[:] += size * share * column[:, 0]
+    return problems
+
+
+def test_nothing_is_likelier_than_what_is_not_believed(world: World) -> None:
+    """Where rows scatter beyond their noise as well, by which what is likely is told less surely."""
+    found = [judge(*wandering(world(seed), 0.4), seed=1) for seed in (5, 11, 13, 14)]
+    assert all(one.verdict is Verdict.NONE and one.doubtful for one in found)
+    for one in found:
+        assert max(one.doubtful.values()) < 1 - sum(one.doubtful.values())
+
+
 def with_candidates(made: Any, *merged: tuple[str, ...], least: float | None = None) -> list[Problem]:
     """The world's problems, some of its columns being those of one candidate each, of the first one's name."""
     found = []
