@@ -121,7 +121,9 @@ def _stribeck(axis: AxisModel) -> Candidate:
 
     parameters = (
         EffectParameter("amplitude", axis.unit(), "friction at rest beyond the Coulomb friction"),
-        EffectParameter("velocity", f"{axis.kind.position_unit}/s", "speed at which it has fallen to 1/e"),
+        EffectParameter(
+            "velocity", f"{axis.kind.position_unit}/s", "speed at which it has fallen to 1/e", positive=True
+        ),
     )
     # At half the speed that hardly a row is below, all rows have lost it, but what they miss near a reversal looks so.
     slowest = axis.slowest / 2

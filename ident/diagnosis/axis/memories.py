@@ -39,7 +39,7 @@ def presliding(axis: AxisModel) -> Candidate:
 
     parameters = (
         EffectParameter("amplitude", axis.unit(), "friction right after a reversal beyond that in motion"),
-        EffectParameter("distance", axis.kind.position_unit, "path over which it has fallen to 1/e"),
+        EffectParameter("distance", axis.kind.position_unit, "path over which it has fallen to 1/e", positive=True),
     )
     tried = tried_between(shortest, longest)
     candidate = shaped_by(axis, EffectName.PRESLIDING, parameters, series, tried, price=math.log(len(tried)))
@@ -64,7 +64,7 @@ def friction_warming(axis: AxisModel) -> Candidate:
 
     parameters = (
         EffectParameter("change", axis.unit(), "of the Coulomb friction, once warm"),
-        EffectParameter("time", "s", "in which 63 % of the change have come"),
+        EffectParameter("time", "s", "in which 63 % of the change have come", positive=True),
     )
     tried = tried_between(shortest, longest)
     return shaped_by(axis, AxisEffect.FRICTION_WARMING, parameters, series, tried, price=math.log(len(tried)))

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.check.unknowns import HELD, Unknown, unknown_of
 from ident.diagnosis.observations.linear import least_squares, stretch_sums
 from ident.diagnosis.observations.regression import Regression
-from ident.diagnosis.observations.rows import Column, Rows
+from ident.diagnosis.observations.rows import Rows
 from ident.diagnosis.observations.whitening import Whitening
-from ident.diagnosis.problem import Candidate, Problem, Series, Turned, contributions_of, forces_of, summed, turned_by
+from ident.diagnosis.problem import Candidate, Problem, Series, summed
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -23,8 +23,6 @@ MOST_STEPS: Final = 15
 HALVINGS: Final = 6
 DIFFERENCE: Final = 1e-4
 """Relative step of numerical derivatives."""
-HELD: Final = 1e4
-"""Weight of what is known of the baseline beforehand, over its standard deviations, where it is held."""
 SETTLED: Final = 0.02
 """Decrease of the sum of squares, in units of the noise, from which the refit has settled: a seventh of a deviation."""
 
@@ -69,49 +67,6 @@ class Refit:
     def baseline_std(self) -> Array:
         """Standard deviations (p,) of the model's parameters."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
-
-
-@dataclass(frozen=True)
-class _Unknown:
-    """The numbers of one effect: coefficients of its columns, or its parameters where it has an exact form.
-
-    The first of them are the parameters of the candidate, the others came along. `turned`: what it makes of the forces
-    of others.
-    """
-
-    candidates: Sequence[Candidate]
-    place: slice
-    exact: Callable[[Array, Array], Series] | None
-    columns: tuple[Array | None, ...]
-    finish: Callable[[Array], Array]
-    turned: Turned | None = None
-
-    def series(self, values: Array, baseline: Array) -> Series:
-        """What it adds to every block, (N,)."""
-        if self.exact is not None:
-            return self.exact(values, baseline)
-        return [None if column is None else column @ values for column in self.columns]
-
-    @property
-    def candidate(self) -> Candidate:
-        """In the first problem."""
-        return self.candidates[0]
-
-    @property
-    def has_force(self) -> bool:
-        """Whether others may turn it."""
-        return self.turned is None and self.candidate.force is not None
-
-    def forces(self, values: Array, baseline: Array) -> Series:
-        """Of every block, unfiltered."""
-        return forces_of(self.candidates, self.finish(values), baseline)
-
-    def expected(self, values: Array) -> Array:
-        """How far its numbers are from what is expected of them, in standard deviations (k,), from all values."""
-        expected = self.candidate.expected
-        if self.exact is None or expected is None:
-            return np.zeros(0)
-        return expected(values[self.place])
 
 
 def refit(
@@ -175,13 +130,13 @@ class _Model:
         self.regression, self.whitener, self.chosen = regression, whitener, chosen
         self.rows: Rows = regression.rows
         self.size = self.rows.baseline.shape[1]
-        linear = self._linear(regression.columns_of(variants), self.rows.target)
-        self.unknowns: list[_Unknown] = []
+        linear = self._begun(regression.columns_of(variants), self._as_found(problems[0], variants))
+        self.unknowns: list[Unknown] = []
         starts, taken = [(linear[: self.size], linear[: self.size])], self.size
         for variant in variants:
             column = self.rows.layout[variant]
             width, first = column.width, sum(len(one) for one, _ in starts)
-            unknown, by_columns, found = _unknown(problems, column, linear[taken : taken + width], first, exact)
+            unknown, by_columns, found = unknown_of(problems, column, linear[taken : taken + width], first, exact)
             self.unknowns.append(unknown)
             starts.append((by_columns, found))
             taken += width
@@ -226,6 +181,20 @@ class _Model:
             parts.append(Part(unknown.candidate.key, numbers[stated], total, numbers, deviations, tuple(series)))
         return Refit(values[: self.size], covariance[: self.size, : self.size], tuple(parts), tuple(blocks))
 
+    def _as_found(self, problem: Problem, variants: Sequence[int]) -> Mask:
+        """Which columns of some variants (k,) are taken from the rows themselves."""
+        columns = [self.rows.layout[variant] for variant in variants]
+        found = [problem.candidates[column.candidate].as_found for column in columns]
+        return np.repeat(np.array(found, dtype=bool), [column.width for column in columns])
+
+    def _begun(self, columns: Array, as_found: Mask) -> Array:
+        """Coefficients of the baseline and of columns (n, k) by least squares, one of those that were found."""
+        coefficients = np.ones(self.size + columns.shape[1])
+        free = np.append(np.ones(self.size, dtype=bool), ~as_found)
+        target = self.rows.target - columns[:, as_found].sum(axis=1)
+        coefficients[free] = self._linear(columns[:, ~as_found], target)
+        return coefficients
+
     def _better(self, by_columns: Array, found: Array) -> Array:
         """All values to begin with: by columns, or those found before, the baseline fitted beside, if those leave less.
 
@@ -255,7 +224,7 @@ class _Model:
             self._kept[number] = kept
         return kept[1]
 
-    def _series(self, unknown: _Unknown, own: Array, values: Array) -> Series:
+    def _series(self, unknown: Unknown, own: Array, values: Array) -> Series:
         """What an effect of some numbers adds to every block, and makes of the forces of others, of those in `values`.
 
         What turns others is not turned.
@@ -272,7 +241,7 @@ class _Model:
         turning = [one for one in self.unknowns if one.turned is not None]
         return own + self._turned_derivative(number, values, turning) if turning else own
 
-    def _turned_derivative(self, number: int, values: Array, turning: Sequence[_Unknown]) -> Array:
+    def _turned_derivative(self, number: int, values: Array, turning: Sequence[Unknown]) -> Array:
         """Derivative of what others make of the force of one effect."""
         unknown, baseline = self.unknowns[number], values[: self.size]
         own, columns = values[unknown.place], []
@@ -323,35 +292,12 @@ class _Model:
         return np.asarray(robust / np.outer(scale, scale))
 
 
-def _unknown(
-    problems: Sequence[Problem], column: Column, coefficients: Array, first: int, by_form: bool
-) -> tuple[_Unknown, Array, Array]:
-    """The numbers of a variant, and what they begin with: by coefficients of its columns, and as they were found."""
-    candidates = [problem.candidates[column.candidate] for problem in problems]
-    variant = candidates[0].variants[column.variant]
-    finish = variant.start or _same
-    columns = tuple(part for candidate in candidates for part in candidate.variants[column.variant].columns)
-    if candidates[0].contribution is None or not by_form or not variant.bent:
-        place = slice(first, first + len(coefficients))
-        return _Unknown(candidates, place, None, columns, finish), coefficients, coefficients
-
-    start = np.asarray(finish(coefficients), dtype=float)
-    turned = None if candidates[0].turned is None else partial(turned_by, candidates)
-    exact = partial(contributions_of, candidates)
-    unknown = _Unknown(candidates, slice(first, first + len(start)), exact, columns, _same, turned)
-    return unknown, start, start if variant.found is None else variant.found
-
-
 def _beyond(candidate: Candidate, numbers: Array) -> Array:
     """Standard deviations of the parameters (k,) beyond the scatter of the rows, from all numbers (m,)."""
     count = len(candidate.parameters)
     along = numbers[count:]
     alone = np.hypot(candidate.spread or 0.0, candidate.part * numbers[:count])
     return np.asarray(np.hypot(alone, candidate.yielding * np.linalg.norm(along)))
-
-
-def _same(values: Array) -> Array:
-    return values
 
 
 def _steps(values: Array) -> list[float]:

@@ -141,10 +141,7 @@ class TermCause:
 def placed_parameters(name: EffectName, where: str) -> tuple[EffectParameter, ...]:
     """Parameters of an effect, with the units that they have at a place."""
     spec = EFFECTS[name]
-    return tuple(
-        EffectParameter(entry.name, spec.unit(entry.name, where), entry.meaning, entry.default)
-        for entry in spec.parameters
-    )
+    return tuple(replace(entry, unit=spec.unit(entry.name, where)) for entry in spec.parameters)
 
 
 def term_causes(names: Sequence[EffectName]) -> list[TermCause]:

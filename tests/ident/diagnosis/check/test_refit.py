@@ -104,3 +104,46 @@ def test_what_a_way_of_telling_adds_to_a_deviation_is_absolute_or_a_part(world: 
     )
     assert wide.std[0] == pytest.approx(np.hypot(plain.std[0], 0.1))
     assert relative.std[0] == pytest.approx(np.hypot(plain.std[0], 0.25 * plain.values[0]))
+
+
+def test_a_number_above_zero_is_given_by_its_size(world: type[Any]) -> None:
+    """The law of the second number is even in it; its fit begins on the other side of zero."""
+
+    def even(problem: Problem) -> Problem:
+        straight, curved = (problem.candidate(f"{name}@place").variants[0].columns for name in ("a", "b"))
+        pairs = [(one, two) for one, two in zip(straight, curved, strict=True) if one is not None and two is not None]
+
+        def form(values: Array, baseline: Array) -> list[Array | None]:
+            return [values[0] * one[:, 0] + values[1] ** 2 * two[:, 0] for one, two in pairs]
+
+        added = form(np.array([SIZE, CURVED]), TRUTH)
+        blocks = [
+            replace(b, target=b.target + (0.0 if a is None else a)) for b, a in zip(problem.blocks, added, strict=True)
+        ]
+        parameters = (EffectParameter("size", "Nm", ""), EffectParameter("speed", "m/s", "", positive=True))
+        variant = Variant(straight, lambda found: np.array([found[0], -1.0]))
+        first = Candidate("a", "place", parameters, (variant,), form)
+        return replace(problem, blocks=tuple(blocks), candidates=(first, *problem.candidates[1:]))
+
+    part = refitted([even(world(seed=3).problem(number)) for number in (0, 1)])[0].parts[0]
+    assert part.values == pytest.approx([SIZE, CURVED], abs=0.1)
+
+
+def test_what_was_found_is_taken_whole_where_the_fitted_rows_have_none_of_it(world: type[Any]) -> None:
+    def found_in(problem: Problem, share: float) -> Problem:
+        """Its series `a` is in its target, and found there, in one of the two records alone."""
+        series = tuple(None if one is None else share * one for one in problem.candidates[0].variants[0].columns)
+        blocks = [
+            replace(b, target=b.target + (0.0 if a is None else a[:, 0]))
+            for b, a in zip(problem.blocks, series, strict=True)
+        ]
+        first = replace(problem.candidates[0], variants=(Variant(series),), as_found=True)
+        return replace(problem, blocks=tuple(blocks), candidates=(first, *problem.candidates[1:]))
+
+    problems = [found_in(world(seed=3).problem(part), share) for part, share in ((0, 0.0), (1, 2.0))]
+    regression = Regression(problems[0], make_rows(*problems))
+    fitted = ~regression.rows.confirming
+    found = refit(problems, regression, (0,), whitener_of(regression), fitted)
+    assert found.parts[0].values == pytest.approx([1.0])
+    for (block, _), model in list(zip(regression.rows.blocks, found.blocks, strict=True))[2:]:
+        assert np.std(block.target - model) < 0.7 * np.std(block.target - block.baseline @ TRUTH)
