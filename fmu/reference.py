@@ -119,16 +119,18 @@ def _integrated(
     numbers = ca.DM([row.start or 0.0 for row in table.block(Block.PARAMETER)])
     rates = ca.cse(ca.densify(ca.substitute(model.xd, model.p, numbers)))
     problem = {"x": model.x, "p": model.u, "ode": rates}
-    tolerances = {
+    options = {
         "reltol": _RELATIVE,
         "abstol": _ABSOLUTE,
+        # CasADi's own QR divides by zero where columns of the Jacobian have numbers near the smallest there are.
+        "linear_solver": "csparse",
         "show_eval_warnings": False,
         "disable_internal_warnings": True,
     }
     states = [np.array([row.start or 0.0 for row in table.block(Block.STATE)])]
     for length, commands in zip(lengths, values, strict=True):
         grid = INTERVAL * np.arange(1, round(length / INTERVAL) + 1)
-        integrate = ca.integrator("reference", "cvodes", problem, 0.0, grid, tolerances)
+        integrate = ca.integrator("reference", "cvodes", problem, 0.0, grid, options)
         try:
             found = integrate(x0=states[-1], p=commands)["xf"]
         except RuntimeError as reason:
