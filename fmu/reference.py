@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import casadi as ca
 import numpy as np
@@ -119,7 +119,7 @@ def _integrated(
     numbers = ca.DM([row.start or 0.0 for row in table.block(Block.PARAMETER)])
     rates = ca.cse(ca.densify(ca.substitute(model.xd, model.p, numbers)))
     problem = {"x": model.x, "p": model.u, "ode": rates}
-    options = {
+    options: dict[str, Any] = {
         "reltol": _RELATIVE,
         "abstol": _ABSOLUTE,
         # CasADi's own QR divides by zero where columns of the Jacobian have numbers near the smallest there are.
