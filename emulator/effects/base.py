@@ -53,7 +53,7 @@ class Placed:
         """
         value = self[parameter]
         if value < 0:
-            raise UserError(f"{self}: its {parameter} is not negative.", "Give a positive number.")
+            raise UserError(f"{self}: its {parameter} cannot be negative.", "Give a positive number.")
         return value
 
     def __str__(self) -> str:
