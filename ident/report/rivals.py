@@ -153,7 +153,7 @@ def _doubtful(findings: Findings) -> Chart | None:
         for key, value in sorted(shares.items(), key=lambda entry: -entry[1])
     )
     title = "Beside the causes" if findings.causes else "In the place of nothing"
-    said = "not believed: not likely enough, or of no size"
+    said = "not believed: not likely enough"
     return Chart(title, PROBABILITY, bars, said)
 
 

@@ -100,7 +100,7 @@ def _findings(standing: Standing) -> Findings:
 def _doubtful(standing: Standing) -> dict[str, float]:
     """Probability of everything beside the set, or in its place if that is empty, the greatest first.
 
-    But of what was in the set and lost its place, which the fitted rows alone would have there.
+    But of what was in the set and lost its place: it was refuted or passed over, whatever its evidence is.
     """
     lost, hypotheses = standing.search.refuted | standing.search.passed_over, standing.design.hypotheses
     odds = {index: log for index, log in standing.odds_beside.items() if index not in lost}

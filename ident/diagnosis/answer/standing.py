@@ -9,6 +9,7 @@ from typing import Final
 from ident.diagnosis.answer.taken import as_variants
 from ident.diagnosis.check.fitted import Fitted, Taken
 from ident.diagnosis.evidence.state import State
+from ident.diagnosis.evidence.tables import Member
 from ident.diagnosis.law.reach import told_samples
 from ident.diagnosis.noise.colours import SIZES, Colours
 from ident.diagnosis.search.asked import Asked
@@ -61,17 +62,18 @@ class Standing:
 
     @cached_property
     def odds_beside(self) -> dict[int, float]:
-        """Log odds of everything that can be there beside the set; evidence for it is tempered, as a member's is."""
-        fitter, state, hypotheses = self.search.fitter, self.state, self.design.hypotheses
-        found = dict[int, float]()
-        for index, table in fitter.among_all(state).tables().items():
-            if table.is_there:
-                log = table.total - hypotheses[index].price
-                # Tempering makes it no likelier.
-                if log > 0:
-                    log = fitter.odds(fitter.state({**state.members, index: table.best}, state), index, state)
-                found[index] = log
-        return found
+        """Log odds of everything that can be there beside the set: of what is likelier than nothing as of a member.
+
+        That is fitted, and its evidence tempered, which makes it no likelier.
+        """
+        tables, hypotheses = self.search.fitter.among_all(self.state).tables(), self.design.hypotheses
+        raw = {index: table.total - hypotheses[index].price for index, table in tables.items() if table.is_there}
+        return {index: self._fitted_odds(index, tables[index].best) if log > 0 else log for index, log in raw.items()}
+
+    def _fitted_odds(self, index: int, member: Member) -> float:
+        fitter = self.search.fitter
+        found = fitter.state({**self.state.members, index: member}, self.state)
+        return fitter.odds(found, index, self.state) if math.isfinite(found.log_posterior) else -math.inf
 
     @cached_property
     def is_lacking(self) -> bool:

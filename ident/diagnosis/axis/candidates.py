@@ -172,7 +172,7 @@ def _elasticity(axis: AxisModel) -> Candidate:
     meaning = "between drive and load, all inertia behind it; negative where the position is measured behind it"
     parameters = (
         EffectParameter("compliance", unit, meaning),
-        EffectParameter("resonance", "rad/s", "of the load, the drive held"),
+        EffectParameter("resonance", "rad/s", "of the load, the drive held", positive=True),
     )
     sampling = axis.sample_time**2 / abs(axis.inertia)
     tried = [share * axis.bandwidth for share in RESONANCES]

@@ -33,7 +33,7 @@ def deviations_against(fitted: Fitted) -> Array:
 
 def _left_open(fitted: Fitted, added: Array) -> Array:
     """Variance (k,) along series (m, k) of white confirming rows of what the fitted rows leave open of the model."""
-    columns = np.hstack([fitted.rows.baseline, fitted.regression.columns_of(fitted.found.variants)])
+    columns = np.hstack([fitted.rows.baseline, fitted.regression.fitted_columns_of(fitted.found.variants)])
     white, confirming = fitted.found.whitener.apply(fitted.rows, columns), fitted.rows.confirming
     design = np.vstack([white[~confirming], fitted.regression.prior_jacobian(white.shape[1])])
     size = np.linalg.norm(design, axis=0)

@@ -57,8 +57,8 @@ class SmoothFunction:
     def beside(self, taken: tuple[int, ...]) -> Generic:
         """Learn it beside the baseline and the effects taken, on the fitted rows, and try it on the others."""
         regression, rows = self._regression, self._regression.rows
-        design = np.hstack([rows.baseline, regression.columns_of(taken)])
-        white = self._whitener.apply(rows, np.column_stack([design, rows.target]))
+        design = np.hstack([rows.baseline, regression.fitted_columns_of(taken)])
+        white = self._whitener.apply(rows, np.column_stack([design, rows.target - regression.found_of(taken)]))
         fitted = ~rows.confirming
         model, target = white[:, :-1], white[:, -1]
         left = target - model @ least_squares(model[fitted], target[fitted])

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.check.unknowns import HELD, Unknown, unknown_of
+from ident.diagnosis.check.unknowns import Unknown, unknown_of
 from ident.diagnosis.observations.linear import least_squares, stretch_sums
 from ident.diagnosis.observations.regression import Regression
 from ident.diagnosis.observations.rows import Rows
@@ -23,6 +23,8 @@ MOST_STEPS: Final = 15
 HALVINGS: Final = 6
 DIFFERENCE: Final = 1e-4
 """Relative step of numerical derivatives."""
+HELD: Final = 1e4
+"""Weight of what is known of the baseline beforehand, over its standard deviations, where it is held."""
 SETTLED: Final = 0.02
 """Decrease of the sum of squares, in units of the noise, from which the refit has settled: a seventh of a deviation."""
 
@@ -130,12 +132,14 @@ class _Model:
         self.regression, self.whitener, self.chosen = regression, whitener, chosen
         self.rows: Rows = regression.rows
         self.size = self.rows.baseline.shape[1]
-        linear = self._begun(regression.columns_of(variants), self._as_found(problems[0], variants))
+        unexplained = self.rows.target - regression.found_of(variants)
+        linear = self._linear(regression.fitted_columns_of(variants), unexplained)
         self.unknowns: list[Unknown] = []
         starts, taken = [(linear[: self.size], linear[: self.size])], self.size
         for variant in variants:
             column = self.rows.layout[variant]
-            width, first = column.width, sum(len(one) for one, _ in starts)
+            width = 0 if problems[0].candidates[column.candidate].as_found else column.width
+            first = sum(len(one) for one, _ in starts)
             unknown, by_columns, found = unknown_of(problems, column, linear[taken : taken + width], first, exact)
             self.unknowns.append(unknown)
             starts.append((by_columns, found))
@@ -145,7 +149,7 @@ class _Model:
 
     @property
     def nonlinear(self) -> bool:
-        return any(unknown.exact is not None for unknown in self.unknowns)
+        return any(unknown.exact is not None and not unknown.is_settled for unknown in self.unknowns)
 
     def residual(self, values: Array) -> Array:
         """Whitened rows that are fitted, then what is known beforehand."""
@@ -180,20 +184,6 @@ class _Model:
             total = np.hypot(deviations[stated], _beyond(unknown.candidate, numbers))
             parts.append(Part(unknown.candidate.key, numbers[stated], total, numbers, deviations, tuple(series)))
         return Refit(values[: self.size], covariance[: self.size, : self.size], tuple(parts), tuple(blocks))
-
-    def _as_found(self, problem: Problem, variants: Sequence[int]) -> Mask:
-        """Which columns of some variants (k,) are taken from the rows themselves."""
-        columns = [self.rows.layout[variant] for variant in variants]
-        found = [problem.candidates[column.candidate].as_found for column in columns]
-        return np.repeat(np.array(found, dtype=bool), [column.width for column in columns])
-
-    def _begun(self, columns: Array, as_found: Mask) -> Array:
-        """Coefficients of the baseline and of columns (n, k) by least squares, one of those that were found."""
-        coefficients = np.ones(self.size + columns.shape[1])
-        free = np.append(np.ones(self.size, dtype=bool), ~as_found)
-        target = self.rows.target - columns[:, as_found].sum(axis=1)
-        coefficients[free] = self._linear(columns[:, ~as_found], target)
-        return coefficients
 
     def _better(self, by_columns: Array, found: Array) -> Array:
         """All values to begin with: by columns, or those found before, the baseline fitted beside, if those leave less.
@@ -264,12 +254,12 @@ class _Model:
         own = values[unknown.place]
         if unknown.exact is None:
             return self.rows.stack(unknown.columns, len(own))
-        here, columns = self._added(number, values), []
+        here, derivative = self._added(number, values), np.zeros((len(self.rows), len(own)))
         for index, step in enumerate(_steps(own)):
             ahead = own.copy()
             ahead[index] += step
-            columns.append((self.rows.stack(self._series(unknown, ahead, values)) - here) / step)
-        return np.stack(columns, axis=1)
+            derivative[:, index] = (self.rows.stack(self._series(unknown, ahead, values)) - here) / step
+        return derivative
 
     def _covariance(self, values: Array) -> Array:
         """Sandwich over the stretches of rows, nowhere below what white rows would give."""
@@ -306,10 +296,10 @@ def _steps(values: Array) -> list[float]:
 
 def _gradient(function: Callable[[Array], Array], values: Array) -> Array:
     """Numerical derivative (n, k)."""
-    columns = []
+    derivative = np.zeros((len(function(values)), len(values)))
     for index, step in enumerate(_steps(values)):
         ahead, behind = values.copy(), values.copy()
         ahead[index] += step
         behind[index] -= step
-        columns.append((np.asarray(function(ahead)) - np.asarray(function(behind))) / (2 * step))
-    return np.stack(columns, axis=1)
+        derivative[:, index] = (np.asarray(function(ahead)) - np.asarray(function(behind))) / (2 * step)
+    return derivative

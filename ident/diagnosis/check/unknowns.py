@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,6 @@ from ident.diagnosis.problem import Candidate, Problem, Series, Turned, contribu
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-HELD: Final = 1e4
-"""Weight of what is known beforehand, over its standard deviations, where it is held."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +48,11 @@ class Unknown:
         return self.candidates[0]
 
     @property
+    def is_settled(self) -> bool:
+        """Whether nothing of it is fitted."""
+        return bool(self.place.start == self.place.stop)
+
+    @property
     def has_force(self) -> bool:
         """Whether others may turn it."""
         return self.turned is None and self.candidate.force is not None
@@ -61,16 +62,11 @@ class Unknown:
         return forces_of(self.candidates, self.finish(values), baseline)
 
     def expected(self, values: Array) -> Array:
-        """How far its numbers are from what is expected of them, in standard deviations (k,), from all values.
-
-        What was found is taken whole: also where the fitted rows have none of it.
-        """
-        if self.candidate.as_found:
-            return HELD * (values[self.place] - 1.0)
+        """How far its numbers are from what is expected of them, in standard deviations (k,), from all values."""
         expected = self.candidate.expected
         if self.exact is None or expected is None:
             return np.zeros(0)
-        return expected(values[self.place])
+        return expected(self.finish(values[self.place]))
 
 
 def unknown_of(
@@ -81,6 +77,8 @@ def unknown_of(
     variant = candidates[0].variants[column.variant]
     finish = variant.start or _same
     columns = tuple(part for candidate in candidates for part in candidate.variants[column.variant].columns)
+    if candidates[0].as_found:
+        return _found(candidates, columns, first, finish(np.ones(column.width))), coefficients, coefficients
     if candidates[0].contribution is None or not by_form or not variant.bent:
         place = slice(first, first + len(coefficients))
         return Unknown(candidates, place, None, columns, finish), coefficients, coefficients
@@ -94,6 +92,12 @@ def unknown_of(
 
     unknown = Unknown(candidates, slice(first, first + len(start)), exact, columns, proper, turned)
     return unknown, start, start if variant.found is None else variant.found
+
+
+def _found(candidates: Sequence[Candidate], columns: tuple[Array | None, ...], first: int, numbers: Array) -> Unknown:
+    """What was found in the rows is taken whole: nothing of it is fitted, wherever it is."""
+    whole = [None if column is None else column.sum(axis=1) for column in columns]
+    return Unknown(candidates, slice(first, first), lambda _values, _baseline: whole, columns, lambda _values: numbers)
 
 
 def _above_zero(candidate: Candidate, count: int) -> Mask:

@@ -69,6 +69,18 @@ class Regression:
         places = [self.rows.columns[:, self.rows.layout[variant].place] for variant in variants]
         return np.hstack([np.zeros((len(self.rows), 0)), *places])
 
+    def fitted_columns_of(self, variants: Sequence[int]) -> Array:
+        """Of those the ones that have coefficients (n, k): not what was found in the rows themselves."""
+        return self.columns_of([variant for variant in variants if not self._was_found(variant)])
+
+    def found_of(self, variants: Sequence[int]) -> Array:
+        """What was found in the rows themselves (n,), of some variants: its coefficient is one."""
+        found = self.columns_of([variant for variant in variants if self._was_found(variant)])
+        return np.asarray(found.sum(axis=1))
+
+    def _was_found(self, variant: int) -> bool:
+        return self.problem.candidates[self.owners[variant]].as_found
+
     @property
     def strongest(self) -> tuple[int, ...]:
         """The best variants of all candidates, whether or not they are there.
