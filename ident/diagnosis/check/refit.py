@@ -138,7 +138,7 @@ class _Model:
         starts, taken = [(linear[: self.size], linear[: self.size])], self.size
         for variant in variants:
             column = self.rows.layout[variant]
-            width = 0 if problems[0].candidates[column.candidate].as_found else column.width
+            width = 0 if regression.was_found(variant) else column.width
             first = sum(len(one) for one, _ in starts)
             unknown, by_columns, found = unknown_of(problems, column, linear[taken : taken + width], first, exact)
             self.unknowns.append(unknown)

@@ -71,14 +71,15 @@ class Regression:
 
     def fitted_columns_of(self, variants: Sequence[int]) -> Array:
         """Of those the ones that have coefficients (n, k): not what was found in the rows themselves."""
-        return self.columns_of([variant for variant in variants if not self._was_found(variant)])
+        return self.columns_of([variant for variant in variants if not self.was_found(variant)])
 
     def found_of(self, variants: Sequence[int]) -> Array:
         """What was found in the rows themselves (n,), of some variants: its coefficient is one."""
-        found = self.columns_of([variant for variant in variants if self._was_found(variant)])
+        found = self.columns_of([variant for variant in variants if self.was_found(variant)])
         return np.asarray(found.sum(axis=1))
 
-    def _was_found(self, variant: int) -> bool:
+    def was_found(self, variant: int) -> bool:
+        """Whether the columns of a variant are taken from the rows themselves."""
         return self.problem.candidates[self.owners[variant]].as_found
 
     @property
