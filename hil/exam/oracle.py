@@ -89,22 +89,28 @@ def evidence_of_case(
     """
     forbid_emulator()
     try:
-        problems = _axis(fit, confirm) if texts is None else _vehicle(fit, confirm, *texts)
-        found = log_evidence_of(*problems, keys)
+        found = log_evidence_of(*posed(fit, confirm, texts), keys)
     except (ArithmeticError, ValueError, UserError):
         # A record that the diagnosis refuses shows an oracle nothing either.
         found = dict.fromkeys(keys, NOTHING)
     return identifier, json.dumps({key: value if np.isfinite(value) else None for key, value in found.items()}).encode()
 
 
-def _axis(fit: bytes, confirm: bytes) -> tuple[Problem, Problem]:
-    records = axis_records(fit, confirm)
-    return pose_axis(records[:1], records[1:], axis_reference(records[:1], None, records[1:]))
+def posed(fit: bytes, confirm: bytes, texts: tuple[str, str] | None) -> tuple[Problem, Problem]:
+    """What is asked of a case, of its records to fit and to confirm, as Parquet.
 
+    Args:
+        fit, confirm: the records.
+        texts: of the files of vehicle and model; None: an axis.
 
-def _vehicle(fit: bytes, confirm: bytes, vehicle: str, model: str) -> tuple[Problem, Problem]:
+    Raises:
+        UserError: nothing can be asked of these records.
+    """
+    if texts is None:
+        axes = axis_records(fit, confirm)
+        return pose_axis(axes[:1], axes[1:], axis_reference(axes[:1], None, axes[1:]))
     records = vehicle_records(fit, confirm)
-    return pose_vehicle(records[:1], records[1:], *described(vehicle, model)).problems
+    return pose_vehicle(records[:1], records[1:], *described(*texts)).problems
 
 
 def oracle_rates(folder: ExamFolder, cases: Sequence[Case], false_alarms: float) -> dict[float, Rate]:

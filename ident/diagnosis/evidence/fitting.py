@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.evidence.evidence import Evidence
-from ident.diagnosis.evidence.misfit import excess_of_scatter, tempered
+from ident.diagnosis.evidence.misfit import scatter_along, tempered
 from ident.diagnosis.evidence.state import State
 from ident.diagnosis.evidence.tables import Member, Members
 from ident.diagnosis.hypotheses.bends import Bends, Bent, Form
@@ -174,8 +174,8 @@ class Fitter:
         columns, target, expected = self._rows(state)
         white, _ = self._colours.white(np.column_stack([columns, target]), state.evidence.sizes)
         white, stretch, places = white[chosen], self._colours.stretch[chosen], self._places(state.members)
-        ratios = excess_of_scatter(white[:, :-1], white[:, -1], expected, stretch, list(places.values()))
-        return dict(zip(places, ratios, strict=True))
+        scatters = scatter_along(white[:, :-1], white[:, -1], expected, stretch, list(places.values()))
+        return {index: one.excess for index, one in zip(places, scatters, strict=True)}
 
     def odds(self, state: State, index: int, bare: State) -> float:
         """Log odds of a member against nothing in its place, evidence tempered; `bare` is the set without it."""

@@ -26,8 +26,9 @@ from ident.diagnosis.observations.linear import RANK, starts_of
 
 Array = NDArray[np.float64]
 
-BELIEVED: Final = 4.0
-"""Degrees of freedom of what is believed of a ratio beforehand: it is known to within a factor of two."""
+BELIEVED: Final = 16.0
+"""Degrees of freedom of what is believed of a ratio beforehand: what the most likely scatter of ratios has, over all
+names of vehicles that lack nothing."""
 
 
 def tempered(log: float, cost: float, excess: float) -> float:
@@ -35,12 +36,36 @@ def tempered(log: float, cost: float, excess: float) -> float:
     return (log + cost) / excess - cost
 
 
-def excess_of_scatter(
-    white: Array, target: Array, known: tuple[Array, Array], stretch: NDArray[np.int64], places: Sequence[slice]
-) -> list[float]:
-    """Variance of the coefficients along what is found of every member, by the sandwich over that by the noise; >= 1.
+@dataclass(frozen=True)
+class Scatter:
+    """How rows scatter in a direction of the coefficients in which the variance is one by the noise.
 
-    What few stretches tell is shrunk to that of all other directions.
+    What is known otherwise, the priors included, or by a single stretch, is as uncertain as it says.
+
+    Attributes:
+        told: variance by the sandwich.
+        expected: of it, were the noise as it says.
+        freedom: degrees of freedom of what is told.
+        elsewhere: the same ratio of all other directions together.
+    """
+
+    told: float = 0.0
+    expected: float = 0.0
+    freedom: float = 0.0
+    elsewhere: float = 1.0
+
+    @property
+    def excess(self) -> float:
+        """Variance that is believed, at least one: what few stretches tell is shrunk to that of all others."""
+        weight = self.freedom / (BELIEVED + self.freedom)
+        believed = weight * self.told + (1 - weight) * max(self.elsewhere, 1.0) * self.expected
+        return max(1 - self.expected + believed, 1.0)
+
+
+def scatter_along(
+    white: Array, target: Array, known: tuple[Array, Array], stretch: NDArray[np.int64], places: Sequence[slice]
+) -> list[Scatter]:
+    """How rows scatter along what is found of every member.
 
     Args:
         white: (n, k) rows in units of the noise, of coefficients of unit variance.
@@ -57,13 +82,13 @@ def excess_of_scatter(
     inverse = basis @ basis.T
     found = inverse @ (white.T @ target + beside.T @ wanted)
     sandwich = _Sandwich.of(white @ basis, target - white @ found, stretch)
-    ratios = []
+    scatters = []
     for place in places:
         turned = np.linalg.solve(inverse[place, place], found[place])
         by_noise = float(found[place] @ turned)
         along = basis[place].T @ turned
-        ratios.append(max(sandwich.ratio(along / math.sqrt(by_noise)), 1.0) if by_noise > 0 else 1.0)
-    return ratios
+        scatters.append(sandwich.along(along / math.sqrt(by_noise)) if by_noise > 0 else Scatter())
+    return scatters
 
 
 @dataclass(frozen=True)
@@ -96,12 +121,9 @@ class _Sandwich:
             expected += float(np.sum(weighted**2) - np.sum((rows.T @ weighted) ** 2))
         return scatter, expected
 
-    def ratio(self, along: Array) -> float:
-        """Variance in a direction (k,) of unit length, in which it is one by the noise.
-
-        What is known otherwise, the priors included, or by a single stretch, is as uncertain as it says.
-        """
-        weights = [weighted @ along for weighted in self.weighted]
+    def along(self, direction: Array) -> Scatter:
+        """In a direction (k,) of unit length, in which the variance is one by the noise."""
+        weights = [weighted @ direction for weighted in self.weighted]
         scatter = sum(float(own @ left) ** 2 for own, left in zip(weights, self.residuals, strict=True))
         # Trace of the covariance of these sums, were the noise as it says, and that of its square.
         squares = np.array([float(own @ own) for own in weights])
@@ -110,10 +132,8 @@ class _Sandwich:
         expected = float(np.sum(squares - shared))
         square = float(np.sum(squares**2 - 2 * squares * shared) + np.sum((fitted.T @ fitted) ** 2))
         freedom = expected**2 / square if square > 0 else 0.0
-        elsewhere = [whole - own for whole, own in zip(self._everywhere, (scatter, expected), strict=True)]
-        believed = max(elsewhere[0] / elsewhere[1], 1.0) if elsewhere[1] > RANK else 1.0
-        told = freedom / (BELIEVED + freedom)
-        return 1 - expected + told * scatter + (1 - told) * believed * expected
+        others = [whole - own for whole, own in zip(self._everywhere, (scatter, expected), strict=True)]
+        return Scatter(scatter, expected, freedom, others[0] / others[1] if others[1] > RANK else 1.0)
 
 
 def _as_without_leverage(rows: Array) -> Array:

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ident.diagnosis.noise.autoregression import autocovariance
 from ident.diagnosis.observations.linear import ROUNDING, rms
 from ident.diagnosis.observations.regression import Regression
 from ident.diagnosis.observations.rows import Kept, Rows
@@ -220,7 +219,7 @@ def _of(regression: Regression, left: Left | None) -> Whitener:
     """Noise of rows without repeats: of what a set leaves, or the parameters and the strongest candidates."""
     if left is None:
         left = regression.left_beside(regression.columns_of(regression.strongest))
-    return whitener_of(regression.rows, colours_of(regression.rows, left, autocovariance))
+    return whitener_of(regression.rows, colours_of(regression.rows, left))
 
 
 def _of_sizes(deviations: Array, correlation: Array) -> Array:

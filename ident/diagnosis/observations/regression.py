@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.observations.autoregression import ORDER
 from ident.diagnosis.observations.directions import Directions, White, directions
 from ident.diagnosis.observations.linear import least_squares, unit_of
 from ident.diagnosis.observations.rows import Rows
 from ident.diagnosis.observations.whitening import (
-    ORDER,
     Colour,
     Left,
     Whitener,

@@ -7,7 +7,8 @@ prevail, and where nothing repeats, the colour is that of what is left.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -16,13 +17,12 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.observations.autoregression import ORDER, autocovariance
 from ident.diagnosis.observations.linear import starts_of
 from ident.diagnosis.observations.rows import Rows
 
 Array = NDArray[np.float64]
 
-ORDER: Final = 20
-"""Of the autoregression: slow noise hides below fast noise, and shows only over many rows."""
 TOLERATED_MEMORY: Final = 0.5
 """Correlation time of what is tolerated [s]: it is model error, and as slow as the motion."""
 PREVAILING: Final = 2.0
@@ -118,10 +118,6 @@ class Left:
     fitted: float
 
 
-Autocovariance = Callable[[Array, NDArray[np.int64]], Array]
-"""Of a residual (n,), runs behind each other, and how many rows of its run lie before each: (ORDER + 1,)."""
-
-
 def colours_of_repeats(rows: Rows, residuals: Sequence[Array]) -> tuple[Colour, ...]:
     """Colour of the noise in the mean over the repeats, by group, from what differs between them.
 
@@ -129,25 +125,40 @@ def colours_of_repeats(rows: Rows, residuals: Sequence[Array]) -> tuple[Colour, 
         rows: of all blocks.
         residuals: of every block, (N,), of any model: what repeats in them cancels.
     """
-    groups = int(rows.group.max(initial=-1)) + 1
     ages = row_ages(rows)
-    sums, counts, means = np.zeros((groups, ORDER + 1)), np.zeros(groups, dtype=int), np.zeros(groups)
+    differing: dict[int, list[_Differing]] = {}
     for (_, kept), place, residual in zip(rows.blocks, rows.block_slices, residuals, strict=True):
-        repeats, length = kept.samples.shape
-        if repeats < 2 or length == 0:
-            continue
-        group, age = rows.group[place.start], ages[place]
-        deviations = residual[kept.samples] - residual[kept.samples].mean(axis=0)
-        for lag in range(ORDER + 1):
-            later = np.flatnonzero(age >= lag)
-            sums[group, lag] += np.sum(deviations[:, later] * deviations[:, later - lag]) / repeats
-        counts[group] += (repeats - 1) * length
-        means[group] += length
-    complete = means == np.bincount(rows.group, minlength=groups)
-    return tuple(
-        Colour(total / max(count, 1), int(count) if whole else 0)
-        for total, count, whole in zip(sums, counts, complete, strict=True)
-    )
+        if place.stop > place.start:
+            own = _differing(residual[kept.samples], ages[place])
+            differing.setdefault(int(rows.group[place.start]), []).append(own)
+    return tuple(_colour_of(differing[group]) for group in sorted(differing))
+
+
+@dataclass(frozen=True)
+class _Differing:
+    """What differs between the repeats of a block, as large as it is in their mean, behind each other.
+
+    Attributes:
+        values, ages: (P m,) it, and how many rows of its run lie before each.
+        freedom: of it; 0 where nothing repeats.
+    """
+
+    values: Array
+    ages: NDArray[np.int64]
+    freedom: int
+
+
+def _differing(residual: Array, ages: NDArray[np.int64]) -> _Differing:
+    """Of repeats (P, m): the mean has 1/P of what each has, and takes as much of it off."""
+    repeats, length = residual.shape
+    values = (residual - residual.mean(axis=0)) / math.sqrt(max(repeats - 1, 1))
+    return _Differing(values.ravel(), np.tile(ages, repeats), (repeats - 1) * length)
+
+
+def _colour_of(blocks: Sequence[_Differing]) -> Colour:
+    values, ages = np.concatenate([one.values for one in blocks]), np.concatenate([one.ages for one in blocks])
+    count = sum(one.freedom for one in blocks) if all(one.freedom for one in blocks) else 0
+    return Colour(autocovariance(values, ages), count)
 
 
 def fit_whitener(
@@ -161,7 +172,7 @@ def fit_whitener(
 
     `repeats` are the colours of `colours_of_repeats`; without them, only what is left has one.
     """
-    colours = colours_of(rows, Left(residual, freedom_lost), _through_window)
+    colours = colours_of(rows, Left(residual, freedom_lost))
     if repeats is not None:
         colours = [
             known if known.count and own.covariance[0] <= PREVAILING * known.covariance[0] else own
@@ -170,8 +181,8 @@ def fit_whitener(
     return whitener_of(rows, colours, order)
 
 
-def colours_of(rows: Rows, left: Left, autocovariance: Autocovariance) -> Sequence[Colour]:
-    """Colour of what is left of every group of rows, by an estimate of the autocovariance of its runs."""
+def colours_of(rows: Rows, left: Left) -> Sequence[Colour]:
+    """Colour of what is left of every group of rows."""
     inflation, age = len(rows) / max(len(rows) - left.fitted, 1.0), row_ages(rows)
     places = [np.flatnonzero(rows.group == group) for group in range(int(rows.group.max(initial=-1)) + 1)]
     return [Colour(inflation * autocovariance(left.residual[own], age[own]), len(own)) for own in places]
@@ -192,14 +203,6 @@ def _tolerated(rows: Rows) -> Array:
             group = rows.group[place.start]
             found[group] = np.maximum(found[group], block.tolerance**2 * np.exp(-memory))
     return found
-
-
-def _through_window(residual: Array, age: NDArray[np.int64]) -> Array:
-    covariance = np.empty(ORDER + 1)
-    for lag in range(ORDER + 1):
-        later = np.flatnonzero(age >= lag)
-        covariance[lag] = residual[later] @ residual[later - lag]
-    return covariance / max(len(residual), 1)
 
 
 def predictor_of(colour: Colour) -> Predictor:

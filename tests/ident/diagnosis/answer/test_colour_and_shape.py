@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy import linalg, signal
 
 from ident.diagnosis.answer.judge import judge
 from ident.diagnosis.observations.regression import Regression
-from ident.diagnosis.observations.rows import make_rows
+from ident.diagnosis.observations.rows import Rows, make_rows
 from ident.diagnosis.observations.whitening import colours_of_repeats, fit_whitener
 from ident.diagnosis.problem import Block, Candidate, Problem, Variant
 from ident.effects import EffectParameter
@@ -38,6 +39,29 @@ def test_the_colour_of_repeats_is_that_of_their_mean(world: type[Any]) -> None:
     problem = world(seed=4, samples=4000).problem(0)
     for colour in colours_of_repeats(make_rows(problem), residuals(problem)):
         assert colour.covariance[0] == pytest.approx(0.25, rel=0.1)
+
+
+def test_the_colour_of_short_repeats_is_steep_where_their_noise_is(world: type[Any]) -> None:
+    """Four repeats of some eighty rows of what falls off by four orders: through their window it would be flat."""
+    problem, errors = world(seed=4, samples=400).problem(0), []
+    rows = make_rows(problem)
+    for seed in range(20):
+        made = _of_two_poles(problem, rows, seed, 0.95)
+        for colour in colours_of_repeats(rows, made):
+            weights = linalg.solve_toeplitz(colour.covariance[:6], colour.covariance[1:7])
+            errors.append(float(np.sqrt(colour.covariance[0] - weights @ colour.covariance[1:7])))
+    assert np.median(errors) == pytest.approx(0.5, rel=0.1)
+
+
+def _of_two_poles(problem: Problem, rows: Rows, seed: int, poles: float) -> list[Array]:
+    """Residuals whose rows are an autoregression with innovations of unit variance, another one in every repeat."""
+    generator, found = np.random.default_rng(seed), []
+    for block, (_, kept) in zip(problem.blocks, rows.blocks, strict=True):
+        drawn = generator.normal(size=(len(kept.samples), 500 + kept.samples.shape[1]))
+        residual = np.zeros(len(block.target))
+        residual[kept.samples] = signal.lfilter([1.0], np.poly([poles, poles]), drawn)[:, 500:]
+        found.append(residual)
+    return found
 
 
 def test_without_repeats_the_colour_is_that_of_what_is_left(world: type[Any]) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy import stats
 
-from ident.diagnosis.evidence.misfit import BELIEVED, excess_of_scatter
+from ident.diagnosis.evidence.misfit import BELIEVED, scatter_along
 
 NOTHING = np.zeros((0, 3)), np.zeros(0)
 STRETCHES = 3000
@@ -21,9 +23,14 @@ def rows(copies: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return repeated[0], repeated[1], repeated[2]
 
 
+def excess_along(*rows: Any) -> list[float]:
+    """What likelihoods of members are tempered by."""
+    return [one.excess for one in scatter_along(*rows)]
+
+
 def test_rows_of_white_noise_are_taken_as_they_are() -> None:
     white, target, stretch = rows(1)
-    ratios = excess_of_scatter(white, target, NOTHING, stretch, [slice(0, 1), slice(1, 3)])
+    ratios = excess_along(white, target, NOTHING, stretch, [slice(0, 1), slice(1, 3)])
     assert ratios == pytest.approx([1.0, 1.0], abs=0.2)
     assert min(ratios) >= 1.0
 
@@ -31,14 +38,14 @@ def test_rows_of_white_noise_are_taken_as_they_are() -> None:
 @pytest.mark.parametrize("copies", [4, 10])
 def test_a_row_said_many_times_is_said_once(copies: int) -> None:
     white, target, stretch = rows(copies)
-    ratios = excess_of_scatter(white, target, NOTHING, stretch, [slice(0, 1), slice(1, 3)])
+    ratios = excess_along(white, target, NOTHING, stretch, [slice(0, 1), slice(1, 3)])
     assert ratios == pytest.approx([copies, copies], rel=0.25)
 
 
 def test_what_is_known_otherwise_does_not_scatter() -> None:
     white, target, stretch = rows(10)
     known = np.array([[1e4, 0.0, 0.0]]), np.array([2e4])
-    ratios = excess_of_scatter(white, target, known, stretch, [slice(0, 1), slice(1, 3)])
+    ratios = excess_along(white, target, known, stretch, [slice(0, 1), slice(1, 3)])
     assert ratios[0] == pytest.approx(1.0, abs=0.01)
     assert ratios[1] > 5
 
@@ -50,7 +57,7 @@ def test_the_scatter_of_few_stretches_is_told_though_what_is_fitted_follows_thei
     white[stretch > 2, 1] = 0.0
     noise = np.where(stretch > 2, 1.0, 3.0) * draw.normal(size=(400, 600))
     targets = white @ [2.0, 5.0, -5.0] + noise
-    ratios = [excess_of_scatter(white, target, NOTHING, stretch, [slice(1, 2)])[0] for target in targets]
+    ratios = [excess_along(white, target, NOTHING, stretch, [slice(1, 2)])[0] for target in targets]
     # In the others a twentieth of all rows is as noisy.
     elsewhere = 1 + 8 / 20
     told = 2 / (2 + BELIEVED)
@@ -58,12 +65,12 @@ def test_the_scatter_of_few_stretches_is_told_though_what_is_fitted_follows_thei
 
 
 def test_few_stretches_say_little_that_the_others_do_not() -> None:
-    """Variances of two degrees of freedom, each shrunk to one that is known to four."""
+    """Variances of two degrees of freedom, each shrunk to what is believed of it."""
     draw, stretch = np.random.default_rng(7), np.repeat(np.arange(60), 10)
     white = draw.normal(size=(600, 3))
     white[stretch > 2, 1] = 0.0
     targets = white @ [2.0, 5.0, -5.0] + draw.normal(size=(400, 600))
-    ratios = [excess_of_scatter(white, target, NOTHING, stretch, [slice(1, 2)])[0] for target in targets]
+    ratios = [excess_along(white, target, NOTHING, stretch, [slice(1, 2)])[0] for target in targets]
     told = 2 / (2 + BELIEVED)
     assert np.quantile(ratios, 0.95) == pytest.approx(1 + told * (stats.chi2(2).ppf(0.95) / 2 - 1), rel=0.15)
 
@@ -73,4 +80,4 @@ def test_what_a_single_stretch_tells_is_taken_as_it_is() -> None:
     white = draw.normal(size=(600, 3))
     white[:, 1] = 1e5 * (stretch == 7)
     target = white @ [2.0, 5e-5, -5.0] + 3.0 * draw.normal(size=600)
-    assert excess_of_scatter(white, target, NOTHING, stretch, [slice(1, 2)]) == pytest.approx([1.0], abs=0.01)
+    assert excess_along(white, target, NOTHING, stretch, [slice(1, 2)]) == pytest.approx([1.0], abs=0.01)

@@ -7,8 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import linalg, signal
 
-from ident.diagnosis.noise.autoregression import autocovariance
-from ident.diagnosis.observations.whitening import ORDER
+from ident.diagnosis.observations.autoregression import ORDER, autocovariance
 
 Array = NDArray[np.float64]
 LENGTH = 600

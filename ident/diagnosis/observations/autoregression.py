@@ -1,19 +1,22 @@
-"""Colour of what is left of rows that nothing repeats, by Burg's autoregression.
+"""Colour of rows by Burg's autoregression.
 
-What is left is filtered, and mostly slow: its spectrum falls by many orders. Autocovariances of a record (Yule and
-Walker) see that through the window of its length, whose side lobes are then the noise that is taken for its fast part.
-Burg (1967) minimizes the errors of predictions forward and backward within the record and knows no window (Kay, Modern
+They are filtered, and mostly slow: their spectrum falls by many orders. Autocovariances of a record (Yule and Walker)
+see that through the window of its length, whose side lobes are then the noise that is taken for its fast part. Burg
+(1967) minimizes the errors of predictions forward and backward within the record and knows no window (Kay, Modern
 Spectral Estimation, 1988, chapter 7). What is whitened keeps a floor of `whitening.TAPER` of the variance all the same.
 """
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.observations.whitening import ORDER
-
 Array = NDArray[np.float64]
+
+ORDER: Final = 20
+"""Of the autoregression: slow noise hides below fast noise, and shows only over many rows."""
 
 
 def autocovariance(residual: Array, age: NDArray[np.int64]) -> Array:
