@@ -6,15 +6,17 @@
 
 Of the cases of an exam that lack nothing. Along a name, what the rows tell of it has a square of one in units of the
 noise, in the mean over all names and cases; above it noise is told too small, below it too large. How far rows scatter
-about it, stretch by stretch over the noise, is one in the mean; beyond what few stretches scatter by chance the ratio
-has a spread of its own, an inverse chi-squared. The likeliest degrees of freedom of that are what `BELIEVED` is in
-`ident/diagnosis/evidence/misfit.py`. What acts mostly on rolling is told apart: its rows have a tolerance.
+about it, stretch by stretch over the noise, is one in the mean, or what all other directions scatter there; beyond what
+few stretches do by chance the ratio of both has a spread of its own, an inverse chi-squared. The likeliest degrees of
+freedom of that are what `BELIEVED` is in `ident/diagnosis/evidence/misfit.py`. Names of a case share rows: the
+likelihood counts them as if they did not. What acts mostly on rolling is told apart: its rows have a tolerance.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -33,6 +35,7 @@ from ident.diagnosis.noise.colours import Colours
 from ident.diagnosis.observations.orders import with_orders
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.search.asked import Asked, asked_of
+from ident.errors import UserError
 
 Array = NDArray[np.float64]
 
@@ -80,16 +83,17 @@ def told_by(asked: Asked) -> Iterator[Told]:
     for number, one in enumerate(design.hypotheses):
         if one.free or number in fitter.invisible:
             continue
-        own = columns[:, one.blocks[0].place]
+        shown = next(block for block in one.blocks if np.any(columns[:, block.place]))
+        own = columns[:, shown.place]
         own = own * (FAR / np.maximum(np.linalg.norm(own, axis=0), np.finfo(float).tiny))
         rows, place = np.hstack([baseline, own]), slice(width, width + own.shape[1])
         known = np.zeros((0, rows.shape[1])), np.zeros(0)
         (scatter,) = scatter_along(rows, target, known, colours.stretch, [place])
         rolls = bool(np.sum(own[kinematic] ** 2) > np.sum(own[~kinematic] ** 2))
-        yield Told(_square(baseline, own, target), scatter, rolls)
+        yield Told(square_along(baseline, own, target), scatter, rolls)
 
 
-def _square(baseline: Array, own: Array, target: Array) -> float:
+def square_along(baseline: Array, own: Array, target: Array) -> float:
     """Of what rows tell along columns (n, k) beside others, whose coefficients have unit variance; over their rank."""
     width = baseline.shape[1]
     beside = np.vstack([baseline, np.eye(width)])
@@ -108,8 +112,11 @@ def of_case(folder: ExamFolder, of_axes: bool, identifier: str) -> list[Told]:
 
 
 def likelihoods(scatters: Sequence[Scatter]) -> dict[int, float]:
-    """Log likelihood of the ratios, one of them, by degrees of freedom beforehand, at the likeliest ratio."""
-    ratios = np.array([one.told / one.expected for one in scatters])
+    """Log likelihood of a ratio, in the mean over all, by degrees of freedom that are believed beforehand.
+
+    Of ratios over those of all other directions in the same stretches, about their likeliest.
+    """
+    ratios = np.array([one.told / (one.expected * one.elsewhere) for one in scatters])
     freedom = np.array([one.freedom for one in scatters])
 
     def log(of: int, usual: float) -> float:
@@ -152,7 +159,12 @@ def main() -> None:
         exam = read_exam(folder)
         for case in open_cases(folder, own_key(folder, exam, asked.key)):
             if case.kind is Kind.NONE and folder.complete(case.identifier):
-                told += of_case(folder, exam.of_axes, case.identifier)
+                try:
+                    told += of_case(folder, exam.of_axes, case.identifier)
+                except UserError as refused:
+                    print(f"{case.identifier} is passed over: {refused}", file=sys.stderr)
+    if not told:
+        parser.error("none of these exams has records of a case that lacks nothing: seal one with --none 12")
     print("\n".join(report(told)))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.diagnosis import Gap, Share
+from ident.diagnosis.observations.linear import ROUNDING, rms
 from ident.diagnosis.observations.rows import Kept, Rows
 from ident.diagnosis.problem import Block
 
@@ -43,7 +44,8 @@ def noise_floors(rows: Rows, models: Series, left: Array) -> Array:
         total, count = pooled[label]
         if freedom == 0:
             variance = total / count if count else float(np.mean(left[place] ** 2)) if left[place].size else 0.0
-        values.append(np.hypot(np.sqrt(variance), block.tolerance))
+        # Repeats that are the same to the last digit have the noise of that digit.
+        values.append(math.hypot(math.sqrt(variance), block.tolerance, ROUNDING * rms(block.target)))
     return np.maximum(values, np.finfo(float).tiny)
 
 

@@ -34,8 +34,8 @@ def autocovariance(residual: Array, age: NDArray[np.int64]) -> Array:
         later = np.flatnonzero(age >= order)
         ahead, behind = forward[later], backward[later - 1]
         power = 0.5 * float(ahead @ ahead + behind @ behind)
-        # Fewer rows than coefficients, at the ends of the longest runs, predict nothing.
-        reflection = float(ahead @ behind) / power if power > 0 and len(later) >= ORDER else 0.0
+        # Hardly more rows than coefficients, at the ends of the longest runs, predict nothing.
+        reflection = float(ahead @ behind) / power if power > 0 and len(later) >= 2 * order else 0.0
         found[order] = reflection * variance + weights @ found[order - 1 : 0 : -1]
         weights = np.append(weights - reflection * weights[::-1], reflection)
         variance *= 1 - reflection**2

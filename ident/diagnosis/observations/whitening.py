@@ -16,6 +16,7 @@ from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
 from ident.diagnosis.observations.autoregression import ORDER, autocovariance
 from ident.diagnosis.observations.linear import starts_of
@@ -27,6 +28,8 @@ TOLERATED_MEMORY: Final = 0.5
 """Correlation time of what is tolerated [s]: it is model error, and as slow as the motion."""
 PREVAILING: Final = 2.0
 """Power of what is left, over that of the noise in the mean of the repeats, from which model errors prevail."""
+ROWS_PER_ORDER: Final = 20
+"""Rows that every order of an autoregression is fitted to at least."""
 STRIDE: Final = 128
 """Rows that are whitened at once."""
 TAPER: Final = 1e-4
@@ -126,39 +129,33 @@ def colours_of_repeats(rows: Rows, residuals: Sequence[Array]) -> tuple[Colour, 
         residuals: of every block, (N,), of any model: what repeats in them cancels.
     """
     ages = row_ages(rows)
-    differing: dict[int, list[_Differing]] = {}
+    differing: dict[int, list[Array]] = {}
+    behind: dict[int, list[NDArray[np.int64]]] = {}
     for (_, kept), place, residual in zip(rows.blocks, rows.block_slices, residuals, strict=True):
         if place.stop > place.start:
-            own = _differing(residual[kept.samples], ages[place])
-            differing.setdefault(int(rows.group[place.start]), []).append(own)
-    return tuple(_colour_of(differing[group]) for group in sorted(differing))
+            group, repeats = int(rows.group[place.start]), len(kept.samples)
+            # P - 1 independent contrasts of P repeats, each as large as what is left in their mean.
+            contrasts = linalg.helmert(repeats) @ residual[kept.samples] / math.sqrt(repeats)
+            differing.setdefault(group, []).append(contrasts)
+            behind.setdefault(group, []).append(np.tile(ages[place], repeats - 1))
+    return tuple(_colour_of(differing[group], np.concatenate(behind[group])) for group in sorted(differing))
 
 
-@dataclass(frozen=True)
-class _Differing:
-    """What differs between the repeats of a block, as large as it is in their mean, behind each other.
+def _colour_of(blocks: Sequence[Array], ages: NDArray[np.int64]) -> Colour:
+    """Of contrasts (P - 1, m) of every block; the errors of predictions are those of rows that they are not made of.
 
-    Attributes:
-        values, ages: (P m,) it, and how many rows of its run lie before each.
-        freedom: of it; 0 where nothing repeats.
+    An autoregression of order d leaves 1 - d/n of the noise of the n rows that it is fitted to, and 1 + d/n of that of
+    others (Akaike 1969); the mean of the repeats is independent of what differs between them.
     """
-
-    values: Array
-    ages: NDArray[np.int64]
-    freedom: int
-
-
-def _differing(residual: Array, ages: NDArray[np.int64]) -> _Differing:
-    """Of repeats (P, m): the mean has 1/P of what each has, and takes as much of it off."""
-    repeats, length = residual.shape
-    values = (residual - residual.mean(axis=0)) / math.sqrt(max(repeats - 1, 1))
-    return _Differing(values.ravel(), np.tile(ages, repeats), (repeats - 1) * length)
+    values = np.concatenate([one.ravel() for one in blocks])
+    count = len(values) if all(len(one) for one in blocks) else 0
+    order = _depth(count)
+    return Colour(autocovariance(values, ages) * ((count + order) / max(count - order, 1)), count)
 
 
-def _colour_of(blocks: Sequence[_Differing]) -> Colour:
-    values, ages = np.concatenate([one.values for one in blocks]), np.concatenate([one.ages for one in blocks])
-    count = sum(one.freedom for one in blocks) if all(one.freedom for one in blocks) else 0
-    return Colour(autocovariance(values, ages), count)
+def _depth(count: int, most: int = ORDER) -> int:
+    """Order of an autoregression that so many rows bear."""
+    return min(most, count // ROWS_PER_ORDER)
 
 
 def fit_whitener(
@@ -211,7 +208,7 @@ def predictor_of(colour: Colour) -> Predictor:
 
 
 def _predictor(colour: Colour, tolerated: Array, order: int) -> Predictor:
-    depth = min(order, colour.count // 20)
+    depth = _depth(colour.count, order)
     covariance = colour.covariance[: depth + 1] + tolerated[: depth + 1]
     covariance[0] = max(covariance[0] * (1 + TAPER), np.finfo(float).tiny)
     return _levinson(covariance)

@@ -170,12 +170,16 @@ def warming(time: float, _x: float, v: float) -> float:
 
 
 def test_what_warms_up_is_no_noise_though_repeats_differ_by_it() -> None:
-    machine = Machine(law=warming)
-    records = [machine.drive(11)], [machine.drive(12)]
-    (cause,) = diagnose_axis(*records, seed=1).causes
-    assert cause.candidate.effect == "friction_warming"
-    assert cause.part.std[0] < 0.15
-    assert cause.part.values[0] == pytest.approx(-3.2, abs=2 * cause.part.std[0])
+    """How surely it is told depends on a time constant that is told as well, and on the axis: in most to 3 %."""
+    stds = list[float]()
+    for seed in (11, 21, 31):
+        machine = Machine(law=warming)
+        records = [machine.drive(seed)], [machine.drive(seed + 1)]
+        (cause,) = diagnose_axis(*records, seed=1).causes
+        assert cause.candidate.effect == "friction_warming"
+        assert cause.part.values[0] == pytest.approx(-3.2, abs=2 * cause.part.std[0])
+        stds.append(cause.part.std[0])
+    assert np.median(stds) < 0.15
     findings = diagnose_axis(*records, seed=1, lacking=("friction_warming",))
     (cause,) = findings.causes
     assert cause.law_answer is not None

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.axis.diagnose import diagnose_axis
 from ident.diagnosis.dependence import path_since_reversal
 from ident.diagnosis.diagnosis import Verdict
@@ -160,10 +161,14 @@ def test_friction_that_warms_up_is_no_noise(machine: Make, known: bool) -> None:
 
 
 def test_slow_noise_of_the_effort_is_no_law_of_time(machine: Make) -> None:
-    for seed in (21, 31, 41):
+    """Nor a name, more often than one time in twenty: of twelve axes twice by chance in one of eight."""
+    found = list[Findings]()
+    for seed in range(21, 141, 10):
         plain = machine()
         records = [plain.drive(seed), plain.drive(seed + 1)]
-        assert diagnose_axis(records[:1], records[1:], seed=1).verdict is Verdict.NONE
+        found.append(diagnose_axis(records[:1], records[1:], seed=1))
+    assert all(cause.law_answer is None for one in found for cause in one.causes)
+    assert sum(one.verdict is not Verdict.NONE for one in found) <= 2
 
 
 def test_what_is_within_what_a_model_may_have_wrong_is_no_law(machine: Make) -> None:

@@ -1,4 +1,4 @@
-"""The colour of what is left is that of the process it is drawn from, also where its spectrum falls by many orders."""
+"""The colour of rows is that of the process they are drawn from, also where its spectrum falls by many orders."""
 
 from __future__ import annotations
 
