@@ -6,7 +6,7 @@
 
 Of the cases of an exam that lack nothing. Along a name, what the rows tell of it has a square of one in units of the
 noise, in the mean over all names and cases; above it noise is told too small, below it too large. How far rows scatter
-about it, stretch by stretch over the noise, is one in the mean, or what all other directions scatter there; beyond what
+about it, stretch by stretch over the noise, is one in the mean, or what all other directions scatter; beyond what
 few stretches do by chance the ratio of both has a spread of its own, an inverse chi-squared. The likeliest degrees of
 freedom of that are what `BELIEVED` is in `ident/diagnosis/evidence/misfit.py`. Names of a case share rows: the
 likelihood counts them as if they did not. What acts mostly on rolling is told apart: its rows have a tolerance.
@@ -114,7 +114,7 @@ def of_case(folder: ExamFolder, of_axes: bool, identifier: str) -> list[Told]:
 def likelihoods(scatters: Sequence[Scatter]) -> dict[int, float]:
     """Log likelihood of a ratio, in the mean over all, by degrees of freedom that are believed beforehand.
 
-    Of ratios over those of all other directions in the same stretches, about their likeliest.
+    Of ratios over those of all other directions, about their likeliest.
     """
     ratios = np.array([one.told / (one.expected * one.elsewhere) for one in scatters])
     freedom = np.array([one.freedom for one in scatters])

@@ -6,7 +6,7 @@ power of the inverse of the ratio before they are integrated (Pauli, Racugno and
 the rows of a stretch that has much of a member: so residuals of a stretch are made as large as they would be without,
 by the leverage of its rows, and the ratio is one in the mean where the noise is as it says (Bell and McCaffrey 2002).
 A member that few stretches have is told a ratio of few degrees of freedom, by accident anything: what is believed
-beforehand, that it is the ratio of all other directions in these stretches, counts beside it (scaled inverse
+beforehand, that it is the ratio of all other directions, counts beside it (scaled inverse
 chi-squared; Gelman et al. 2013, 2.6).
 """
 
@@ -26,9 +26,8 @@ from ident.diagnosis.observations.linear import RANK, starts_of
 
 Array = NDArray[np.float64]
 
-BELIEVED: Final = 16.0
-"""Degrees of freedom of what is believed of a ratio beforehand: the likeliest over names that act on forces, of
-vehicles that lack nothing (`examples/scatter_along_names.py`)."""
+BELIEVED: Final = 4.0
+"""Degrees of freedom of what is believed of a ratio beforehand: it is known to within a factor of two."""
 
 
 def tempered(log: float, cost: float, excess: float) -> float:
@@ -46,7 +45,7 @@ class Scatter:
         told: variance by the sandwich.
         expected: of it, were the noise as it says.
         freedom: degrees of freedom of what is told.
-        elsewhere: told over expected of all other directions, in stretches weighed by what they tell of this one.
+        elsewhere: told over expected of all other directions together.
     """
 
     told: float = 0.0
@@ -56,9 +55,9 @@ class Scatter:
 
     @property
     def excess(self) -> float:
-        """Variance that is believed, at least one: what few stretches tell is shrunk to what all others do there."""
+        """Variance that is believed, at least one: what few stretches tell is shrunk to that of all others."""
         weight = self.freedom / (BELIEVED + self.freedom)
-        believed = weight * self.told + (1 - weight) * self.elsewhere * self.expected
+        believed = weight * self.told + (1 - weight) * max(self.elsewhere, 1.0) * self.expected
         return max(1 - self.expected + believed, 1.0)
 
 
@@ -131,8 +130,8 @@ class _Sandwich:
         expected = squares - shared
         square = float(np.sum(squares**2 - 2 * squares * shared) + np.sum((fitted.T @ fitted) ** 2))
         freedom = float(np.sum(expected)) ** 2 / square if square > 0 else 0.0
-        others, usual = (float(squares @ (whole - own)) for whole, own in zip(self._all, (told, expected), strict=True))
-        elsewhere = others / usual if usual > RANK * float(np.sum(squares)) else 1.0
+        others, usual = (float(np.sum(whole - own)) for whole, own in zip(self._all, (told, expected), strict=True))
+        elsewhere = others / usual if usual > RANK else 1.0
         return Scatter(float(np.sum(told)), float(np.sum(expected)), freedom, elsewhere)
 
 
