@@ -8,8 +8,9 @@ Of the cases of an exam that lack nothing. Along a name, what the rows tell of i
 noise, in the mean over all names and cases; above it noise is told too small, below it too large. How far rows scatter
 about it, stretch by stretch over the noise, is one in the mean, or what all other directions scatter; beyond what
 few stretches do by chance the ratio of both has a spread of its own, an inverse chi-squared. The likeliest degrees of
-freedom of that are to be compared with `BELIEVED` of `ident/diagnosis/evidence/misfit.py`. Names of a case share rows: the
-likelihood counts them as if they did not. What acts mostly on rolling is told apart: its rows have a tolerance.
+freedom of that are to be compared with `BELIEVED` of `ident/diagnosis/evidence/misfit.py`. Names of a case
+share rows: the likelihood counts them as if they did not. What acts mostly on rolling is told
+apart: its rows have a tolerance.
 """
 
 from __future__ import annotations
