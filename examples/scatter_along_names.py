@@ -4,13 +4,13 @@
         --pairs 0 --laws 0 --unknown 0 --invisible 0 --faults 0
     python examples/scatter_along_names.py cases
 
-Of the cases of an exam that lack nothing. Along a name, what the rows tell of it has a square of one in units of the
-noise, in the mean over all names and cases; above it noise is told too small, below it too large. How far rows scatter
-about it, stretch by stretch over the noise, is one in the mean, or what all other directions scatter; beyond what
-few stretches do by chance the ratio of both has a spread of its own, an inverse chi-squared. The likeliest degrees of
-freedom of that are to be compared with `BELIEVED` of `ident/diagnosis/evidence/misfit.py`. Names of a case
-share rows: the likelihood counts them as if they did not. What acts mostly on rolling is told
-apart: its rows have a tolerance.
+Of the cases of an exam that lack nothing, diagnosed or not. Along a name, what the rows tell of it has a square of one
+in units of the noise, in the mean over all names and cases; above it noise is told too small, below it too large. How
+far rows scatter about it, stretch by stretch over the noise, is one in the mean, or what all other directions scatter;
+beyond what few stretches do by chance the ratio of both has a spread of its own, an inverse chi-squared. The likeliest
+degrees of freedom of that are to be compared with `BELIEVED` of `ident/diagnosis/evidence/misfit.py`. Names of a case
+share rows: the likelihood counts them as if they did not. What acts mostly on rolling is told apart: its rows have a
+tolerance.
 """
 
 from __future__ import annotations
@@ -29,10 +29,11 @@ from scipy import optimize, stats
 
 from hil.exam.answer_file import open_cases, own_key
 from hil.exam.cases import Kind
-from hil.exam.folder import RECORDS, ExamFolder, read_exam
+from hil.exam.diagnosing import both_records, descriptions
+from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.oracle import posed
 from ident.diagnosis.evidence.misfit import Scatter, scatter_along
-from ident.diagnosis.noise.colours import Colours
+from ident.diagnosis.observations.linear import orthonormal
 from ident.diagnosis.observations.orders import with_orders
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.search.asked import Asked, asked_of
@@ -70,17 +71,13 @@ class Told:
 
 def told_by(asked: Asked) -> Iterator[Told]:
     """Along every name that shows, each beside the parameters of the model alone."""
-    design, colours, fitter = asked.design, Colours(asked.regression), asked.fitter
+    design, fitter, regression = asked.design, asked.fitter, asked.regression
     stacked = np.column_stack([design.baseline, design.columns, design.target])
-    white, _ = colours.white(stacked, fitter.nothing.evidence.sizes)
-    width = design.baseline.shape[1]
+    white, width = fitter.nothing.evidence.noise.apply(regression.rows, stacked), design.baseline.shape[1]
     baseline, columns, target = white[:, :width], white[:, width:-1], white[:, -1]
-    kinematic = np.concatenate(
-        [
-            np.full(one.stop - one.start, block.channel is Channel.KINEMATIC)
-            for (block, _), one in zip(colours.kept, colours.places, strict=True)
-        ]
-    )
+    kinematic = np.zeros(len(target), dtype=np.bool_)
+    for (block, _), place in zip(regression.rows.blocks, regression.rows.block_slices, strict=True):
+        kinematic[place] = block.channel is Channel.KINEMATIC
     for number, one in enumerate(design.hypotheses):
         if one.free or number in fitter.invisible:
             continue
@@ -89,7 +86,7 @@ def told_by(asked: Asked) -> Iterator[Told]:
         own = own * (FAR / np.maximum(np.linalg.norm(own, axis=0), np.finfo(float).tiny))
         rows, place = np.hstack([baseline, own]), slice(width, width + own.shape[1])
         known = np.zeros((0, rows.shape[1])), np.zeros(0)
-        (scatter,) = scatter_along(rows, target, known, colours.stretch, [place])
+        (scatter,) = scatter_along(rows, target, known, regression.stretch, [place])
         rolls = bool(np.sum(own[kinematic] ** 2) > np.sum(own[~kinematic] ** 2))
         yield Told(square_along(baseline, own, target), scatter, rolls)
 
@@ -97,18 +94,17 @@ def told_by(asked: Asked) -> Iterator[Told]:
 def square_along(baseline: Array, own: Array, target: Array) -> float:
     """Of what rows tell along columns (n, k) beside others, whose coefficients have unit variance; over their rank."""
     width = baseline.shape[1]
-    beside = np.vstack([baseline, np.eye(width)])
+    beside = orthonormal(np.vstack([baseline, np.eye(width)]))
     rest = np.vstack([np.column_stack([own, target]), np.zeros((width, own.shape[1] + 1))])
-    left = rest - beside @ np.linalg.lstsq(beside, rest, rcond=None)[0]
-    basis, size, _ = np.linalg.svd(left[:, :-1], full_matrices=False)
-    along = basis[:, size > 1e-6 * size[0]].T @ left[:, -1]
+    left = rest - beside @ (beside.T @ rest)
+    along = orthonormal(left[:, :-1]).T @ left[:, -1]
     return float(along @ along) / len(along)
 
 
 def of_case(folder: ExamFolder, of_axes: bool, identifier: str) -> list[Told]:
     """What the records of a case tell."""
-    fit, confirm = (folder.record(identifier, which).read_bytes() for which in RECORDS)
-    texts = None if of_axes else (folder.vehicle.read_text(encoding="utf-8"), folder.model.read_text(encoding="utf-8"))
+    fit, confirm = both_records(folder, identifier)
+    texts = None if of_axes else descriptions(folder)
     return list(told_by(asked_of(with_orders(posed(fit, confirm, texts)))))
 
 

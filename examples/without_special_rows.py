@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.exam.answer_file import open_cases, own_key
-from hil.exam.diagnosing import described, vehicle_records
+from hil.exam.diagnosing import both_records, described, descriptions, vehicle_records
 from hil.exam.folder import RECORDS, ExamFolder, read_exam
 from ident.diagnosis.diagnosis import NamedEffect
 from ident.diagnosis.vehicle import build
@@ -125,10 +125,9 @@ def noted(finding: set[str]) -> Iterator[None]:
 
 def said_of(identifier: str, exam: Path) -> list[str]:
     """Names, places and first sizes that are said of a case, or its verdict where it has none."""
-    fit, confirm = ((exam / "cases" / f"{identifier}.{which}.parquet").read_bytes() for which in ("fit", "confirm"))
-    records = vehicle_records(fit, confirm)
-    texts = [(exam / name).read_text(encoding="utf-8") for name in ("vehicle.toml", "model.toml")]
-    found = diagnose_vehicle(records[:1], records[1:], *described(texts[0], texts[1])).diagnosis
+    folder = ExamFolder(exam)
+    records = vehicle_records(*both_records(folder, identifier))
+    found = diagnose_vehicle(records[:1], records[1:], *described(*descriptions(folder))).diagnosis
     return [_named(one) for one in found.effects] or [str(found.verdict)]
 
 

@@ -148,13 +148,18 @@ def keep_answers(
 
 def _vehicle_task(folder: ExamFolder, removed: Mapping[str, str]) -> Callable[[str], tuple[Any, ...]]:
     """Arguments of `diagnose_case` for a case."""
-    described = [path.read_text(encoding="utf-8") for path in (folder.vehicle, folder.model)]
-    return lambda identifier: (identifier, *both_records(folder, identifier), *described, removed.get(identifier))
+    texts = descriptions(folder)
+    return lambda identifier: (identifier, *both_records(folder, identifier), *texts, removed.get(identifier))
 
 
 def _axis_task(folder: ExamFolder, removed: Mapping[str, str]) -> Callable[[str], tuple[Any, ...]]:
     """Arguments of `diagnose_axis_case` for a case."""
     return lambda identifier: (identifier, *both_records(folder, identifier), removed.get(identifier))
+
+
+def descriptions(folder: ExamFolder) -> tuple[str, str]:
+    """Texts of the files of the vehicle and of the model under test."""
+    return folder.vehicle.read_text(encoding="utf-8"), folder.model.read_text(encoding="utf-8")
 
 
 def both_records(folder: ExamFolder, identifier: str) -> tuple[bytes, ...]:

@@ -19,6 +19,7 @@ from hil.exam.diagnosing import (
     axis_records,
     both_records,
     described,
+    descriptions,
     forbid_emulator,
     keep_answers,
     refuse_undiagnosed,
@@ -67,7 +68,7 @@ def ask_oracle(
     there = with_records(folder, exam.identifiers)
     if exam.sealed:
         refuse_undiagnosed(folder, there)
-    texts = None if exam.of_axes else tuple(path.read_text(encoding="utf-8") for path in (folder.vehicle, folder.model))
+    texts = None if exam.of_axes else descriptions(folder)
 
     def task(identifier: str) -> tuple[object, ...]:
         return identifier, *both_records(folder, identifier), texts, tuple(asked[identifier])

@@ -6,13 +6,12 @@ power of the inverse of the ratio before they are integrated (Pauli, Racugno and
 the rows of a stretch that has much of a member: so residuals of a stretch are made as large as they would be without,
 by the leverage of its rows, and the ratio is one in the mean where the noise is as it says (Bell and McCaffrey 2002).
 A member that few stretches have is told a ratio of few degrees of freedom, by accident anything: what is believed
-beforehand, that it is the ratio of all other directions, counts beside it (scaled inverse
-chi-squared; Gelman et al. 2013, 2.6).
+beforehand, that it is the ratio of all other directions, counts beside it (scaled inverse chi-squared; Gelman et
+al. 2013, 2.6).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,13 +44,13 @@ class Scatter:
         told: variance by the sandwich.
         expected: of it, were the noise as it says.
         freedom: degrees of freedom of what is told.
-        elsewhere: told over expected of all other directions together.
+        elsewhere: told over expected, of all other directions together.
     """
 
-    told: float = 0.0
-    expected: float = 0.0
-    freedom: float = 0.0
-    elsewhere: float = 1.0
+    told: float
+    expected: float
+    freedom: float
+    elsewhere: float
 
     @property
     def excess(self) -> float:
@@ -83,10 +82,8 @@ def scatter_along(
     sandwich = _Sandwich.of(white @ basis, target - white @ found, stretch)
     scatters = []
     for place in places:
-        turned = np.linalg.solve(inverse[place, place], found[place])
-        by_noise = float(found[place] @ turned)
-        along = basis[place].T @ turned
-        scatters.append(sandwich.along(along / math.sqrt(by_noise)) if by_noise > 0 else Scatter())
+        along = basis[place].T @ np.linalg.solve(inverse[place, place], found[place])
+        scatters.append(sandwich.along(along / max(float(np.linalg.norm(along)), np.finfo(float).tiny)))
     return scatters
 
 
@@ -112,27 +109,27 @@ class _Sandwich:
         return cls(parts, [_as_without_leverage(part) for part in parts], np.split(residual, ends))
 
     @cached_property
-    def _all(self) -> tuple[Array, Array]:
-        """(S,) variance, and what is expected of it by the noise, of all directions together, by stretch."""
-        parts = list(zip(self.rows, self.weighted, self.residuals, strict=True))
-        told = [np.sum((left @ weighted) ** 2) for _, weighted, left in parts]
-        expected = [np.sum(weighted**2) - np.sum((rows.T @ weighted) ** 2) for rows, weighted, _ in parts]
-        return np.array(told), np.array(expected)
+    def _everywhere(self) -> tuple[float, float]:
+        """Variance, and what is expected of it by the noise, of all directions together."""
+        told = expected = 0.0
+        for rows, weighted, left in zip(self.rows, self.weighted, self.residuals, strict=True):
+            told += float(np.sum((left @ weighted) ** 2))
+            expected += float(np.sum(weighted**2) - np.sum((rows.T @ weighted) ** 2))
+        return told, expected
 
     def along(self, direction: Array) -> Scatter:
         """In a direction (k,) of unit length, in which the variance is one by the noise."""
         weights = [weighted @ direction for weighted in self.weighted]
-        told = np.array([float(own @ left) ** 2 for own, left in zip(weights, self.residuals, strict=True)])
-        # Covariance of these sums, were the noise as it says.
+        told = sum(float(own @ left) ** 2 for own, left in zip(weights, self.residuals, strict=True))
+        # Trace of the covariance of these sums, were the noise as it says, and that of its square.
         squares = np.array([float(own @ own) for own in weights])
         fitted = np.array([rows.T @ own for rows, own in zip(self.rows, weights, strict=True)])
         shared = np.sum(fitted**2, axis=1)
-        expected = squares - shared
+        expected = float(np.sum(squares - shared))
         square = float(np.sum(squares**2 - 2 * squares * shared) + np.sum((fitted.T @ fitted) ** 2))
-        freedom = float(np.sum(expected)) ** 2 / square if square > 0 else 0.0
-        others, usual = (float(np.sum(whole - own)) for whole, own in zip(self._all, (told, expected), strict=True))
-        elsewhere = others / usual if usual > RANK else 1.0
-        return Scatter(float(np.sum(told)), float(np.sum(expected)), freedom, elsewhere)
+        freedom = expected**2 / square if square > 0 else 0.0
+        others, usual = (whole - own for whole, own in zip(self._everywhere, (told, expected), strict=True))
+        return Scatter(told, expected, freedom, others / usual if usual > RANK else 1.0)
 
 
 def _as_without_leverage(rows: Array) -> Array:

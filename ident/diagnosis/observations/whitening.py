@@ -129,26 +129,25 @@ def colours_of_repeats(rows: Rows, residuals: Sequence[Array]) -> tuple[Colour, 
         residuals: of every block, (N,), of any model: what repeats in them cancels.
     """
     ages = row_ages(rows)
-    differing: dict[int, list[Array]] = {}
-    behind: dict[int, list[NDArray[np.int64]]] = {}
+    differing: dict[int, list[tuple[Array, NDArray[np.int64]]]] = {}
     for (_, kept), place, residual in zip(rows.blocks, rows.block_slices, residuals, strict=True):
         if place.stop > place.start:
-            group, repeats = int(rows.group[place.start]), len(kept.samples)
+            repeats = len(kept.samples)
             # P - 1 independent contrasts of P repeats, each as large as what is left in their mean.
             contrasts = linalg.helmert(repeats) @ residual[kept.samples] / math.sqrt(repeats)
-            differing.setdefault(group, []).append(contrasts)
-            behind.setdefault(group, []).append(np.tile(ages[place], repeats - 1))
-    return tuple(_colour_of(differing[group], np.concatenate(behind[group])) for group in sorted(differing))
+            own = contrasts.ravel(), np.tile(ages[place], repeats - 1)
+            differing.setdefault(int(rows.group[place.start]), []).append(own)
+    return tuple(_colour_of(differing[group]) for group in sorted(differing))
 
 
-def _colour_of(blocks: Sequence[Array], ages: NDArray[np.int64]) -> Colour:
-    """Of contrasts (P - 1, m) of every block; the errors of predictions are those of rows that they are not made of.
+def _colour_of(blocks: Sequence[tuple[Array, NDArray[np.int64]]]) -> Colour:
+    """Of contrasts of every block; the errors of predictions are those of rows that they are not made of.
 
     An autoregression of order d leaves 1 - d/n of the noise of the n rows that it is fitted to, and 1 + d/n of that of
     others (Akaike 1969); the mean of the repeats is independent of what differs between them.
     """
-    values = np.concatenate([one.ravel() for one in blocks])
-    count = len(values) if all(len(one) for one in blocks) else 0
+    values, ages = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    count = len(values) if all(len(one) for one, _ in blocks) else 0
     order = _depth(count)
     return Colour(autocovariance(values, ages) * ((count + order) / max(count - order, 1)), count)
 

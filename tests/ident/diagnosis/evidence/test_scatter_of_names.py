@@ -12,10 +12,7 @@ from ident.diagnosis.search.asked import asked_of
 
 
 def test_of_a_world_of_white_noise_the_report_says_so(world: type[Any]) -> None:
-    told = [
-        one
-        for seed in range(12)
-        for one in told_by(asked_of((world(seed=seed).problem(0), world(seed=seed).problem(1))))
-    ]
+    worlds = [world(seed=seed) for seed in range(12)]
+    told = [one for each in worlds for one in told_by(asked_of((each.problem(0), each.problem(1))))]
     assert np.mean([one.square for one in told]) == pytest.approx(1.0, abs=0.35)
     assert next(report(told)).startswith(f"forces: {len(told)} squares, mean ")

@@ -161,14 +161,14 @@ def test_friction_that_warms_up_is_no_noise(machine: Make, known: bool) -> None:
 
 
 def test_slow_noise_of_the_effort_is_no_law_of_time(machine: Make) -> None:
-    """Nor a name, more often than one time in twenty: of twelve axes twice by chance in one of eight."""
+    """Nor a name, of 120 axes more than once (one of the first twelve)."""
     found = list[Findings]()
     for seed in range(21, 141, 10):
         plain = machine()
         records = [plain.drive(seed), plain.drive(seed + 1)]
         found.append(diagnose_axis(records[:1], records[1:], seed=1))
     assert all(cause.law_answer is None for one in found for cause in one.causes)
-    assert sum(one.verdict is not Verdict.NONE for one in found) <= 2
+    assert sum(one.verdict is not Verdict.NONE for one in found) <= 1
 
 
 def test_what_is_within_what_a_model_may_have_wrong_is_no_law(machine: Make) -> None:
