@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
 from ident.diagnosis.evidence.evidence import Evidence
 from ident.diagnosis.evidence.misfit import scatter_along, tempered
@@ -158,11 +159,11 @@ class Fitter:
         columns, target, (beside, wanted) = self._rows(state)
         white, _ = self._colours.white(np.column_stack([columns, target]), state.evidence.sizes)
         width = columns.shape[1]
-        rows = np.vstack([white[:, :-1], beside, np.eye(width)])
-        found = np.linalg.lstsq(rows, np.concatenate([white[:, -1], wanted, np.zeros(width)]), rcond=None)[0]
+        directions, factor = np.linalg.qr(np.vstack([white[:, :-1], beside, np.eye(width)]))
+        basis = linalg.solve_triangular(factor, np.eye(width))
+        found = basis @ (directions.T @ np.concatenate([white[:, -1], wanted, np.zeros(width)]))
         # Coefficients that are known beforehand as well as the rows say are no free ones.
-        known = float(np.trace(np.linalg.inv(rows.T @ rows)))
-        return Left(target - columns @ found, width - known)
+        return Left(target - columns @ found, width - float(np.sum(basis**2)))
 
     def excess(self, state: State, chosen: NDArray[np.bool_] | slice = slice(None)) -> dict[int, float]:
         """How far rows scatter beyond their noise along every member, by which its likelihoods are tempered.
@@ -279,12 +280,12 @@ class Fitter:
         beside, wanted = self._expected_beside(state, others, len(scale))
         rows = np.vstack([white[:, :-1] * scale, own * scale, beside, np.eye(len(scale))[:width]])
         target = np.concatenate([white[:, -1], bent.expected[1], wanted, np.zeros(width)])
-        found = np.linalg.lstsq(rows, target, rcond=None)[0]
-        wished = found[-len(size) :]
-        spread = np.linalg.pinv(rows.T @ rows, hermitian=True)[-len(size) :, -len(size) :]
-        gain = 0.5 * float(wished @ np.linalg.pinv(spread, hermitian=True) @ wished)
+        # What is left of their columns beside all others, and what the rows want of that.
+        directions, factor = np.linalg.qr(rows)
+        corner, wanted = factor[-len(size) :, -len(size) :], (directions.T @ target)[-len(size) :]
+        wished = np.linalg.lstsq(corner, wanted, rcond=None)[0]
         most = FURTHEST * _range(bent.held)
-        return np.clip(wished * scale[-len(size) :], -most, most), gain
+        return np.clip(wished * scale[-len(size) :], -most, most), 0.5 * float(np.sum((corner @ wished) ** 2))
 
     def _expected_beside(self, state: State, members: Members, count: int) -> tuple[Array, Array]:
         """Rows (m, count) and (m,) of what is expected of members that stand behind the baseline."""

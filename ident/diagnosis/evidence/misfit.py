@@ -6,8 +6,8 @@ power of the inverse of the ratio before they are integrated (Pauli, Racugno and
 the rows of a stretch that has much of a member: so residuals of a stretch are made as large as they would be without,
 by the leverage of its rows, and the ratio is one in the mean where the noise is as it says (Bell and McCaffrey 2002).
 A member that few stretches have is told a ratio of few degrees of freedom, by accident anything: what is believed
-beforehand, that it is the ratio of all other directions, counts beside it (scaled inverse chi-squared; Gelman et
-al. 2013, 2.6).
+beforehand, that it is the ratio of all other directions in these stretches, counts beside it (scaled inverse
+chi-squared; Gelman et al. 2013, 2.6).
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ from ident.diagnosis.observations.linear import RANK, starts_of
 
 Array = NDArray[np.float64]
 
-BELIEVED: Final = 4.0
-"""Degrees of freedom of what is believed of a ratio beforehand: it is known to within a factor of two."""
+BELIEVED: Final = 16.0
+"""Degrees of freedom of what is believed of a ratio beforehand: the likeliest over names that act on forces, of
+vehicles that lack nothing (`examples/scatter_along_names.py`)."""
 
 
 def tempered(log: float, cost: float, excess: float) -> float:
@@ -44,7 +45,7 @@ class Scatter:
         told: variance by the sandwich.
         expected: of it, were the noise as it says.
         freedom: degrees of freedom of what is told.
-        elsewhere: told over expected, of all other directions together.
+        elsewhere: told over expected of all other directions, in stretches weighed by what they tell of this one.
     """
 
     told: float
@@ -54,9 +55,9 @@ class Scatter:
 
     @property
     def excess(self) -> float:
-        """Variance that is believed, at least one: what few stretches tell is shrunk to that of all others."""
+        """Variance that is believed, at least one: what few stretches tell is shrunk to what all others do there."""
         weight = self.freedom / (BELIEVED + self.freedom)
-        believed = weight * self.told + (1 - weight) * max(self.elsewhere, 1.0) * self.expected
+        believed = weight * self.told + (1 - weight) * self.elsewhere * self.expected
         return max(1 - self.expected + believed, 1.0)
 
 
@@ -74,15 +75,17 @@ def scatter_along(
     """
     beside, wanted = known
     width = white.shape[1]
-    factor = linalg.cholesky(np.eye(width) + white.T @ white + beside.T @ beside, lower=True)
-    # Independent directions of the coefficients, of unit variance by the noise.
-    basis = np.asarray(linalg.solve_triangular(factor, np.eye(width), lower=True).T)
-    inverse = basis @ basis.T
-    found = inverse @ (white.T @ target + beside.T @ wanted)
-    sandwich = _Sandwich.of(white @ basis, target - white @ found, stretch)
+    whole = np.concatenate([target, wanted, np.zeros(width)])
+    # Independent directions of the coefficients, of unit variance by the noise. Columns of the plant are nearly the
+    # same in units of what is known of them: their products would have lost all digits of what is left.
+    rows, factor = np.linalg.qr(np.vstack([white, beside, np.eye(width)]))
+    basis = linalg.solve_triangular(factor, np.eye(width))
+    amplitudes = rows.T @ whole
+    left, found = whole - rows @ amplitudes, basis @ amplitudes
+    sandwich = _Sandwich.of(rows[: len(target)], left[: len(target)], stretch)
     scatters = []
     for place in places:
-        along = basis[place].T @ np.linalg.solve(inverse[place, place], found[place])
+        along = np.linalg.lstsq(basis[place], found[place], rcond=None)[0]
         scatters.append(sandwich.along(along / max(float(np.linalg.norm(along)), np.finfo(float).tiny)))
     return scatters
 
@@ -109,27 +112,27 @@ class _Sandwich:
         return cls(parts, [_as_without_leverage(part) for part in parts], np.split(residual, ends))
 
     @cached_property
-    def _everywhere(self) -> tuple[float, float]:
-        """Variance, and what is expected of it by the noise, of all directions together."""
-        told = expected = 0.0
-        for rows, weighted, left in zip(self.rows, self.weighted, self.residuals, strict=True):
-            told += float(np.sum((left @ weighted) ** 2))
-            expected += float(np.sum(weighted**2) - np.sum((rows.T @ weighted) ** 2))
-        return told, expected
+    def _all(self) -> tuple[Array, Array]:
+        """(S,) variance, and what is expected of it by the noise, of all directions together, by stretch."""
+        parts = list(zip(self.rows, self.weighted, self.residuals, strict=True))
+        told = [np.sum((left @ weighted) ** 2) for _, weighted, left in parts]
+        expected = [np.sum(weighted**2) - np.sum((rows.T @ weighted) ** 2) for rows, weighted, _ in parts]
+        return np.array(told), np.array(expected)
 
     def along(self, direction: Array) -> Scatter:
         """In a direction (k,) of unit length, in which the variance is one by the noise."""
         weights = [weighted @ direction for weighted in self.weighted]
-        told = sum(float(own @ left) ** 2 for own, left in zip(weights, self.residuals, strict=True))
-        # Trace of the covariance of these sums, were the noise as it says, and that of its square.
+        told = np.array([float(own @ left) ** 2 for own, left in zip(weights, self.residuals, strict=True)])
+        # Covariance of these sums, were the noise as it says.
         squares = np.array([float(own @ own) for own in weights])
         fitted = np.array([rows.T @ own for rows, own in zip(self.rows, weights, strict=True)])
         shared = np.sum(fitted**2, axis=1)
-        expected = float(np.sum(squares - shared))
+        expected = squares - shared
         square = float(np.sum(squares**2 - 2 * squares * shared) + np.sum((fitted.T @ fitted) ** 2))
-        freedom = expected**2 / square if square > 0 else 0.0
-        others, usual = (whole - own for whole, own in zip(self._everywhere, (told, expected), strict=True))
-        return Scatter(told, expected, freedom, others / usual if usual > RANK else 1.0)
+        freedom = float(np.sum(expected)) ** 2 / square if square > 0 else 0.0
+        others, usual = (float(squares @ (whole - own)) for whole, own in zip(self._all, (told, expected), strict=True))
+        elsewhere = others / usual if usual > RANK * float(np.sum(squares)) else 1.0
+        return Scatter(float(np.sum(told)), float(np.sum(expected)), freedom, elsewhere)
 
 
 def _as_without_leverage(rows: Array) -> Array:

@@ -43,9 +43,6 @@ Array = NDArray[np.float64]
 UNSTATED: Final[Mapping[str, float]] = MappingProxyType(dict.fromkeys(CREEP_NAMES, CREEP_STD) | {LAG_NAME: LAG_STD})
 """Standard deviations, about zero, of what is fitted beside the parameters and is no cause."""
 
-INEXACT: Final = 1e-3
-"""Part of what a dynamic row measures that no model and no sensor is expected to have right."""
-
 
 def build_problem(
     records: Sequence[Record],
@@ -148,8 +145,7 @@ def _tolerance(source: Source, row: int, target: Array, context: Context) -> flo
         size = rms(context.filtered(source.own.of(source.inputs)[:, row], source)[used])
         return math.hypot(source.own.untold * size, source.own.lever * source.own.other)
     if source.channel is Channel.DYNAMIC:
-        shaken = SHAKEN if source.travels and source.rattles.any() else 0.0
-        return math.hypot(shaken, INEXACT) * rms(target[used])
+        return SHAKEN * rms(target[used]) if source.travels and source.rattles.any() else 0.0
     return tolerated_creep(source, source.coordinates[row], context.geometry)
 
 

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
+from hypothesis import given
+from hypothesis import strategies as st
 
-from ident.diagnosis.evidence.misfit import BELIEVED, scatter_along
+from ident.diagnosis.evidence.misfit import BELIEVED, Scatter, scatter_along
 
 NOTHING = np.zeros((0, 3)), np.zeros(0)
 STRETCHES = 3000
@@ -50,29 +51,53 @@ def test_what_is_known_otherwise_does_not_scatter() -> None:
     assert ratios[1] > 5
 
 
-def test_the_scatter_of_few_stretches_is_told_though_what_is_fitted_follows_their_rows() -> None:
-    """Three of sixty that are alone noisy, by two degrees of freedom against what is believed of them."""
+def few_noisy(draws: int) -> list[Scatter]:
+    """Along a column that three of sixty stretches have, which are three times as noisy as is thought."""
     draw, stretch = np.random.default_rng(5), np.repeat(np.arange(60), 10)
     white = draw.normal(size=(600, 3))
     white[stretch > 2, 1] = 0.0
-    noise = np.where(stretch > 2, 1.0, 3.0) * draw.normal(size=(400, 600))
-    targets = white @ [2.0, 5.0, -5.0] + noise
-    ratios = [excess_along(white, target, NOTHING, stretch, [slice(1, 2)])[0] for target in targets]
-    # In the others a twentieth of all rows is as noisy.
-    elsewhere = 1 + 8 / 20
-    told = 2 / (2 + BELIEVED)
-    assert np.mean(ratios) == pytest.approx(told * 9 + (1 - told) * elsewhere, rel=0.15)
+    noise = np.where(stretch > 2, 1.0, 3.0) * draw.normal(size=(draws, 600))
+    targets = draw.normal(size=(draws, 3)) @ white.T + noise
+    return [scatter_along(white, target, NOTHING, stretch, [slice(1, 2)])[0] for target in targets]
 
 
-def test_few_stretches_say_little_that_the_others_do_not() -> None:
-    """Variances of two degrees of freedom, each shrunk to one that is known to four."""
+def test_the_scatter_of_few_stretches_is_told_though_what_is_fitted_follows_their_rows() -> None:
+    """By two degrees of freedom, and by what all other directions say of these stretches."""
+    found = few_noisy(400)
+    assert np.mean([one.told / one.expected for one in found]) == pytest.approx(9.0, rel=0.15)
+    assert np.mean([one.elsewhere for one in found]) == pytest.approx(9.0, rel=0.2)
+    assert [one.freedom for one in found] == pytest.approx([2.0] * 400, rel=0.2)
+
+
+def test_the_scatter_of_other_stretches_says_nothing_of_these() -> None:
+    """Nine times the noise is in 57 stretches that know nothing of this column."""
+    draw, stretch = np.random.default_rng(5), np.repeat(np.arange(60), 10)
+    white = draw.normal(size=(600, 3))
+    white[stretch > 2, 1] = 0.0
+    targets = np.where(stretch > 2, 3.0, 1.0) * draw.normal(size=(400, 600))
+    found = [scatter_along(white, target, NOTHING, stretch, [slice(1, 2)])[0].elsewhere for target in targets]
+    assert np.mean(found) == pytest.approx(1.0, abs=0.15)
+
+
+@given(told=st.floats(0.0, 20.0), elsewhere=st.floats(0.0, 20.0), freedom=st.floats(0.0, 1e3))
+def test_what_is_believed_of_a_scatter_lies_between_what_it_and_what_the_others_say(
+    told: float, elsewhere: float, freedom: float
+) -> None:
+    excess = Scatter(told, 1.0, freedom, elsewhere).excess
+    assert max(min(told, elsewhere), 1.0) - 1e-9 <= excess <= max(told, elsewhere, 1.0) + 1e-9
+    assert Scatter(told, 1.0, BELIEVED, elsewhere).excess == pytest.approx(max((told + elsewhere) / 2, 1.0))
+
+
+def test_few_stretches_are_believed_to_scatter_as_all_that_they_tell() -> None:
+    """Two degrees of freedom of the column itself, six of the two others in its three stretches, white noise."""
     draw, stretch = np.random.default_rng(7), np.repeat(np.arange(60), 10)
     white = draw.normal(size=(600, 3))
     white[stretch > 2, 1] = 0.0
-    targets = white @ [2.0, 5.0, -5.0] + draw.normal(size=(400, 600))
+    targets = draw.normal(size=(1000, 600))
     ratios = [excess_along(white, target, NOTHING, stretch, [slice(1, 2)])[0] for target in targets]
-    told = 2 / (2 + BELIEVED)
-    assert np.quantile(ratios, 0.95) == pytest.approx(1 + told * (stats.chi2(2).ppf(0.95) / 2 - 1), rel=0.15)
+    told, others = draw.chisquare(2, 10000) / 2, draw.chisquare(6, 10000) / 6
+    mixed = (2 * told + BELIEVED * others) / (2 + BELIEVED)
+    assert np.quantile(ratios, [0.5, 0.95]) == pytest.approx(np.maximum(np.quantile(mixed, [0.5, 0.95]), 1.0), rel=0.1)
 
 
 def test_what_a_single_stretch_tells_is_taken_as_it_is() -> None:
@@ -81,3 +106,16 @@ def test_what_a_single_stretch_tells_is_taken_as_it_is() -> None:
     white[:, 1] = 1e5 * (stretch == 7)
     target = white @ [2.0, 5e-5, -5.0] + 3.0 * draw.normal(size=600)
     assert excess_along(white, target, NOTHING, stretch, [slice(1, 2)]) == pytest.approx([1.0], abs=0.01)
+
+
+def test_columns_of_a_plant_of_which_next_to_nothing_is_known_lose_no_digit() -> None:
+    """Inertias in units of a prior that is a hundred million times as wide as what rows tell, nearly the same."""
+    draw, stretch = np.random.default_rng(8), np.repeat(np.arange(60), 10)
+    first, second, member = draw.normal(size=(3, 600))
+    target = 3e4 * first - 2e3 * second + 4 * member + draw.normal(size=600)
+    far_apart = np.column_stack([1e8 * first, 100 * second, member])
+    nearly_the_same = np.column_stack([1e8 * first, 1e8 * first + 100 * second, member])
+    (apart,), (nearly,) = (
+        scatter_along(white, target, NOTHING, stretch, [slice(2, 3)]) for white in (far_apart, nearly_the_same)
+    )
+    assert (nearly.told, nearly.elsewhere) == pytest.approx((apart.told, apart.elsewhere), rel=1e-3)

@@ -56,6 +56,8 @@ def test_a_perfect_vehicle_leaves_nothing(vehicle: VehicleDescription) -> None:
         assert np.abs(left).max() < 3e-3 * scale, block.label
         if block.channel is Channel.KINEMATIC:
             assert np.sqrt(np.mean(left**2)) < block.tolerance, block.label
+        else:
+            assert block.tolerance == 0.0, block.label
 
 
 LOADED = DIAGNOSTIC["known payload"].drives
