@@ -2,7 +2,8 @@
 
 Where steps repeat, the colour is that of what differs between the repeats: what repeats is not in it, so that no effect
 can be taken for noise. It counts as long as what the best candidates leave is about as small; where model errors
-prevail, and where nothing repeats, the colour is that of what is left.
+prevail, and where nothing repeats, the colour is that of what is left. An autoregression of order d leaves 1 - d/n of
+the noise of the n rows that it is fitted to, and 1 + d/n of that of others (Akaike 1969).
 """
 
 from __future__ import annotations
@@ -143,8 +144,7 @@ def colours_of_repeats(rows: Rows, residuals: Sequence[Array]) -> tuple[Colour, 
 def _colour_of(blocks: Sequence[tuple[Array, NDArray[np.int64]]]) -> Colour:
     """Of contrasts of every block; the errors of predictions are those of rows that they are not made of.
 
-    An autoregression of order d leaves 1 - d/n of the noise of the n rows that it is fitted to, and 1 + d/n of that of
-    others (Akaike 1969); the mean of the repeats is independent of what differs between them.
+    The mean of the repeats is independent of what differs between them.
     """
     values, ages = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
     count = len(values) if all(len(one) for one, _ in blocks) else 0
@@ -178,10 +178,15 @@ def fit_whitener(
 
 
 def colours_of(rows: Rows, left: Left) -> Sequence[Colour]:
-    """Colour of what is left of every group of rows."""
+    """Colour of what is left of every group of rows, as large as before coefficients and predictions were fitted."""
     inflation, age = len(rows) / max(len(rows) - left.fitted, 1.0), row_ages(rows)
-    places = [np.flatnonzero(rows.group == group) for group in range(int(rows.group.max(initial=-1)) + 1)]
-    return [Colour(inflation * autocovariance(left.residual[own], age[own]), len(own)) for own in places]
+    found = []
+    for group in range(int(rows.group.max(initial=-1)) + 1):
+        own = np.flatnonzero(rows.group == group)
+        count = len(own)
+        predicted = count / max(count - _depth(count), 1)
+        found.append(Colour(inflation * predicted * autocovariance(left.residual[own], age[own]), count))
+    return found
 
 
 def whitener_of(rows: Rows, colours: Sequence[Colour], order: int = ORDER) -> Whitener:
