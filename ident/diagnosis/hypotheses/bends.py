@@ -9,6 +9,7 @@ where the rows want it.
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -39,6 +40,9 @@ NEAR_PLANT: Final = 1e-3
 
 SAME: Final = 0.1
 """Of coefficients, in standard deviations by the usual noise, that change nothing."""
+
+KEPT: Final = 16
+"""Answers of every hypothesis, the last ones: a search comes back to numbers that it was at before."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,7 @@ class Bends:
     def __init__(self, problems: Sequence[Problem], colours: Colours) -> None:
         self.problems, self.colours = problems, colours
         self._straight: dict[tuple[str, int], float] = {}
-        self._kept: dict[tuple[str, int], Bent] = {}
+        self._kept = defaultdict[tuple[str, int], list[Bent]](list)
 
     def is_bent(self, hypothesis: Hypothesis, block: Block) -> bool:
         """Whether there is more to a hypothesis than its columns."""
@@ -119,33 +123,33 @@ class Bends:
 
         Where no numbers are held, which might have been moved to where another set wants them.
         """
-        found = self._kept.get((hypothesis.key, block.place.start))
-        return None if found is None or found.held.size else found
+        kept = self._kept[hypothesis.key, block.place.start]
+        return kept[0] if kept and not kept[0].held.size else None
 
     def bend(self, form: Form, coefficients: Array, held: Array | None) -> Bent | None:
         """About some coefficients (K,) and held numbers (H,), or those of the columns; None where these miss nothing.
 
-        The last answer, where the coefficients are those but for `SAME`.
+        An earlier answer, where the coefficients are those but for `SAME`.
         """
         key, size, others = form.key, float(np.abs(coefficients).max()), form.rows_of_others
         if held is None and not others.any() and size <= self._straight.get(key, 0.0):
             return None
         numbers = form.held(coefficients) if held is None else held
-        kept = self._kept.get(key)
-        if kept is not None and not np.array_equal(kept.held, numbers):
-            kept = None
-        if kept is not None and kept.is_of(coefficients, form.parameters, others):
-            return kept
+        kept = [one for one in self._kept[key] if np.array_equal(one.held, numbers)]
+        for one in kept:
+            if one.is_of(coefficients, form.parameters, others):
+                return self._last(key, one)
         here, expected = form.added(coefficients, numbers), form.expected_about(coefficients, numbers)
         if held is None and not len(expected[1]) and self._power(here - form.by_columns(coefficients)) < NEGLIGIBLE:
             if not others.any():
                 self._straight[key] = size
             return None
-        if kept is not None and kept.has_slopes_near(coefficients, form.parameters, others):
-            slopes, sloped = kept.slopes, kept.sloped
-        else:
+        near = next((one for one in kept if one.has_slopes_near(coefficients, form.parameters, others)), None)
+        if near is None:
             slopes, sloped = form.slopes(coefficients, numbers, here), (coefficients, form.parameters, others)
-        self._kept[key] = Bent(
+        else:
+            slopes, sloped = near.slopes, near.sloped
+        found = Bent(
             place=form.block.place,
             about=coefficients,
             held=numbers,
@@ -157,7 +161,12 @@ class Bends:
             others=others,
             sloped=sloped,
         )
-        return self._kept[key]
+        return self._last(key, found)
+
+    def _last(self, key: tuple[str, int], bent: Bent) -> Bent:
+        """The same, as the one that was asked for last."""
+        self._kept[key] = [bent, *(one for one in self._kept[key] if one is not bent)][:KEPT]
+        return bent
 
     def _power(self, series: Array) -> float:
         """Sum of squares of a series (n,), in units of the noise."""
