@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from examples.scatter_along_names import likelihoods, square_along
+from examples.scatter_along_names import FREEDOMS, Told, likelihood, square_along
 from ident.diagnosis.evidence.misfit import Scatter
 
 
@@ -18,11 +18,19 @@ def test_squares_along_columns_are_those_of_chance() -> None:
     assert np.quantile(squares, 0.95) == pytest.approx(5.99 / 2, rel=0.1)
 
 
-@pytest.mark.parametrize("believed", [4, 16])
-def test_degrees_of_freedom_of_drawn_ratios_are_the_likeliest(believed: int) -> None:
-    draw = np.random.default_rng(2)
-    freedom = draw.uniform(2, 12, size=6000)
-    true = believed / draw.chisquare(believed, size=6000)
-    told = true * draw.chisquare(freedom) / freedom
-    found = likelihoods([Scatter(one, 1.0, of, 1.0) for one, of in zip(told, freedom, strict=True)])
-    assert max(found, key=found.__getitem__) == believed
+def test_what_is_the_same_as_what_is_there_tells_nothing() -> None:
+    draw = np.random.default_rng(3)
+    columns = draw.normal(size=(200, 5))
+    assert square_along(columns, 30 * columns[:, :1] + 0.1 * draw.normal(size=(200, 1)), draw.normal(size=200)) is None
+
+
+@pytest.mark.parametrize(("spread", "likeliest"), [(0.0, max(FREEDOMS)), (1.5, min(FREEDOMS))])
+def test_the_firmest_belief_is_likeliest_of_noise_that_is_as_it_says_and_the_loosest_of_any(
+    spread: float, likeliest: float
+) -> None:
+    draw, freedom = np.random.default_rng(2), 12.0
+    true = np.exp(spread * draw.normal(size=20000))
+    told = true * draw.chisquare(freedom, size=len(true)) / freedom
+    squares = true * draw.chisquare(1, size=len(true))
+    drawn = [Told(square, Scatter(one, 1.0, freedom), False) for square, one in zip(squares, told, strict=True)]
+    assert max(FREEDOMS, key=lambda of: likelihood(drawn, of)) == likeliest

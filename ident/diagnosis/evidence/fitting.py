@@ -143,11 +143,11 @@ class Fitter:
 
     def _noise_beside(self, state: State) -> Sizes:
         """What is most likely lacking beside a set."""
-        columns, target, beside = self._rows(state)
+        columns, target, beside = self.rows_of(state)
         known = np.column_stack(beside)
         return most_likely(self._colours, columns, target, known.T @ known, state.evidence.sizes)
 
-    def _rows(self, state: State) -> tuple[Array, Array, tuple[Array, Array]]:
+    def rows_of(self, state: State) -> tuple[Array, Array, tuple[Array, Array]]:
         """Columns (n, k) of the plant and of all members, the target (n,), and rows of what is expected beside."""
         members = state.members.items()
         columns = np.hstack([self.design.baseline, *(self._columns(state, index, one) for index, one in members)])
@@ -156,7 +156,7 @@ class Fitter:
 
     def left(self, state: State) -> Left:
         """What a set leaves of the rows."""
-        columns, target, (beside, wanted) = self._rows(state)
+        columns, target, (beside, wanted) = self.rows_of(state)
         white, _ = self._colours.white(np.column_stack([columns, target]), state.evidence.sizes)
         width = columns.shape[1]
         directions, factor = np.linalg.qr(np.vstack([white[:, :-1], beside, np.eye(width)]))
@@ -172,7 +172,7 @@ class Fitter:
             state: the set.
             chosen: (n,) rows that are looked at; all of them.
         """
-        columns, target, expected = self._rows(state)
+        columns, target, expected = self.rows_of(state)
         white, _ = self._colours.white(np.column_stack([columns, target]), state.evidence.sizes)
         white, stretch, places = white[chosen], self._colours.stretch[chosen], self._places(state.members)
         scatters = scatter_along(white[:, :-1], white[:, -1], expected, stretch, list(places.values()))

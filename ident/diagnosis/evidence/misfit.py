@@ -6,15 +6,13 @@ power of the inverse of the ratio before they are integrated (Pauli, Racugno and
 the rows of a stretch that has much of a member: so residuals of a stretch are made as large as they would be without,
 by the leverage of its rows, and the ratio is one in the mean where the noise is as it says (Bell and McCaffrey 2002).
 A member that few stretches have is told a ratio of few degrees of freedom, by accident anything: what is believed
-beforehand, that it is the ratio of all other directions in these stretches, counts beside it (scaled inverse
-chi-squared; Gelman et al. 2013, 2.6).
+beforehand, that the noise is as it says, counts beside it (scaled inverse chi-squared; Gelman et al. 2013, 2.6).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -25,9 +23,9 @@ from ident.diagnosis.observations.linear import RANK, starts_of
 
 Array = NDArray[np.float64]
 
-BELIEVED: Final = 16.0
-"""Degrees of freedom of what is believed of a ratio beforehand: the likeliest over names that act on forces, of
-vehicles that lack nothing (`examples/scatter_along_names.py`)."""
+BELIEVED: Final = 8.0
+"""Degrees of freedom of what is believed of a ratio beforehand: the likeliest by the squares along all names that act
+on forces, beside what is there (`examples/scatter_along_names.py`)."""
 
 
 def tempered(log: float, cost: float, excess: float) -> float:
@@ -45,20 +43,20 @@ class Scatter:
         told: variance by the sandwich.
         expected: of it, were the noise as it says.
         freedom: degrees of freedom of what is told.
-        elsewhere: told over expected of all other directions, in stretches weighed by what they tell of this one.
     """
 
     told: float
     expected: float
     freedom: float
-    elsewhere: float
 
     @property
     def excess(self) -> float:
-        """Variance that is believed, at least one: what few stretches tell is shrunk to what all others do there."""
-        weight = self.freedom / (BELIEVED + self.freedom)
-        believed = weight * self.told + (1 - weight) * self.elsewhere * self.expected
-        return max(1 - self.expected + believed, 1.0)
+        """Variance that is believed."""
+        return self.variance(BELIEVED)
+
+    def variance(self, believed: float) -> float:
+        """At least one, of so many degrees of freedom beforehand."""
+        return max(1 + self.freedom / (believed + self.freedom) * (self.told - self.expected), 1.0)
 
 
 def scatter_along(
@@ -111,28 +109,17 @@ class _Sandwich:
         parts = np.split(rows, ends)
         return cls(parts, [_as_without_leverage(part) for part in parts], np.split(residual, ends))
 
-    @cached_property
-    def _all(self) -> tuple[Array, Array]:
-        """(S,) variance, and what is expected of it by the noise, of all directions together, by stretch."""
-        parts = list(zip(self.rows, self.weighted, self.residuals, strict=True))
-        told = [np.sum((left @ weighted) ** 2) for _, weighted, left in parts]
-        expected = [np.sum(weighted**2) - np.sum((rows.T @ weighted) ** 2) for rows, weighted, _ in parts]
-        return np.array(told), np.array(expected)
-
     def along(self, direction: Array) -> Scatter:
         """In a direction (k,) of unit length, in which the variance is one by the noise."""
         weights = [weighted @ direction for weighted in self.weighted]
-        told = np.array([float(own @ left) ** 2 for own, left in zip(weights, self.residuals, strict=True)])
-        # Covariance of these sums, were the noise as it says.
+        told = sum(float(own @ left) ** 2 for own, left in zip(weights, self.residuals, strict=True))
+        # Trace of the covariance of these sums, were the noise as it says, and that of its square.
         squares = np.array([float(own @ own) for own in weights])
         fitted = np.array([rows.T @ own for rows, own in zip(self.rows, weights, strict=True)])
         shared = np.sum(fitted**2, axis=1)
-        expected = squares - shared
+        expected = float(np.sum(squares - shared))
         square = float(np.sum(squares**2 - 2 * squares * shared) + np.sum((fitted.T @ fitted) ** 2))
-        freedom = float(np.sum(expected)) ** 2 / square if square > 0 else 0.0
-        others, usual = (float(squares @ (whole - own)) for whole, own in zip(self._all, (told, expected), strict=True))
-        elsewhere = others / usual if usual > RANK * float(np.sum(squares)) else 1.0
-        return Scatter(float(np.sum(told)), float(np.sum(expected)), freedom, elsewhere)
+        return Scatter(told, expected, expected**2 / square if square > 0 else 0.0)
 
 
 def _as_without_leverage(rows: Array) -> Array:

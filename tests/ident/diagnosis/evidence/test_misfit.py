@@ -62,42 +62,18 @@ def few_noisy(draws: int) -> list[Scatter]:
 
 
 def test_the_scatter_of_few_stretches_is_told_though_what_is_fitted_follows_their_rows() -> None:
-    """By two degrees of freedom, and by what all other directions say of these stretches."""
+    """By two degrees of freedom."""
     found = few_noisy(400)
     assert np.mean([one.told / one.expected for one in found]) == pytest.approx(9.0, rel=0.15)
-    assert np.mean([one.elsewhere for one in found]) == pytest.approx(9.0, rel=0.2)
     assert [one.freedom for one in found] == pytest.approx([2.0] * 400, rel=0.2)
 
 
-def test_the_scatter_of_other_stretches_says_nothing_of_these() -> None:
-    """Nine times the noise is in 57 stretches that know nothing of this column."""
-    draw, stretch = np.random.default_rng(5), np.repeat(np.arange(60), 10)
-    white = draw.normal(size=(600, 3))
-    white[stretch > 2, 1] = 0.0
-    targets = np.where(stretch > 2, 3.0, 1.0) * draw.normal(size=(400, 600))
-    found = [scatter_along(white, target, NOTHING, stretch, [slice(1, 2)])[0].elsewhere for target in targets]
-    assert np.mean(found) == pytest.approx(1.0, abs=0.15)
-
-
-@given(told=st.floats(0.0, 20.0), elsewhere=st.floats(0.0, 20.0), freedom=st.floats(0.0, 1e3))
-def test_what_is_believed_of_a_scatter_lies_between_what_it_and_what_the_others_say(
-    told: float, elsewhere: float, freedom: float
+@given(told=st.floats(0.0, 20.0), freedom=st.floats(0.0, 1e3))
+def test_what_is_believed_of_a_scatter_lies_between_what_it_says_and_what_the_noise_does(
+    told: float, freedom: float
 ) -> None:
-    excess = Scatter(told, 1.0, freedom, elsewhere).excess
-    assert max(min(told, elsewhere), 1.0) - 1e-9 <= excess <= max(told, elsewhere, 1.0) + 1e-9
-    assert Scatter(told, 1.0, BELIEVED, elsewhere).excess == pytest.approx(max((told + elsewhere) / 2, 1.0))
-
-
-def test_few_stretches_are_believed_to_scatter_as_all_that_they_tell() -> None:
-    """Two degrees of freedom of the column itself, six of the two others in its three stretches, white noise."""
-    draw, stretch = np.random.default_rng(7), np.repeat(np.arange(60), 10)
-    white = draw.normal(size=(600, 3))
-    white[stretch > 2, 1] = 0.0
-    targets = draw.normal(size=(1000, 600))
-    ratios = [excess_along(white, target, NOTHING, stretch, [slice(1, 2)])[0] for target in targets]
-    told, others = draw.chisquare(2, 10000) / 2, draw.chisquare(6, 10000) / 6
-    mixed = (2 * told + BELIEVED * others) / (2 + BELIEVED)
-    assert np.quantile(ratios, [0.5, 0.95]) == pytest.approx(np.maximum(np.quantile(mixed, [0.5, 0.95]), 1.0), rel=0.1)
+    assert 1.0 <= Scatter(told, 1.0, freedom).excess <= max(told, 1.0)
+    assert Scatter(told, 1.0, BELIEVED).excess == pytest.approx(max((told + 1) / 2, 1.0))
 
 
 def test_what_a_single_stretch_tells_is_taken_as_it_is() -> None:
@@ -118,4 +94,4 @@ def test_columns_of_a_plant_of_which_next_to_nothing_is_known_lose_no_digit() ->
     (apart,), (nearly,) = (
         scatter_along(white, target, NOTHING, stretch, [slice(2, 3)]) for white in (far_apart, nearly_the_same)
     )
-    assert (nearly.told, nearly.elsewhere) == pytest.approx((apart.told, apart.elsewhere), rel=1e-3)
+    assert (nearly.told, nearly.freedom) == pytest.approx((apart.told, apart.freedom), rel=1e-3)
