@@ -30,7 +30,7 @@ from hil.exam.folder import ExamFolder, read_exam
 from hil.exam.oracle import posed
 from ident.diagnosis.evidence.misfit import Scatter, scatter_along
 from ident.diagnosis.evidence.state import State
-from ident.diagnosis.observations.linear import orthonormal
+from ident.diagnosis.observations.linear import orthonormal, with_known
 from ident.diagnosis.observations.orders import with_orders
 from ident.diagnosis.problem import Channel
 from ident.diagnosis.search.asked import Asked, asked_of
@@ -47,29 +47,32 @@ PARTS = 5
 FAR = 30.0
 """Standard deviation of a coefficient beforehand, over that by the noise: rows tell all of it."""
 
-LEFT = 0.1
-"""Of a name beside what is there, from which it is another."""
-
 
 @dataclass(frozen=True)
 class Told:
     """What rows tell along a name.
 
     Attributes:
-        square: of it, in units of the noise, over its number of coefficients.
+        square: of it, in units of the noise, over the rank.
+        rank: how many coefficients it has.
         scatter: of the rows.
         rolls: whether it acts mostly on rolling.
     """
 
     square: float
+    rank: int
     scatter: Scatter
     rolls: bool
 
 
 def told_by(asked: Asked, there: Collection[str] = ()) -> Iterator[Told]:
-    """Along every name that shows, each beside the parameters of the model and what is there (keys) alone."""
+    """Along every name that shows, and is not the same as what is there (keys), each beside that and the parameters.
+
+    Raises:
+        UserError: what is there is no candidate, or does not show.
+    """
     design, fitter, regression = asked.design, asked.fitter, asked.regression
-    state = _with(asked, there)
+    state = fitter.among_all(_with(asked, there))
     columns, target, (known, wanted) = fitter.rows_of(state)
     width = columns.shape[1]
     white = state.evidence.noise.apply(regression.rows, np.column_stack([columns, design.columns, target]))
@@ -77,44 +80,43 @@ def told_by(asked: Asked, there: Collection[str] = ()) -> Iterator[Told]:
     kinematic = np.zeros(len(target), dtype=np.bool_)
     for (block, _), place in zip(regression.rows.blocks, regression.rows.block_slices, strict=True):
         kinematic[place] = block.channel is Channel.KINEMATIC
-    for number, one in enumerate(design.hypotheses):
+    for number in state.tables():
+        one = design.hypotheses[number]
         shown = next((block for block in one.blocks if np.any(names[:, block.place])), None)
-        if one.free or number in fitter.invisible or number in state.members or shown is None:
+        if one.free or number in fitter.invisible or shown is None:
             continue
         own = names[:, shown.place]
         own = own * (FAR / np.maximum(np.linalg.norm(own, axis=0), np.finfo(float).tiny))
-        rows, place = np.hstack([columns, own]), slice(width, width + own.shape[1])
-        beside = np.hstack([known, np.zeros((len(known), own.shape[1]))]), wanted
-        (scatter,) = scatter_along(rows, target, beside, regression.stretch, [place])
+        place, beside = slice(width, width + own.shape[1]), np.hstack([known, np.zeros((len(known), own.shape[1]))])
+        (scatter,) = scatter_along(np.hstack([columns, own]), target, (beside, wanted), regression.stretch, [place])
+        square, rank = square_along(columns, own, target, (known, wanted))
         rolls = bool(np.sum(own[kinematic] ** 2) > np.sum(own[~kinematic] ** 2))
-        square = square_along(columns, own, target)
-        if square is not None:
-            yield Told(square, scatter, rolls)
+        yield Told(square, rank, scatter, rolls)
 
 
 def _with(asked: Asked, there: Collection[str]) -> State:
     """What is there, fitted with the noise that it leaves."""
-    state = asked.fitter.nothing
-    for number, one in enumerate(asked.design.hypotheses):
-        if one.key in there and not one.free:
-            best = asked.fitter.among_all(state).tables()[number].best
-            state = asked.fitter.state({**state.members, number: best}, state)
+    state, keys = asked.fitter.nothing, {one.key: number for number, one in enumerate(asked.design.hypotheses)}
+    for key in there:
+        table = asked.fitter.among_all(state).tables().get(keys.get(key, -1))
+        if table is None or not table.is_there:
+            raise UserError(f"{key} does not show in these records", "Such a case says nothing of noise: leave it out.")
+        state = asked.fitter.state({**state.members, keys[key]: table.best}, state)
     return state
 
 
-def square_along(columns: Array, own: Array, target: Array) -> float | None:
-    """Of what rows tell along columns (n, k) beside others, whose coefficients have unit variance; over their rank.
+def square_along(columns: Array, own: Array, target: Array, known: tuple[Array, Array]) -> tuple[float, int]:
+    """Of what rows tell along some columns (n, k) over their rank, and this; arguments as for `scatter_along`.
 
-    None where next to nothing of them is left beside those.
+    Beside others, which have coefficients of unit variance.
     """
-    width = columns.shape[1]
-    beside = orthonormal(np.vstack([columns, np.eye(width)]))
-    rest = np.vstack([np.column_stack([own, target]), np.zeros((width, own.shape[1] + 1))])
+    rows, wanted = with_known(columns, target, known)
+    beside, padded = orthonormal(rows), np.zeros((len(rows), own.shape[1]))
+    padded[: len(own)] = own
+    rest = np.column_stack([padded, wanted])
     left = rest - beside @ (beside.T @ rest)
-    if np.all(np.linalg.norm(left[:, :-1], axis=0) < LEFT * np.linalg.norm(own, axis=0)):
-        return None
     along = orthonormal(left[:, :-1]).T @ left[:, -1]
-    return float(along @ along) / len(along)
+    return float(along @ along) / len(along), len(along)
 
 
 def of_case(folder: ExamFolder, of_axes: bool, case: Case) -> list[Told]:
@@ -128,8 +130,8 @@ def of_case(folder: ExamFolder, of_axes: bool, case: Case) -> list[Told]:
 def likelihood(told: Sequence[Told], freedom: float) -> float:
     """Log likelihood of a square, in the mean over all, by degrees of freedom that are believed beforehand."""
     variance = np.array([one.scatter.variance(freedom) for one in told])
-    squares = np.array([one.square for one in told])
-    return -0.5 * float(np.mean(squares / variance + np.log(2 * np.pi * variance)))
+    squares, ranks = np.array([one.square for one in told]), np.array([one.rank for one in told])
+    return -0.5 * float(np.average(squares / variance + np.log(2 * np.pi * variance), weights=ranks))
 
 
 def report(told: Sequence[Told]) -> Iterator[str]:
@@ -143,7 +145,7 @@ def report(told: Sequence[Told]) -> Iterator[str]:
     for part in filter(len, np.array_split(np.arange(len(forces)), PARTS)):
         scatter = np.mean([forces[number].scatter.excess for number in part])
         square = np.mean([forces[number].square for number in part])
-        yield f"forces that scatter {scatter:.2f} times as their noise says: mean {square:.2f}"
+        yield f"forces believed to scatter {scatter:.2f} times as their noise says: mean {square:.2f}"
     for freedom in FREEDOMS if forces else ():
         yield f"{freedom:g} degrees of freedom beforehand: log likelihood of a square {likelihood(forces, freedom):.3f}"
 

@@ -21,6 +21,7 @@ from ident.diagnosis.hypotheses.hypotheses import Block, Design
 from ident.diagnosis.hypotheses.products import Products, numbers_of
 from ident.diagnosis.noise.colours import Colours, Sizes, most_likely
 from ident.diagnosis.observations.directions import VISIBLE
+from ident.diagnosis.observations.linear import RANK, with_known
 from ident.diagnosis.observations.whitening import Left
 from ident.diagnosis.problem import Series, summed
 
@@ -156,14 +157,13 @@ class Fitter:
 
     def left(self, state: State) -> Left:
         """What a set leaves of the rows."""
-        columns, target, (beside, wanted) = self.rows_of(state)
+        columns, target, known = self.rows_of(state)
         white, _ = self._colours.white(np.column_stack([columns, target]), state.evidence.sizes)
-        width = columns.shape[1]
-        directions, factor = np.linalg.qr(np.vstack([white[:, :-1], beside, np.eye(width)]))
-        basis = linalg.solve_triangular(factor, np.eye(width))
-        found = basis @ (directions.T @ np.concatenate([white[:, -1], wanted, np.zeros(width)]))
+        rows, wanted = with_known(white[:, :-1], white[:, -1], known)
+        directions, factor = np.linalg.qr(rows)
+        found = linalg.solve_triangular(factor, directions.T @ wanted)
         # Coefficients that are known beforehand as well as the rows say are no free ones.
-        return Left(target - columns @ found, width - float(np.sum(basis**2)))
+        return Left(target - columns @ found, float(np.sum(directions[: len(target)] ** 2)))
 
     def excess(self, state: State, chosen: NDArray[np.bool_] | slice = slice(None)) -> dict[int, float]:
         """How far rows scatter beyond their noise along every member, by which its likelihoods are tempered.
@@ -278,14 +278,15 @@ class Fitter:
         own = np.zeros((len(bent.expected[1]), len(scale)))
         own[:, width : width + bent.slopes.shape[1]], own[:, -len(size) :] = bent.expected[0], expected
         beside, wanted = self._expected_beside(state, others, len(scale))
-        rows = np.vstack([white[:, :-1] * scale, own * scale, beside, np.eye(len(scale))[:width]])
-        target = np.concatenate([white[:, -1], bent.expected[1], wanted, np.zeros(width)])
+        # What cannot be told from others promises nothing.
+        prior = np.diag(np.where(np.arange(len(scale)) < width, 1.0, RANK))
+        rows = np.vstack([white[:, :-1] * scale, own * scale, beside, prior])
+        target = np.concatenate([white[:, -1], bent.expected[1], wanted, np.zeros(len(scale))])
         # What is left of their columns beside all others, and what the rows want of that.
-        directions, factor = np.linalg.qr(rows)
-        corner, wanted = factor[-len(size) :, -len(size) :], (directions.T @ target)[-len(size) :]
-        wished = np.linalg.lstsq(corner, wanted, rcond=None)[0]
+        factor = np.linalg.qr(np.column_stack([rows, target])).R[-1 - len(size) : -1, -1 - len(size) :]
+        wished = linalg.solve_triangular(factor[:, :-1], factor[:, -1])
         most = FURTHEST * _range(bent.held)
-        return np.clip(wished * scale[-len(size) :], -most, most), 0.5 * float(np.sum((corner @ wished) ** 2))
+        return np.clip(wished * scale[-len(size) :], -most, most), 0.5 * float(np.sum(factor[:, -1] ** 2))
 
     def _expected_beside(self, state: State, members: Members, count: int) -> tuple[Array, Array]:
         """Rows (m, count) and (m,) of what is expected of members that stand behind the baseline."""

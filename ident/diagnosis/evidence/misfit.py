@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ident.diagnosis.observations.linear import RANK, starts_of
+from ident.diagnosis.observations.linear import RANK, starts_of, with_known
 
 Array = NDArray[np.float64]
 
 BELIEVED: Final = 8.0
-"""Degrees of freedom of what is believed of a ratio beforehand: the likeliest by the squares along all names that act
-on forces, beside what is there (`examples/scatter_along_names.py`)."""
+"""Degrees of freedom of what is believed of a ratio beforehand: squares along all names that act on forces, beside what
+is there, are as likely by eight as by sixteen, and less by others (`examples/scatter_along_names.py`)."""
 
 
 def tempered(log: float, cost: float, excess: float) -> float:
@@ -55,7 +55,7 @@ class Scatter:
         return self.variance(BELIEVED)
 
     def variance(self, believed: float) -> float:
-        """At least one, of so many degrees of freedom beforehand."""
+        """Variance, at least one, if `believed` degrees of freedom say beforehand that it is that by the noise."""
         return max(1 + self.freedom / (believed + self.freedom) * (self.told - self.expected), 1.0)
 
 
@@ -71,15 +71,12 @@ def scatter_along(
         stretch: (n,) number of the stretch that each row belongs to, rising.
         places: columns of every member.
     """
-    beside, wanted = known
-    width = white.shape[1]
-    whole = np.concatenate([target, wanted, np.zeros(width)])
-    # Independent directions of the coefficients, of unit variance by the noise. Columns of the plant are nearly the
-    # same in units of what is known of them: their products would have lost all digits of what is left.
-    rows, factor = np.linalg.qr(np.vstack([white, beside, np.eye(width)]))
-    basis = linalg.solve_triangular(factor, np.eye(width))
-    amplitudes = rows.T @ whole
-    left, found = whole - rows @ amplitudes, basis @ amplitudes
+    whole, wanted = with_known(white, target, known)
+    # Independent directions of the coefficients, of unit variance by the noise.
+    rows, factor = np.linalg.qr(whole)
+    basis = linalg.solve_triangular(factor, np.eye(len(factor)))
+    amplitudes = rows.T @ wanted
+    left, found = wanted - rows @ amplitudes, basis @ amplitudes
     sandwich = _Sandwich.of(rows[: len(target)], left[: len(target)], stretch)
     scatters = []
     for place in places:

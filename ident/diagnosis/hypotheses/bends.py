@@ -9,7 +9,6 @@ where the rows want it.
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -98,7 +97,7 @@ class Bends:
     def __init__(self, problems: Sequence[Problem], colours: Colours) -> None:
         self.problems, self.colours = problems, colours
         self._straight: dict[tuple[str, int], float] = {}
-        self._kept = defaultdict[tuple[str, int], list[Bent]](list)
+        self._kept: dict[tuple[str, int], list[Bent]] = {}
 
     def is_bent(self, hypothesis: Hypothesis, block: Block) -> bool:
         """Whether there is more to a hypothesis than its columns."""
@@ -123,7 +122,7 @@ class Bends:
 
         Where no numbers are held, which might have been moved to where another set wants them.
         """
-        kept = self._kept[hypothesis.key, block.place.start]
+        kept = self._kept.get((hypothesis.key, block.place.start))
         return kept[0] if kept and not kept[0].held.size else None
 
     def bend(self, form: Form, coefficients: Array, held: Array | None) -> Bent | None:
@@ -135,10 +134,10 @@ class Bends:
         if held is None and not others.any() and size <= self._straight.get(key, 0.0):
             return None
         numbers = form.held(coefficients) if held is None else held
-        kept = [one for one in self._kept[key] if np.array_equal(one.held, numbers)]
+        kept = [one for one in self._kept.get(key, []) if np.array_equal(one.held, numbers)]
         for one in kept:
             if one.is_of(coefficients, form.parameters, others):
-                return self._last(key, one)
+                return self._put_first(key, one)
         here, expected = form.added(coefficients, numbers), form.expected_about(coefficients, numbers)
         if held is None and not len(expected[1]) and self._power(here - form.by_columns(coefficients)) < NEGLIGIBLE:
             if not others.any():
@@ -161,11 +160,11 @@ class Bends:
             others=others,
             sloped=sloped,
         )
-        return self._last(key, found)
+        return self._put_first(key, found)
 
-    def _last(self, key: tuple[str, int], bent: Bent) -> Bent:
+    def _put_first(self, key: tuple[str, int], bent: Bent) -> Bent:
         """The same, as the one that was asked for last."""
-        self._kept[key] = [bent, *(one for one in self._kept[key] if one is not bent)][:KEPT]
+        self._kept[key] = [bent, *(one for one in self._kept.get(key, []) if one is not bent)][:KEPT]
         return bent
 
     def _power(self, series: Array) -> float:

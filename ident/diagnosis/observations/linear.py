@@ -24,6 +24,22 @@ def orthonormal(columns: Array, rank: float = RANK) -> Array:
     return np.asarray(vectors[:, singular > rank * singular.max(initial=0.0)])
 
 
+def with_known(white: Array, target: Array, known: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Rows (n + m + k, k) of least squares and their target: coefficients of unit variance, and what is known beside.
+
+    Columns of a plant of which next to nothing is known are nearly the same in units of that: products of these rows
+    would have lost all digits of what is left.
+
+    Args:
+        white: (n, k) rows in units of their noise.
+        target: (n,).
+        known: (m, k) and (m,) rows beside those of the records, in standard deviations.
+    """
+    beside, wanted = known
+    width = white.shape[1]
+    return np.vstack([white, beside, np.eye(width)]), np.concatenate([target, wanted, np.zeros(width)])
+
+
 def rms(values: Array) -> float:
     """Root of the mean square of all values; zero of none."""
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0

@@ -168,7 +168,7 @@ def fit_whitener(
 
     `repeats` are the colours of `colours_of_repeats`; without them, only what is left has one.
     """
-    colours = colours_of(rows, Left(residual, freedom_lost))
+    colours = colours_of(rows, Left(residual, freedom_lost), order)
     if repeats is not None:
         colours = [
             known if known.count and own.covariance[0] <= PREVAILING * known.covariance[0] else own
@@ -177,14 +177,14 @@ def fit_whitener(
     return whitener_of(rows, colours, order)
 
 
-def colours_of(rows: Rows, left: Left) -> Sequence[Colour]:
+def colours_of(rows: Rows, left: Left, order: int = ORDER) -> Sequence[Colour]:
     """Colour of what is left of every group of rows, as large as before coefficients and predictions were fitted."""
     inflation, age = len(rows) / max(len(rows) - left.fitted, 1.0), row_ages(rows)
     found = []
     for group in range(int(rows.group.max(initial=-1)) + 1):
         own = np.flatnonzero(rows.group == group)
         count = len(own)
-        predicted = count / max(count - _depth(count), 1)
+        predicted = count / max(count - _depth(count, order), 1)
         found.append(Colour(inflation * predicted * autocovariance(left.residual[own], age[own]), count))
     return found
 

@@ -61,6 +61,19 @@ def test_whitened_noise_is_white_and_of_unit_size(world: type[Any]) -> None:
     assert np.std(white) == pytest.approx(1.0, abs=0.03)
 
 
+def test_few_rows_without_repeats_are_as_far_below_their_noise_as_others_are_above_it(world: type[Any]) -> None:
+    """An autoregression of order d leaves 1 - d/n of n rows that it is fitted to, and 1 + d/n of others (Akaike)."""
+    rows = make_rows(world(seed=3).problem(0))
+    own, others = [], []
+    for seed in range(40):
+        noise, fresh = np.random.default_rng([4, seed]).normal(size=(2, len(rows)))
+        whitener = fit_whitener(rows, noise)
+        own.append(np.mean(whitener.apply(rows, noise) ** 2))
+        others.append(np.mean(whitener.apply(rows, fresh) ** 2))
+    assert np.mean(own) < 0.98
+    assert np.mean([*own, *others]) == pytest.approx(1.0, abs=0.01)
+
+
 def test_whitening_restarts_at_every_interruption(world: type[Any]) -> None:
     """What stands before a gap in the rows does not reach behind it."""
     problem = world(seed=3).problem(0)
