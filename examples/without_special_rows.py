@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from hil.exam.answer_file import open_cases, own_key
 from hil.exam.diagnosing import both_records, described, descriptions, vehicle_records
-from hil.exam.folder import RECORDS, ExamFolder, read_exam
+from hil.exam.folder import ExamFolder, read_exam
 from ident.diagnosis.diagnosis import NamedEffect
 from ident.diagnosis.vehicle import build
 from ident.diagnosis.vehicle.diagnose import diagnose_vehicle
@@ -154,7 +154,7 @@ def truth_of(exam: Path, keys: Sequence[Path]) -> dict[str, str]:
     return {
         case.identifier: case.effects[0].name if case.effects else "none"
         for case in open_cases(folder, own_key(folder, read_exam(folder), keys))
-        if folder.record(case.identifier, RECORDS[-1]).exists()
+        if folder.complete(case.identifier)
     }
 
 

@@ -148,8 +148,13 @@ def _colour_of(blocks: Sequence[tuple[Array, NDArray[np.int64]]]) -> Colour:
     """
     values, ages = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
     count = len(values) if all(len(one) for one, _ in blocks) else 0
-    order = _depth(count)
-    return Colour(autocovariance(values, ages) * ((count + order) / max(count - order, 1)), count)
+    return Colour((1 + _depth(count) / max(count, 1)) * _unpredicted(values, ages), count)
+
+
+def _unpredicted(values: Array, ages: NDArray[np.int64], order: int = ORDER) -> Array:
+    """Autocovariance (ORDER + 1,) of rows (n,), as large as before an autoregression was fitted to them."""
+    count = len(values)
+    return autocovariance(values, ages) * (count / max(count - _depth(count, order), 1))
 
 
 def _depth(count: int, most: int = ORDER) -> int:
@@ -180,13 +185,8 @@ def fit_whitener(
 def colours_of(rows: Rows, left: Left, order: int = ORDER) -> Sequence[Colour]:
     """Colour of what is left of every group of rows, as large as before coefficients and predictions were fitted."""
     inflation, age = len(rows) / max(len(rows) - left.fitted, 1.0), row_ages(rows)
-    found = []
-    for group in range(int(rows.group.max(initial=-1)) + 1):
-        own = np.flatnonzero(rows.group == group)
-        count = len(own)
-        predicted = count / max(count - _depth(count, order), 1)
-        found.append(Colour(inflation * predicted * autocovariance(left.residual[own], age[own]), count))
-    return found
+    places = [np.flatnonzero(rows.group == group) for group in range(int(rows.group.max(initial=-1)) + 1)]
+    return [Colour(inflation * _unpredicted(left.residual[own], age[own], order), len(own)) for own in places]
 
 
 def whitener_of(rows: Rows, colours: Sequence[Colour], order: int = ORDER) -> Whitener:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 
 from ident.diagnosis.evidence.misfit import BELIEVED, Scatter, scatter_along
 
@@ -66,6 +67,23 @@ def test_the_scatter_of_few_stretches_is_told_though_what_is_fitted_follows_thei
     found = few_noisy(400)
     assert np.mean([one.told / one.expected for one in found]) == pytest.approx(9.0, rel=0.15)
     assert [one.freedom for one in found] == pytest.approx([2.0] * 400, rel=0.2)
+
+
+def test_the_scatter_of_few_stretches_is_believed_as_far_as_its_degrees_of_freedom_go() -> None:
+    """Two, against those of what is believed."""
+    told = 2 / (2 + BELIEVED)
+    assert np.mean([one.excess for one in few_noisy(400)]) == pytest.approx(told * 9 + (1 - told), rel=0.15)
+
+
+def test_few_stretches_of_white_noise_say_little() -> None:
+    """Variances of two degrees of freedom, each shrunk to one."""
+    draw, stretch = np.random.default_rng(7), np.repeat(np.arange(60), 10)
+    white = draw.normal(size=(600, 3))
+    white[stretch > 2, 1] = 0.0
+    targets = white @ [2.0, 5.0, -5.0] + draw.normal(size=(400, 600))
+    ratios = [excess_along(white, target, NOTHING, stretch, [slice(1, 2)])[0] for target in targets]
+    told = 2 / (2 + BELIEVED)
+    assert np.quantile(ratios, 0.95) == pytest.approx(1 + told * (stats.chi2(2).ppf(0.95) / 2 - 1), rel=0.15)
 
 
 @given(told=st.floats(0.0, 20.0), freedom=st.floats(0.0, 1e3))
