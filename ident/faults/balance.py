@@ -74,16 +74,6 @@ class Balance:
     part: Array
     weight: float
 
-    def torque_power(self, told: Array) -> float:
-        """Mean square of the generalized torque that weights (20,) of the torques and their rates make."""
-        return float(told @ self.moments[COUNT:, COUNT:] @ told)
-
-    def misfit(self, told: Array, values: Array) -> float:
-        """Mean square of what parameters (11,) leave of the torque, over the torque's [-]."""
-        full = np.concatenate([values, -told])
-        power = self.torque_power(told)
-        return max(float(full @ self.moments @ full), 0.0) / power if power > 0 else 1.0
-
     def unshared(self, mixing: Array) -> float:
         """Mean square of the torques beyond their parts, over theirs [-]."""
         if not np.any(self.part):
@@ -181,45 +171,65 @@ def fit_balances(
         unmodelled: torque that the model may lack, over the torque.
         stretch: recorded time over true time; rates and accelerations grow with it and with its square.
     """
-    told = [np.concatenate([mixing.ravel(), late]) for mixing in mixings]
-    columns = stretch**ORDERS
+    moments = _moments(balances, [np.concatenate([mixing.ravel(), late]) for mixing in mixings], stretch**ORDERS)
     misfits = np.full(len(balances), unmodelled**2)
-    values = prior.values
+    values, std = prior.values, prior_std(prior)
     for _ in range(REWEIGHTED):
-        values = _solved(balances, prior, values, told, misfits, columns)
-        left = [balance.misfit(each, columns * values) for balance, each in zip(balances, told, strict=True)]
-        misfits = unmodelled**2 + np.array(left)
+        away = (values - prior.values) / std
+        precision = (FREEDOM + 1) / (FREEDOM + away**2) / std**2
+        values = _solved(moments, prior.values, precision, misfits)
+        misfits = unmodelled**2 + moments.misfits(values)
     triples = zip(balances, mixings, misfits, strict=True)
     loss = sum(
         balance.weight / 2 * (math.log(misfit / unmodelled**2) + math.log1p(balance.unshared(mixing) / SHARING**2))
         for balance, mixing, misfit in triples
     )
-    away = ((values - prior.values) / prior_std(prior)) ** 2
-    loss += float(np.sum((FREEDOM + 1) / 2 * np.log1p(away / FREEDOM)))
+    loss += float(np.sum((FREEDOM + 1) / 2 * np.log1p(((values - prior.values) / std) ** 2 / FREEDOM)))
     return Fit(values, loss, math.sqrt(max(float(np.max(misfits, initial=0.0)) - unmodelled**2, 0.0)))
 
 
-def _solved(
-    balances: Sequence[Balance],
-    prior: Parameters,
-    values: Array,
-    told: Sequence[Array],
-    misfits: Array,
-    columns: Array,
-) -> Array:
-    """Least squares, every balance weighted by its misfit and the prior by how far from it the values were."""
-    away = ((values - prior.values) / prior_std(prior)) ** 2
-    precision = (FREEDOM + 1) / (FREEDOM + away) / prior_std(prior) ** 2
-    normal, right = np.diag(precision), prior.values * precision
-    for balance, each, misfit in zip(balances, told, misfits, strict=True):
-        power = balance.torque_power(each)
-        if power <= 0:
-            continue
-        scale = balance.weight / (misfit * power)
-        normal = normal + scale * balance.moments[:COUNT, :COUNT] * np.outer(columns, columns)
-        right = right + scale * columns * (balance.moments[:COUNT, COUNT:] @ each)
+@dataclass(frozen=True)
+class _Moments:
+    """Of all balances, with what their torques are told to be.
+
+    Attributes:
+        theta: (B, 11, 11) of the parameters' columns.
+        crossed: (B, 11) of those with the generalized torque.
+        powers: (B,) mean squares of that torque.
+        weights: (B,) numbers of independent samples.
+    """
+
+    theta: Array
+    crossed: Array
+    powers: Array
+    weights: Array
+
+    def misfits(self, values: Array) -> Array:
+        """(B,) mean squares of what parameters (11,) leave of the torque, over the torque's [-]."""
+        left = self.theta @ values @ values - 2 * self.crossed @ values + self.powers
+        driven = self.powers > 0
+        return np.where(driven, np.maximum(left, 0.0) / np.where(driven, self.powers, 1.0), 1.0)
+
+
+def _moments(balances: Sequence[Balance], told: Sequence[Array], columns: Array) -> _Moments:
+    """With weights (20,) of the torques and their rates for each, and factors (11,) on the parameters' columns."""
+    weights = np.array([balance.weight for balance in balances])
+    told_by, size = DRIVES**2 + DRIVES, len(balances)
+    whole = np.array([balance.moments for balance in balances]).reshape(size, COUNT + told_by, COUNT + told_by)
+    torques = np.array(told).reshape(size, told_by, 1)
+    crossed = (whole[:, :COUNT, COUNT:] @ torques)[..., 0] * columns
+    powers = (np.swapaxes(torques, 1, 2) @ whole[:, COUNT:, COUNT:] @ torques)[:, 0, 0]
+    return _Moments(whole[:, :COUNT, :COUNT] * np.outer(columns, columns), crossed, powers, weights)
+
+
+def _solved(moments: _Moments, known: Array, precision: Array, misfits: Array) -> Array:
+    """Least squares with every balance weighted by its misfit, about values (11,) known so precisely before."""
+    driven = moments.powers > 0
+    scales = np.where(driven, moments.weights / (misfits * np.where(driven, moments.powers, 1.0)), 0.0)
+    normal = np.diag(precision) + np.einsum("b,bij->ij", scales, moments.theta)
+    right = known * precision + scales @ moments.crossed
     root = 1 / np.sqrt(np.diag(normal))
-    scaled, wanted = normal * np.outer(root, root), root * right
+    scaled, wanted = normal * root * root[:, None], root * right
     # Where nothing but the prior tells a combination it may drown in rounding: least norm then.
     found = np.linalg.lstsq(scaled, wanted, rcond=None)[0]
     if np.any(found < 0):

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.plant.vectorised import CHUNK, Inputs, Instruction, Vectorised, run, value_of
+from ident.plant.vectorised import Inputs, Instruction, Vectorised, run, samples_of, value_of
 
 Array = NDArray[np.float64]
 
@@ -27,22 +27,17 @@ class Prepared:
     """
 
     def __init__(self, function: Vectorised, *fixed: Array) -> None:
-        self._samples = next(len(argument) for argument in fixed if argument.ndim == 2)
-        self._last = len(fixed)
-        columns = [np.ascontiguousarray(argument.T) for argument in fixed]
-        self._parts: list[tuple[slice, _Rest]] = []
-        for start in range(0, self._samples, CHUNK):
-            part = slice(start, start + CHUNK)
-            inputs = dict(enumerate(list(values[:, part] if values.ndim == 2 else values) for values in columns))
-            self._parts.append((part, _rest(function.program, inputs)))
+        self._samples, self._last = samples_of(fixed), len(fixed)
+        self._parts = [(part, _rest(function.program, inputs)) for part, inputs in function.chunks(fixed)]
         rest, self._entries = self._parts[0][1], len(function.places[0])
         self.touched = tuple(sorted(targets[1] for code, _, targets, _ in rest.program if code == ca.OP_OUTPUT))
 
     def entries(self, last: Array) -> Array:
         """(len(touched), N) of the entries touched, for a last argument (n,)."""
         result = np.empty((self._entries, self._samples))
+        inputs: Inputs = {(self._last, element): value for element, value in enumerate(last)}
         for part, rest in self._parts:
-            run(rest.program, {self._last: list(last)}, dict(rest.known), result[:, part])
+            run(rest.program, inputs, dict(rest.known), result[:, part])
         return result[list(self.touched)]
 
 
@@ -72,7 +67,7 @@ def _rest(program: Sequence[Instruction], inputs: Inputs) -> _Rest:
 
     for instruction in program:
         code, sources, targets, constant = instruction
-        if code == ca.OP_INPUT and sources[0] not in inputs:
+        if code == ca.OP_INPUT and sources not in inputs:
             left.append(instruction)
             waiting.add(targets[0])
         elif code not in (ca.OP_INPUT, ca.OP_CONST) and not waiting.isdisjoint(sources):

@@ -6,7 +6,7 @@ instructions numpy is about ten times faster.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from types import MappingProxyType
 from typing import Any, Final
@@ -56,8 +56,8 @@ CHUNK: Final = 8192
 Instruction = tuple[int, tuple[int, ...], tuple[int, ...], float]
 """CasADi's code of the operation, where its operands are, where its result goes, value of a constant."""
 
-Inputs = Mapping[int, Sequence[Any]]
-"""Elements of arguments, by the number of the argument."""
+Inputs = Mapping[tuple[int, ...], Any]
+"""Elements of arguments, by the number of the argument and their own."""
 
 
 class Vectorised:
@@ -116,14 +116,23 @@ class Vectorised:
 
     def entries(self, *arguments: Array) -> Array:
         """The outputs that are no structural zeros, (E, N) at `places`; arguments as for the call."""
-        samples = next(len(argument) for argument in arguments if argument.ndim == 2)
-        columns = [np.ascontiguousarray(argument.T) for argument in arguments]
-        result = np.empty((len(self.places[0]), samples))
-        for start in range(0, samples, CHUNK):
-            part = slice(start, start + CHUNK)
-            inputs = dict(enumerate(list(values[:, part] if values.ndim == 2 else values) for values in columns))
+        result = np.empty((len(self.places[0]), samples_of(arguments)))
+        for part, inputs in self.chunks(arguments):
             run(self.program, inputs, {}, result[:, part])
         return result
+
+    def chunks(self, arguments: Sequence[Array]) -> Iterator[tuple[slice, Inputs]]:
+        """What the program takes of the first of its arguments, CHUNK samples at a time."""
+        whole = {place: arguments[place[0]].T[place[1]] for place in self.inputs if place[0] < len(arguments)}
+        taken = {place: np.array(values) if np.ndim(values) else values for place, values in whole.items()}
+        for start in range(0, samples_of(arguments), CHUNK):
+            part = slice(start, start + CHUNK)
+            yield part, {place: values[part] if np.ndim(values) else values for place, values in taken.items()}
+
+
+def samples_of(arguments: Sequence[Array]) -> int:
+    """N of arguments (N, n), of which some may be (n,)."""
+    return next(len(argument) for argument in arguments if argument.ndim == 2)
 
 
 def run(program: Sequence[Instruction], inputs: Inputs, work: dict[int, Any], result: Array) -> None:
@@ -131,7 +140,7 @@ def run(program: Sequence[Instruction], inputs: Inputs, work: dict[int, Any], re
 
     Args:
         program: the instructions.
-        inputs: elements of every argument, by its number.
+        inputs: elements of the arguments.
         work: what stands in places already; written.
         result: (E, N) written, the entries that the instructions put out.
     """
@@ -148,7 +157,7 @@ def value_of(instruction: Instruction, inputs: Inputs, work: Mapping[int, Any]) 
     code, sources, _, constant = instruction
     operation = OPERATIONS.get(code)
     if operation is None:
-        return inputs[sources[0]][sources[1]] if code == ca.OP_INPUT else constant
+        return inputs[sources] if code == ca.OP_INPUT else constant
     # There are hundreds of thousands of these calls.
     return operation(work[sources[0]], work[sources[1]]) if len(sources) == 2 else operation(work[sources[0]])
 

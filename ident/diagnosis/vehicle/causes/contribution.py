@@ -59,8 +59,7 @@ def _change(source: Source, context: Context, parameters: Array, changed: Array)
     """What it adds to one source before the filter (M, rows), whose signals are `changed` without it; None: nothing."""
     context = replace(context, parameters=parameters[: len(PARAMETER_NAMES)])
     inputs = context.inputs(source)
-    seen = _seen(source, context)
-    if np.array_equal(changed[:, seen], inputs[:, seen]):
+    if all(np.array_equal(changed[:, column], inputs[:, column]) for column in _seen(source, context)):
         return None
     return np.asarray((context.rows_of(changed, source) - context.plain(source))[..., 0])
 

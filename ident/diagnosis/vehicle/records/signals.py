@@ -52,8 +52,8 @@ class Signals:
     torques: Array
 
     def as_inputs(self) -> Array:
-        """(N, INPUTS), the columns of `inputs.SLICES`; couplings are not twisted."""
-        inputs = np.zeros((len(self.heading), INPUTS))
+        """(N, INPUTS), the columns of `inputs.SLICES`, each in one piece of memory; couplings are not twisted."""
+        inputs = np.zeros((len(self.heading), INPUTS), order="F")
         inputs[:, SLICES["heading"]] = self.heading[:, None]
         for name in ("alpha", "beta", "alpha_rate", "beta_rate", "alpha_acceleration", "beta_acceleration", "torques"):
             inputs[:, SLICES[name]] = getattr(self, name)

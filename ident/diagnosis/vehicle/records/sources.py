@@ -165,7 +165,7 @@ def _sources(
     common = {
         "step": segment.step,
         "spec": spec,
-        "inputs": loose.inputs[::stride],
+        "inputs": np.asfortranarray(loose.inputs[::stride]),
         "sample_time": segment.sample_time * stride,
         "interval": segment.sample_time,
         "factor": factor // stride,
