@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Basis = Callable[[Array], Array]
 """Values x (...) -> K functions of it (..., K)."""
-Design = Callable[[Basis], Sequence[Array | None]]
-"""Functions -> their columns (N, K) in every block, filtered like it; None where the law does not act."""
+
+
+class Design(Protocol):
+    """Columns of some functions in every block, filtered like it."""
+
+    def __call__(self, basis: Basis, *, apart: bool = False) -> Sequence[Array | None]:
+        """(N, K), the sum of all equals; or (N, J K) with those of each beside the others'; None: no law acts there."""
 
 
 class Variable(enum.StrEnum):
@@ -101,8 +106,8 @@ def law_name(variable: str, partner: str, of: str = "") -> str:
 def across(parts: Sequence[Dependence]) -> Dependence:
     """One dependence of several records, with columns in the blocks of all."""
 
-    def design(basis: Basis) -> Sequence[Array | None]:
-        return [column for part in parts for column in part.design(basis)]
+    def design(basis: Basis, *, apart: bool = False) -> Sequence[Array | None]:
+        return [column for part in parts for column in part.design(basis, apart=apart)]
 
     return replace(parts[0], arguments=tuple(x for part in parts for x in part.arguments), design=design)
 

@@ -53,7 +53,8 @@ def _of_others(axis: AxisModel) -> Iterator[Dependence]:
 def _dependence(axis: AxisModel, variable: Variable, partner: Partner, x: Array, unit: str, of: str = "") -> Dependence:
     factor = _partner(axis, partner)
 
-    def design(basis: Basis) -> Sequence[Array | None]:
+    # An axis has no equals: apart or together is the same.
+    def design(basis: Basis, *, apart: bool = False) -> Sequence[Array | None]:
         columns = basis(x)
         return axis.alone(columns if factor is None else factor[:, None] * columns)
 

@@ -137,19 +137,25 @@ def _columns(taken: Sequence[Variant], place: int, length: int) -> list[Array]:
 def _peaks(
     problem: Problem, candidate: Candidate, residual: Sequence[tuple[Array, float]]
 ) -> tuple[list[float], float]:
-    """Orders of the largest peaks of the spectrum over the angle, and how many independent ones there are."""
+    """Orders of the largest peaks of the spectrum over the angle, and how many independent ones there are.
+
+    Equals have an angle and a lever each, and one spectrum: what it has of all is the sum of what it has of each.
+    """
     rows = list(_rows(problem, _dependence(problem, candidate), residual))
     if not rows:
         return [], 0.0
-    angle, lever, left, reach = (np.concatenate(parts) for parts in zip(*rows, strict=True))
-    span = float(np.ptp(angle))
+    angles, levers, lefts, reaches = (np.concatenate(parts) for parts in zip(*rows, strict=True))
+    span, start = float(np.ptp(angles, axis=0).max()), angles.min()
+    acting = levers != 0
+    angle, lever, reach = angles[acting], levers[acting], reaches[acting]
+    left = np.broadcast_to(lefts[:, None], acting.shape)[acting]
     highest = min(float(np.quantile(reach, 1 - SHARE)), MOST * math.pi / max(span, np.finfo(float).tiny))
     if not span > 0 or not np.isfinite(highest) or highest * span < 2 * math.pi * FEWEST:
         return [], 0.0
     resolution = 2 * math.pi / span
     # Bins of a quarter of the shortest period: what falls between them is averaged by less than a tenth.
     width = math.pi / (2 * highest)
-    bins = np.round((angle - angle.min()) / width).astype(np.int64)
+    bins = np.round((angle - start) / width).astype(np.int64)
     length = int(2 ** math.ceil(math.log2(PADDED * (bins.max() + 1))))
     summed = np.bincount(bins, left * lever, minlength=length)
     orders = 2 * math.pi * np.asarray(np.fft.rfftfreq(length, width), dtype=np.float64)
@@ -164,15 +170,18 @@ def _peaks(
 def _rows(
     problem: Problem, dependence: Dependence, residual: Sequence[tuple[Array, float]]
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """Angle, lever over noise, what is left over noise, and the highest order within the bandwidth, by block."""
-    levers = dependence.design(lambda x: np.ones((*np.shape(x), 1)))
+    """By block: angles and levers over noise of all equals, what is left over noise, and orders within the bandwidth.
+
+    Every row (n) has an angle, a lever, and the highest order that is within the bandwidth, for each of J equals.
+    """
+    levers = dependence.design(lambda x: np.ones((*np.shape(x), 1)), apart=True)
     for block, x, lever, (left, noise) in zip(problem.blocks, dependence.arguments, levers, residual, strict=True):
         chosen = kept_rows(block).samples.ravel()
         if x is None or lever is None or not noise > 0 or not chosen.size:
             continue
-        rate = np.abs(np.gradient(x[:, 0], block.sample_time))[chosen]
-        reach = block.bandwidth / np.maximum(rate, np.finfo(float).tiny)
-        yield x[chosen, 0], lever[chosen, 0] / noise, left[chosen] / noise, reach
+        rate = np.abs(np.gradient(x, block.sample_time, axis=0))[chosen]
+        reach = block.bandwidth / np.maximum(rate, np.finfo(float).eps)
+        yield x[chosen], lever[chosen] / noise, left[chosen] / noise, reach
 
 
 def _largest(orders: Array, ratio: Array, resolution: float) -> list[float]:

@@ -158,8 +158,8 @@ def _turned(candidate: Candidate, kept: list[int]) -> Turned | None:
 
 
 def _dependence(dependence: Dependence, kept: list[int]) -> Dependence:
-    def design(basis: Basis) -> Series:
-        return _chosen(dependence.design(basis), kept)
+    def design(basis: Basis, *, apart: bool = False) -> Series:
+        return _chosen(dependence.design(basis, apart=apart), kept)
 
     return replace(dependence, arguments=tuple(_chosen(dependence.arguments, kept)), design=design)
 

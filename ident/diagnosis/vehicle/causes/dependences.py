@@ -96,7 +96,7 @@ def _dependence(
     sources = [each.source for each in coarse]
     joints = [FORWARD] if where in CHASSIS else [row - FIRST_JOINT for row in rows_of(where)]
 
-    def design(basis: Basis) -> Sequence[Array | None]:
+    def design(basis: Basis, *, apart: bool = False) -> Sequence[Array | None]:
         found: list[Array | None] = []
         for each, lever in zip(coarse, levers, strict=True):
             source = each.source
@@ -110,7 +110,8 @@ def _dependence(
                     for joint, x in zip(joints, variables, strict=True)
                 ]
                 for row in rows:
-                    made = each.rows([(factors[row], function) for factors, function in functions])
+                    parts = [(factors[row], function) for factors, function in functions]
+                    made = np.hstack([each.rows([part]) for part in parts]) if apart else each.rows(parts)
                     columns[row] = made if made.any() else None
             found += columns
         return found

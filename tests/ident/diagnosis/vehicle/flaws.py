@@ -25,3 +25,10 @@ def rippled(segment: Segment, vehicle: VehicleDescription, amplitude: float) -> 
     """A motor that gives more or less than it reports [Nm], twice a revolution."""
     torque = amplitude * np.sin(2 * vehicle.geometry.gear_ratio * segment.wheel_angles[:, 2] + 0.4)
     return replace(segment, motor_torques=segment.motor_torques - torque[:, None] * np.array([0, 0, 1, 0]))
+
+
+def rippled_alike(segment: Segment, vehicle: VehicleDescription, amplitude: float) -> Segment:
+    """The same of all four motors, each over its own angle, which begins anywhere."""
+    angles = segment.wheel_angles + np.array([0.0, 0.3, 1.1, 2.0])
+    torques = amplitude * np.sin(2 * vehicle.geometry.gear_ratio * angles + 0.4)
+    return replace(segment, wheel_angles=angles, motor_torques=segment.motor_torques - torques)

@@ -15,7 +15,7 @@ from ident.diagnosis.vehicle.experiment.ideal import Drive
 from ident.effects.extended import ExtendedModel
 from ident.records.record import Record, Segment, Step
 from ident.vehicle.description import VehicleDescription
-from tests.ident.diagnosis.vehicle.flaws import rippled, sticky
+from tests.ident.diagnosis.vehicle.flaws import rippled, rippled_alike, sticky
 
 Drives = Callable[..., tuple[Record, Record]]
 
@@ -39,6 +39,7 @@ def judged(drives: Drives, flaw: Callable[..., Segment], vehicle: VehicleDescrip
     [
         (partial(sticky, friction=3.0, fall=0.25), "stribeck@steering_right", (3.0, 0.25)),
         (partial(rippled, amplitude=0.1), "torque_ripple@drive_fr", (0.1, 2.0, 0.4)),
+        (partial(rippled_alike, amplitude=0.05), "torque_ripple@drives", (0.05, 2.0, 0.4)),
     ],
 )
 def test_a_flaw_is_named_with_its_size(
