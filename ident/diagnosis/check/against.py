@@ -20,11 +20,11 @@ def deviations_against(fitted: Fitted) -> Array:
     """
     rows, sets = fitted.rows, [fitted.found.variants, *(fitted.others(index) for index in range(fitted.count))]
     models = [rows.stack(list(fitted.held_out_refit(one).blocks)) for one in sets]
-    left = rows.target[:, None] - np.stack(models, axis=1)
-    # Where the effects say nothing, the rows shall say nothing of them.
-    whole = np.where(_told_rows(fitted)[:, None], left[:, :1], left[:, 1:])
-    white = fitted.found.whitener.apply(rows, np.hstack([whole, left[:, 1:]]))[rows.confirming]
-    whole, without = np.hsplit(white, 2)
+    white = fitted.found.whitener.apply(rows, rows.target[:, None] - np.stack(models, axis=1))
+    white, told = white[rows.confirming], _told_rows(fitted)[rows.confirming]
+    # Where the effects say nothing, the rows shall say nothing of them. What is white already has no edges there.
+    without = white[:, 1:]
+    whole = np.where(told[:, None], white[:, :1], without)
     added = without - whole
     deviation = 2 * np.sqrt(np.sum(added**2, axis=0) + _left_open(fitted, added))
     more = np.sum(whole**2, axis=0) - np.sum(without**2, axis=0)
