@@ -85,3 +85,23 @@ def test_what_the_fitted_rows_leave_open_counts(world: Callable[..., Any], asked
 
     made = [against(world, asked, seed, hardly_told) for seed in range(10)]
     assert max(made) < 3.5
+
+
+def test_what_nothing_is_told_of_speaks_neither_for_nor_against(world: Callable[..., Any], asked: Asked) -> None:
+    """An effect that is there, large, and told in every other stretch of the confirming rows: it is not refuted.
+
+    Where it is told and where it is not, what is left differs by what it adds: an edge that noise does not have.
+    """
+    for seed in range(10):
+        made = world(seed, samples=120, true={"b": 20 * SIZE})
+        problems = [made.problem(0), made.problem(1)]
+        question = asked(*problems)
+        blocks = [block for block, _ in question.regression.rows.blocks]
+        told = tuple(np.arange(len(block.target)) // 10 % 2 == 0 for block in blocks)
+        found = Taken(variants_of("b", question), Noise(question.colours, question.colours.usual))
+        whole, nothing, partly = (
+            deviations_against(Fitted(problems, question.regression, found, 1, masks))[0]
+            for masks in ((), tuple(np.zeros_like(one) for one in told), told)
+        )
+        assert nothing == 0.0
+        assert whole < partly < 0
