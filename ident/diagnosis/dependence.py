@@ -112,6 +112,10 @@ def across(parts: Sequence[Dependence]) -> Dependence:
     return replace(parts[0], arguments=tuple(x for part in parts for x in part.arguments), design=design)
 
 
+NEAREST: Final = 0.02
+"""Of the rows, that are nearest to a reversal, or slowest: what is over before them no row can bound."""
+
+
 def path_since_reversal(position: Array, velocity: Array) -> Array:
     """Distance (N,) that a position has gone since its velocity last changed sign."""
     gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(position)))])

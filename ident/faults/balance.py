@@ -174,9 +174,12 @@ def fit_balances(
     moments = _moments(balances, [np.concatenate([mixing.ravel(), late]) for mixing in mixings], stretch**ORDERS)
     misfits = np.full(len(balances), unmodelled**2)
     values, std = prior.values, prior_std(prior)
+
+    def away(found: Array) -> Array:
+        return ((found - prior.values) / std) ** 2
+
     for _ in range(REWEIGHTED):
-        away = (values - prior.values) / std
-        precision = (FREEDOM + 1) / (FREEDOM + away**2) / std**2
+        precision = (FREEDOM + 1) / (FREEDOM + away(values)) / std**2
         values = _solved(moments, prior.values, precision, misfits)
         misfits = unmodelled**2 + moments.misfits(values)
     triples = zip(balances, mixings, misfits, strict=True)
@@ -184,7 +187,7 @@ def fit_balances(
         balance.weight / 2 * (math.log(misfit / unmodelled**2) + math.log1p(balance.unshared(mixing) / SHARING**2))
         for balance, mixing, misfit in triples
     )
-    loss += float(np.sum((FREEDOM + 1) / 2 * np.log1p(((values - prior.values) / std) ** 2 / FREEDOM)))
+    loss += float(np.sum((FREEDOM + 1) / 2 * np.log1p(away(values) / FREEDOM)))
     return Fit(values, loss, math.sqrt(max(float(np.max(misfits, initial=0.0)) - unmodelled**2, 0.0)))
 
 
@@ -193,7 +196,7 @@ class _Moments:
     """Of all balances, with what their torques are told to be.
 
     Attributes:
-        theta: (B, 11, 11) of the parameters' columns.
+        theta: (B, 11, 11) of the parameters' columns, stretched.
         crossed: (B, 11) of those with the generalized torque.
         powers: (B,) mean squares of that torque.
         weights: (B,) numbers of independent samples.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ident.plant import symbolic
 from ident.plant.modes import MODE_TOLERANCE, Mode
-from ident.plant.vectorised import Vectorised
+from ident.plant.vectorised import Vectorised, count_of
 from ident.vehicle.geometry import Geometry
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ def evaluate(function: Any, shape: tuple[int, ...], *arguments: Array) -> Array:
     Returns:
         (N, *shape).
     """
-    samples = next(len(argument) for argument in arguments if argument.ndim == 2)
+    samples = count_of(arguments)
     if samples == 0:
         return np.zeros((0, *shape))
     if samples >= MANY and all(argument.ndim == 1 or len(argument) == samples for argument in arguments):

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.plant.vectorised import Inputs, Instruction, Vectorised, run, samples_of, value_of
+from ident.plant.vectorised import Inputs, Instruction, Vectorised, count_of, run, value_of
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ class Prepared:
     """
 
     def __init__(self, function: Vectorised, *fixed: Array) -> None:
-        self._samples, self._last = samples_of(fixed), len(fixed)
+        self._samples, self._last = count_of(fixed), len(fixed)
         self._parts = [(part, _rest(function.program, inputs)) for part, inputs in function.chunks(fixed)]
         rest, self._entries = self._parts[0][1], len(function.places[0])
         self.touched = tuple(sorted(targets[1] for code, _, targets, _ in rest.program if code == ca.OP_OUTPUT))

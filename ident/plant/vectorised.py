@@ -57,7 +57,7 @@ Instruction = tuple[int, tuple[int, ...], tuple[int, ...], float]
 """CasADi's code of the operation, where its operands are, where its result goes, value of a constant."""
 
 Inputs = Mapping[tuple[int, ...], Any]
-"""Elements of arguments, by the number of the argument and their own."""
+"""Elements of arguments, by (argument, element)."""
 
 
 class Vectorised:
@@ -116,21 +116,21 @@ class Vectorised:
 
     def entries(self, *arguments: Array) -> Array:
         """The outputs that are no structural zeros, (E, N) at `places`; arguments as for the call."""
-        result = np.empty((len(self.places[0]), samples_of(arguments)))
+        result = np.empty((len(self.places[0]), count_of(arguments)))
         for part, inputs in self.chunks(arguments):
             run(self.program, inputs, {}, result[:, part])
         return result
 
     def chunks(self, arguments: Sequence[Array]) -> Iterator[tuple[slice, Inputs]]:
-        """What the program takes of the first of its arguments, CHUNK samples at a time."""
+        """What the program reads of as many of its arguments as are given, CHUNK samples at a time."""
         whole = {place: arguments[place[0]].T[place[1]] for place in self.inputs if place[0] < len(arguments)}
         taken = {place: np.array(values) if np.ndim(values) else values for place, values in whole.items()}
-        for start in range(0, samples_of(arguments), CHUNK):
+        for start in range(0, count_of(arguments), CHUNK):
             part = slice(start, start + CHUNK)
             yield part, {place: values[part] if np.ndim(values) else values for place, values in taken.items()}
 
 
-def samples_of(arguments: Sequence[Array]) -> int:
+def count_of(arguments: Sequence[Array]) -> int:
     """N of arguments (N, n), of which some may be (n,)."""
     return next(len(argument) for argument in arguments if argument.ndim == 2)
 

@@ -20,7 +20,7 @@ from ident.diagnosis.axis.motion import AxisMotion
 from ident.diagnosis.axis.positional import friction_position, gravity_loads, inertia_position
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.observations.delays import DAMPING, HELD, delayed, sprung
-from ident.diagnosis.observations.orders import FEWEST
+from ident.diagnosis.observations.periodogram import FEWEST
 from ident.diagnosis.observations.tried import RATIO, tried_between
 from ident.diagnosis.problem import Candidate, Periodic, Variant
 from ident.effects import EffectParameter

@@ -24,7 +24,7 @@ from ident.diagnosis.axis.motion import (
 )
 from ident.diagnosis.axis.reversals import Sticking, Untold, turned_round, untold_while_sticking
 from ident.diagnosis.axis.scale import LARGEST_HOLD, Scale, nominal
-from ident.diagnosis.dependence import path_since_reversal
+from ident.diagnosis.dependence import NEAREST, path_since_reversal
 from ident.diagnosis.observations.delays import delayed
 from ident.errors import EstimationError, RecordError
 from ident.estimate.axis.cutoff import LARGEST_CUTOFF, position_cutoff
@@ -33,9 +33,6 @@ from ident.estimate.filters import FILTER_ORDER, SEVEN, differentiate, mirrored
 from ident.records.axis_record import AxisRecord, AxisSignals
 
 Array = NDArray[np.float64]
-
-NEAREST: Final = 0.02
-"""Of the rows, that are nearest to a reversal, or slowest."""
 
 PASSED: Final = 3 * np.pi / (8 * math.sqrt(2))
 """Noise bandwidth of the filter of the rows over its cutoff: the integral of 1 / (1 + x⁴)² over x."""

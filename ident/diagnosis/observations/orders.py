@@ -1,8 +1,8 @@
 """Periods of a force over an angle, from the spectrum of what the parameters leave.
 
 Were the order of a ripple tried on a grid, one that the grid lacks would have no name. What the parameters leave of the
-fitted rows is transformed over the angle instead (as Lomb 1976 does over time), lever and noise of every row allowed
-for; its peaks are the orders worth trying, and a refit makes them exact. Chance has as many peaks as the record has
+fitted rows is transformed over the angle instead (`periodogram`), lever and noise of every row allowed for; its peaks
+are the orders worth trying, and a refit makes them exact. Chance has as many peaks as the record has
 independent orders: their number is the price.
 """
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.dependence import Basis, Dependence
 from ident.diagnosis.observations.linear import least_squares, rms, unit_of
+from ident.diagnosis.observations.periodogram import Periodogram, Turned, periodogram
 from ident.diagnosis.observations.rows import kept_rows
 from ident.diagnosis.problem import Candidate, Problem, Variant
 
@@ -25,18 +26,6 @@ Array = NDArray[np.float64]
 
 PEAKS: Final = 3
 """Of a spectrum that are tried."""
-
-PADDED: Final = 4
-"""Points of a spectrum over its resolution."""
-
-SHARE: Final = 0.1
-"""Of the rows that must be slow enough for a wave over the angle to be within their bandwidth."""
-
-MOST: Final = 2.0**17
-"""Orders that are looked at, over the resolution: beyond them nothing but rows at rest is slow enough."""
-
-FEWEST: Final = 2.0
-"""Periods over the range of the angle below which a force is no ripple."""
 
 
 def with_orders(
@@ -137,43 +126,18 @@ def _columns(taken: Sequence[Variant], place: int, length: int) -> list[Array]:
 def _peaks(
     problem: Problem, candidate: Candidate, residual: Sequence[tuple[Array, float]]
 ) -> tuple[list[float], float]:
-    """Orders of the largest peaks of the spectrum over the angle, and how many independent ones there are.
-
-    Equals have an angle and a lever each, and one spectrum: what it has of all is the sum of what it has of each.
-    """
-    rows = list(_rows(problem, _dependence(problem, candidate), residual))
-    if not rows:
+    """Orders of the largest peaks of the spectrum over the angle, and how many independent ones there are."""
+    parts = list(_rows(problem, _dependence(problem, candidate), residual))
+    if not parts:
         return [], 0.0
-    angles, levers, lefts, reaches = (np.concatenate(parts) for parts in zip(*rows, strict=True))
-    span, start = float(np.ptp(angles, axis=0).max()), angles.min()
-    acting = levers != 0
-    angle, lever, reach = angles[acting], levers[acting], reaches[acting]
-    left = np.broadcast_to(lefts[:, None], acting.shape)[acting]
-    highest = min(float(np.quantile(reach, 1 - SHARE)), MOST * math.pi / max(span, np.finfo(float).tiny))
-    if not span > 0 or not np.isfinite(highest) or highest * span < 2 * math.pi * FEWEST:
-        return [], 0.0
-    resolution = 2 * math.pi / span
-    # Bins of a quarter of the shortest period: what falls between them is averaged by less than a tenth.
-    width = math.pi / (2 * highest)
-    bins = np.round((angle - start) / width).astype(np.int64)
-    length = int(2 ** math.ceil(math.log2(PADDED * (bins.max() + 1))))
-    summed = np.bincount(bins, left * lever, minlength=length)
-    orders = 2 * math.pi * np.asarray(np.fft.rfftfreq(length, width), dtype=np.float64)
-    slow = np.sort(reach)
-    power = np.concatenate([np.cumsum((lever[np.argsort(reach)] ** 2)[::-1])[::-1], [0.0]])
-    shown = power[np.searchsorted(slow, orders)]
-    usable = (orders >= FEWEST * resolution) & (orders <= highest) & (shown > 0)
-    ratio = np.where(usable, 2 * np.abs(np.fft.rfft(summed)) ** 2, 0.0) / np.where(usable, shown, 1.0)
-    return _largest(orders, ratio, resolution), float(highest / resolution)
+    found = periodogram(Turned(*(np.concatenate(series) for series in zip(*parts, strict=True))))
+    return ([], 0.0) if found is None else (_largest(found), found.independent)
 
 
 def _rows(
     problem: Problem, dependence: Dependence, residual: Sequence[tuple[Array, float]]
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """By block: angles and levers over noise of all equals, what is left over noise, and orders within the bandwidth.
-
-    Every row (n) has an angle, a lever, and the highest order that is within the bandwidth, for each of J equals.
-    """
+    """What `Turned` is made of, by block."""
     levers = dependence.design(lambda x: np.ones((*np.shape(x), 1)), apart=True)
     for block, x, lever, (left, noise) in zip(problem.blocks, dependence.arguments, levers, residual, strict=True):
         chosen = kept_rows(block).samples.ravel()
@@ -184,14 +148,14 @@ def _rows(
         yield x[chosen], lever[chosen] / noise, left[chosen] / noise, reach
 
 
-def _largest(orders: Array, ratio: Array, resolution: float) -> list[float]:
+def _largest(spectrum: Periodogram) -> list[float]:
     """Orders (up to PEAKS) of the largest peaks, each a resolution from the others."""
     found: list[float] = []
-    left = ratio.copy()
+    left = spectrum.explained.copy()
     for _ in range(PEAKS):
         best = int(np.argmax(left))
         if left[best] <= 0:
             break
-        found.append(float(orders[best]))
-        left[np.abs(orders - orders[best]) < resolution] = 0.0
+        found.append(float(spectrum.orders[best]))
+        left[np.abs(spectrum.orders - spectrum.orders[best]) < spectrum.resolution] = 0.0
     return found

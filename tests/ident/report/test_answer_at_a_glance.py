@@ -54,7 +54,7 @@ def _problem(part: int, law: Any, named: bool) -> Problem:
         features=x[:, None],
     )
 
-    def design(basis: Basis) -> list[Array | None]:
+    def design(basis: Basis, *, apart: bool = False) -> list[Array | None]:
         return [LEVER * basis(x[:, None])[:, 0]]
 
     columns = [("quadratic_drag", x * np.abs(x))] if named else []

@@ -44,7 +44,7 @@ class BristleCause:
         """Inputs (N, INPUTS) that say what the bristles resist, of an amplitude [Nm] and over an angle [rad]."""
         del setting
         amplitude, angle = sizes
-        changed = np.array(inputs)
+        changed = inputs.copy(order="K")
         columns = [SLICES["bristles"].start + joint for joint in self.joints]
         changed[:, columns] += amplitude * self.bent(inputs, float(angle))
         return changed

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.diagnosis.dependence import path_since_reversal
+from ident.diagnosis.dependence import NEAREST, path_since_reversal
 from ident.diagnosis.names import EffectName, places_of
 from ident.diagnosis.problem import Candidate, Variant
 from ident.diagnosis.vehicle.causes.bending import BristleCause, joint_angle
@@ -25,9 +25,6 @@ ANGLES: Final = (0.01, 0.03, 0.1, 0.3)
 
 WIDEST: Final = 1.0
 """Followed up to that [rad]; wider is a spring, as far as wheels and steering go."""
-
-NEAREST: Final = 0.1
-"""Part of the rows that are nearer to a reversal than what they can bound."""
 
 
 def bristle_causes() -> list[BristleCause]:

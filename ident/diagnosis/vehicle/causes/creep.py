@@ -87,7 +87,7 @@ class Creep:
         """Signals (N, INPUTS) as if it had rolled."""
         speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, self.wheel])
         slip = sizes[0] * speed * traction(inputs, self.wheel, setting) / wheel_load(inputs, setting)
-        changed = np.array(inputs)
+        changed = inputs.copy(order="K")
         roll(changed, self.wheel, slip / setting.geometry.wheel_radius, setting)
         return changed
 

@@ -95,7 +95,7 @@ def _at_standstill(recorded: Array, signals: Signals, side: int, geometry: Geome
     rms[:, wheels], rattles[:, wheels] = rattling_at_standstill(beside, processing, dt)
     if rattles.any():
         return Loose(_hammered(recorded, rms, rattles, geometry, dt), rattles, rolls=False)
-    near, inputs, own = near_middle(signals), np.array(recorded), []
+    near, inputs, own = near_middle(signals), recorded.copy(order="K"), []
     # One number for the whole step: when a motor or a unit crosses differs from repeat to repeat.
     resting = list(_SIDES[1 - side])
     for wheel, across in zip(resting, moved_at_rest(signals.beta[:, resting], near).tolist(), strict=True):

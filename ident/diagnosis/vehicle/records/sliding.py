@@ -75,7 +75,7 @@ class SlidingCause:
 
     def without(self, inputs: Array, sizes: Array, setting: Setting) -> Array:
         """Inputs (N, INPUTS) as if the wheels had rolled, apart from the part 1 - `sizes[0]` of their sliding."""
-        changed = np.array(inputs)
+        changed = inputs.copy(order="K")
         slid = self.sliding(inputs, setting)
         for wheel, ahead in zip(self.wheels, slid.T, strict=True):
             roll(changed, wheel, sizes[0] * ahead / setting.geometry.wheel_radius, setting)
@@ -207,7 +207,7 @@ def rolled_with_others(inputs: Array, wheels: Sequence[int], rolled: Array, samp
 
     So are the torques: what a wheel that hammers loses in sliding is not known. `rolled` are its `rolling_rates`.
     """
-    changed = np.array(inputs)
+    changed = inputs.copy(order="K")
     ahead = zero_phase(inputs[:, SLICES["beta_rate"]][:, wheels] - rolled, BAND, sample_time)
     for name, change in (
         ("beta_rate", ahead),

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ident.diagnosis.dependence import Dependence, Partner, Variable
+from ident.diagnosis.dependence import Basis, Dependence, Partner, Variable
 from ident.diagnosis.law.reach import told_samples
 from ident.diagnosis.observations.rows import make_rows
 from ident.diagnosis.problem import Problem
@@ -15,7 +15,11 @@ from ident.diagnosis.problem import Problem
 
 def _with_law(problem: Problem, low: float, high: float, period: float = 0.0) -> Problem:
     x = [np.linspace(low, high, len(block.target))[:, None] for block in problem.blocks]
-    law = Dependence("place", Variable.ANGLE, Partner.NOTHING, "rad", "Nm", tuple(x), lambda basis: [], period=period)
+
+    def design(basis: Basis, *, apart: bool = False) -> list[None]:
+        return []
+
+    law = Dependence("place", Variable.ANGLE, Partner.NOTHING, "rad", "Nm", tuple(x), design, period=period)
     return replace(problem, dependences=(law,))
 
 
