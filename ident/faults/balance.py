@@ -193,25 +193,21 @@ def fit_balances(
 
 @dataclass(frozen=True)
 class _Moments:
-    """Of all balances, with what their torques are told to be.
+    """Of all balances, over the power of the generalized torque as it is told; zero where that has none.
 
     Attributes:
         theta: (B, 11, 11) of the parameters' columns, stretched.
-        crossed: (B, 11) of those with the generalized torque.
-        powers: (B,) mean squares of that torque.
+        crossed: (B, 11) of those with the torque.
         weights: (B,) numbers of independent samples.
     """
 
     theta: Array
     crossed: Array
-    powers: Array
     weights: Array
 
     def misfits(self, values: Array) -> Array:
         """(B,) mean squares of what parameters (11,) leave of the torque, over the torque's [-]."""
-        left = self.theta @ values @ values - 2 * self.crossed @ values + self.powers
-        driven = self.powers > 0
-        return np.where(driven, np.maximum(left, 0.0) / np.where(driven, self.powers, 1.0), 1.0)
+        return np.maximum(self.theta @ values @ values - 2 * self.crossed @ values + 1, 0.0)
 
 
 def _moments(balances: Sequence[Balance], told: Sequence[Array], columns: Array) -> _Moments:
@@ -222,13 +218,14 @@ def _moments(balances: Sequence[Balance], told: Sequence[Array], columns: Array)
     torques = np.array(told).reshape(size, told_by, 1)
     crossed = (whole[:, :COUNT, COUNT:] @ torques)[..., 0] * columns
     powers = (np.swapaxes(torques, 1, 2) @ whole[:, COUNT:, COUNT:] @ torques)[:, 0, 0]
-    return _Moments(whole[:, :COUNT, :COUNT] * np.outer(columns, columns), crossed, powers, weights)
+    over = np.divide(1.0, powers, out=np.zeros(size), where=powers > 0)
+    theta = whole[:, :COUNT, :COUNT] * np.outer(columns, columns)
+    return _Moments(theta * over[:, None, None], crossed * over[:, None], weights)
 
 
 def _solved(moments: _Moments, known: Array, precision: Array, misfits: Array) -> Array:
     """Least squares with every balance weighted by its misfit, about values (11,) known so precisely before."""
-    driven = moments.powers > 0
-    scales = np.where(driven, moments.weights / (misfits * np.where(driven, moments.powers, 1.0)), 0.0)
+    scales = moments.weights / misfits
     normal = np.diag(precision) + np.einsum("b,bij->ij", scales, moments.theta)
     right = known * precision + scales @ moments.crossed
     root = 1 / np.sqrt(np.diag(normal))

@@ -124,7 +124,7 @@ class Vectorised:
     def chunks(self, arguments: Sequence[Array]) -> Iterator[tuple[slice, Inputs]]:
         """What the program reads of as many of its arguments as are given, CHUNK samples at a time."""
         whole = {place: arguments[place[0]].T[place[1]] for place in self.inputs if place[0] < len(arguments)}
-        taken = {place: np.array(values) if np.ndim(values) else values for place, values in whole.items()}
+        taken = {place: np.ascontiguousarray(values) if np.ndim(values) else values for place, values in whole.items()}
         for start in range(0, count_of(arguments), CHUNK):
             part = slice(start, start + CHUNK)
             yield part, {place: values[part] if np.ndim(values) else values for place, values in taken.items()}

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
 from ident.diagnosis.problem import Channel
-from ident.diagnosis.vehicle.records.inputs import SLICES
+from ident.diagnosis.vehicle.records.inputs import SLICES, copied
 from ident.diagnosis.vehicle.records.signals import shifted
 from ident.diagnosis.vehicle.records.sources import Source
 from ident.effects import make_effect
@@ -142,7 +142,7 @@ def _starts(source: Source, length: int) -> tuple[NDArray[np.int64], NDArray[np.
 
 def without_encoder_errors(inputs: Array, model: ExtendedModel, sample_time: float) -> Array:
     """Inputs (N, INPUTS) with the true steering angles in place of those that late or misadjusted encoders report."""
-    true = inputs.copy(order="K")
+    true = copied(inputs)
     for side, (delay, offset) in enumerate(zip(model.encoder_delays(), model.encoder_offsets(), strict=True)):
         for name in ("alpha", "alpha_rate", "alpha_acceleration"):
             column = SLICES[name].start + side

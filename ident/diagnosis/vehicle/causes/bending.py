@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.vehicle.records.inputs import SLICES
+from ident.diagnosis.vehicle.records.inputs import SLICES, copied
 from ident.diagnosis.vehicle.records.transforms import Setting
 from ident.plant.bristles import FIRST_JOINT, bent_along
 from ident.plant.places import STEERING, rows_of
@@ -44,7 +44,7 @@ class BristleCause:
         """Inputs (N, INPUTS) that say what the bristles resist, of an amplitude [Nm] and over an angle [rad]."""
         del setting
         amplitude, angle = sizes
-        changed = inputs.copy(order="K")
+        changed = copied(inputs)
         columns = [SLICES["bristles"].start + joint for joint in self.joints]
         changed[:, columns] += amplitude * self.bent(inputs, float(angle))
         return changed

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ident.diagnosis.observations.linear import rms
 from ident.diagnosis.vehicle.causes.context import Context
 from ident.diagnosis.vehicle.causes.contribution import contribution_of
-from ident.diagnosis.vehicle.records.inputs import SLICES
+from ident.diagnosis.vehicle.records.inputs import SLICES, copied
 from ident.diagnosis.vehicle.records.sliding import roll, traction, wheel_load
 from ident.diagnosis.vehicle.records.sources import Source
 from ident.diagnosis.vehicle.records.transforms import Setting
@@ -87,7 +87,7 @@ class Creep:
         """Signals (N, INPUTS) as if it had rolled."""
         speed = np.abs(setting.geometry.wheel_radius * inputs[:, SLICES["beta_rate"]][:, self.wheel])
         slip = sizes[0] * speed * traction(inputs, self.wheel, setting) / wheel_load(inputs, setting)
-        changed = inputs.copy(order="K")
+        changed = copied(inputs)
         roll(changed, self.wheel, slip / setting.geometry.wheel_radius, setting)
         return changed
 

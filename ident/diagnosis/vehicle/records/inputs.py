@@ -7,10 +7,13 @@ from typing import Final
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from ident.plant.symbolic import Expression
 from ident.plant.symbols import SIDES
 from ident.vehicle.geometry import WHEELS
+
+Array = NDArray[np.float64]
 
 _SIZES: Final = {
     "heading": 1,
@@ -53,6 +56,11 @@ coupling (`ident.diagnosis.vehicle.records.wandering`), `rest` [rad] where a mot
 
 INPUTS: Final = _ENDS[-1]
 """Number of those columns."""
+
+
+def copied(inputs: Array) -> Array:
+    """Signals (N, INPUTS) to be changed; every column stays in one piece of memory, as the equations read them."""
+    return inputs.copy(order="K")
 
 
 @dataclass(frozen=True)

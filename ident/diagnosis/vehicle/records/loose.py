@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from ident.diagnosis.vehicle.records.inputs import SLICES
+from ident.diagnosis.vehicle.records.inputs import SLICES, copied
 from ident.diagnosis.vehicle.records.rattling import (
     above_band,
     hammer,
@@ -95,7 +95,7 @@ def _at_standstill(recorded: Array, signals: Signals, side: int, geometry: Geome
     rms[:, wheels], rattles[:, wheels] = rattling_at_standstill(beside, processing, dt)
     if rattles.any():
         return Loose(_hammered(recorded, rms, rattles, geometry, dt), rattles, rolls=False)
-    near, inputs, own = near_middle(signals), recorded.copy(order="K"), []
+    near, inputs, own = near_middle(signals), copied(recorded), []
     # One number for the whole step: when a motor or a unit crosses differs from repeat to repeat.
     resting = list(_SIDES[1 - side])
     for wheel, across in zip(resting, moved_at_rest(signals.beta[:, resting], near).tolist(), strict=True):

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.vehicle.records.inputs import SLICES
+from ident.diagnosis.vehicle.records.inputs import SLICES, copied
 from ident.diagnosis.vehicle.records.rattling import BAND
 from ident.diagnosis.vehicle.records.transforms import LOAD_CUTOFF, Setting, contact_force
 from ident.estimate.filters import SEVEN, differentiate, zero_phase
@@ -75,7 +75,7 @@ class SlidingCause:
 
     def without(self, inputs: Array, sizes: Array, setting: Setting) -> Array:
         """Inputs (N, INPUTS) as if the wheels had rolled, apart from the part 1 - `sizes[0]` of their sliding."""
-        changed = inputs.copy(order="K")
+        changed = copied(inputs)
         slid = self.sliding(inputs, setting)
         for wheel, ahead in zip(self.wheels, slid.T, strict=True):
             roll(changed, wheel, sizes[0] * ahead / setting.geometry.wheel_radius, setting)
@@ -207,7 +207,7 @@ def rolled_with_others(inputs: Array, wheels: Sequence[int], rolled: Array, samp
 
     So are the torques: what a wheel that hammers loses in sliding is not known. `rolled` are its `rolling_rates`.
     """
-    changed = inputs.copy(order="K")
+    changed = copied(inputs)
     ahead = zero_phase(inputs[:, SLICES["beta_rate"]][:, wheels] - rolled, BAND, sample_time)
     for name, change in (
         ("beta_rate", ahead),

@@ -165,6 +165,7 @@ def _sources(
     common = {
         "step": segment.step,
         "spec": spec,
+        # Column by column, as `copied` keeps them.
         "inputs": np.asfortranarray(loose.inputs[::stride]),
         "sample_time": segment.sample_time * stride,
         "interval": segment.sample_time,

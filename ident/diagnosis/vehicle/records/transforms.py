@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ident.diagnosis.names import EffectName, places_of
 from ident.diagnosis.vehicle.records.flights import Shaken, twist_in_flight
-from ident.diagnosis.vehicle.records.inputs import SLICES
+from ident.diagnosis.vehicle.records.inputs import SLICES, copied
 from ident.diagnosis.vehicle.records.rattling import above_band, moved_by
 from ident.diagnosis.vehicle.records.resting import range_of
 from ident.diagnosis.vehicle.records.signals import shifted
@@ -69,7 +69,7 @@ Transform = Callable[[Array, int, Array, Setting], Array]
 
 def _later_torque(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
     (delay,) = sizes
-    changed = inputs.copy(order="K")
+    changed = copied(inputs)
     column = SLICES["torques"].start + place
     changed[:, column] = shifted(inputs[:, column], delay, setting.sample_time)
     return changed
@@ -77,7 +77,7 @@ def _later_torque(inputs: Array, place: int, sizes: Array, setting: Setting) -> 
 
 def _following_torque(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
     (time,) = sizes
-    changed = inputs.copy(order="K")
+    changed = copied(inputs)
     column = SLICES["torques"].start + place
     changed[:, column] = following(inputs[:, column], float(time), setting.sample_time)
     return changed
@@ -85,7 +85,7 @@ def _following_torque(inputs: Array, place: int, sizes: Array, setting: Setting)
 
 def _earlier_angle(inputs: Array, place: int, sizes: Array, setting: Setting) -> Array:
     (delay,) = sizes
-    changed = inputs.copy(order="K")
+    changed = copied(inputs)
     for name in ("alpha", "alpha_rate", "alpha_acceleration"):
         column = SLICES[name].start + place
         changed[:, column] = shifted(inputs[:, column], -delay, setting.sample_time)
@@ -204,7 +204,7 @@ def _turned_by_load(inputs: Array, wheel: int, gap: float, compliance: float, se
 
 def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> Array:
     """The wheel instead of the motor; what the motor's own inertia takes more than at the wheel's pace is lost."""
-    changed = inputs.copy(order="K")
+    changed = copied(inputs)
     changed[:, SLICES["rattle"].start + wheel] -= inputs[:, SLICES["hammer"].start + wheel] * twist
     rate = differentiate(twist, setting.sample_time, SEVEN)
     acceleration = second_derivative(twist, setting.sample_time, SEVEN)
@@ -216,7 +216,7 @@ def _behind_motor(inputs: Array, wheel: int, twist: Array, setting: Setting) -> 
 
 
 def _rear_behind_front(inputs: Array, side: int, twist: Array, setting: Setting) -> Array:
-    changed, twist = inputs.copy(order="K"), zero_phase(twist, LOAD_CUTOFF, setting.sample_time)
+    changed, twist = copied(inputs), zero_phase(twist, LOAD_CUTOFF, setting.sample_time)
     changed[:, SLICES["twist"].start + side] += twist
     changed[:, SLICES["twist_rate"].start + side] += differentiate(twist, setting.sample_time, SEVEN)
     return changed
