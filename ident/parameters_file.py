@@ -5,6 +5,7 @@
 | `[source]` | where the values come from | all |
 | `[parameters.NAME]` | value, unit, standard deviation, source; more where it was identified | all |
 | `[geometry]` | lengths that the values hold for | all, where known |
+| `[sampling]` | how late all torques act, in records of which interval | identification, where it shows |
 | `[correlation]`, `[fit]`, `[[steps]]`, `[assessment]` | how well the values are known | identification |
 | `[[effects]]` | what the model has beyond (1)-(21) | diagnosis |
 """
@@ -23,6 +24,7 @@ from ident.effects.extended import ExtendedModel
 from ident.effects.text import effects_text, read_effects
 from ident.estimate.result import Estimate, Identification
 from ident.vehicle.geometry import Geometry, geometry_text
+from ident.vehicle.lag import lag_text, read_lag
 from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters, read_parameters
 from ident.vehicle.quantities import read_toml
 from ident.writing import write_whole
@@ -41,7 +43,7 @@ class Identified:
     @property
     def model(self) -> ExtendedModel:
         """Its parameters, without effects."""
-        return ExtendedModel(self.identification.parameters)
+        return ExtendedModel(self.identification.parameters, lag=self.identification.lag)
 
 
 def read_model(path: Path, *, force: bool = True) -> ExtendedModel:
@@ -57,7 +59,7 @@ def read_model(path: Path, *, force: bool = True) -> ExtendedModel:
     """
     document = read_toml(path)
     refuse_unusable(document, str(path), force=force)
-    return ExtendedModel(read_parameters(path, TABLE), read_effects(document, str(path)))
+    return ExtendedModel(read_parameters(path, TABLE), read_effects(document, str(path)), lag=read_lag(document, path))
 
 
 def write_model(
@@ -97,9 +99,10 @@ def model_text(
         estimate = None if identified is None else identified.identification[name]
         lines += ["", f"[{TABLE}.{name}]", *_entry(name, model.parameters, estimate, provenance.get("run", "record"))]
     lines += [] if identified is None else _quality(identified.identification)
+    sampled = "" if model.lag is None else lag_text(model.lag, provenance.get("run", "record"))
     assessed = "" if identified is None else assessment_text(identified.assessment)
     lengths = "" if geometry is None else geometry_text(geometry, provenance.get("vehicle", "vehicle file"))
-    return "\n".join(lines) + "\n" + lengths + effects_text(model.effects) + assessed
+    return "\n".join(lines) + "\n" + sampled + lengths + effects_text(model.effects) + assessed
 
 
 def _entry(name: str, parameters: Parameters, estimate: Estimate | None, source: str) -> Iterator[str]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -90,7 +91,7 @@ def assess(result: Identification, record: Record, vehicle: VehicleDescription) 
 
 def model_of(result: Identification, effects: Sequence[Effect] = ()) -> ExtendedModel:
     """The model that an identification found, with effects beside it."""
-    return ExtendedModel(result.parameters, tuple(effects))
+    return ExtendedModel(result.parameters, tuple(effects), lag=result.lag)
 
 
 def diagnose(
@@ -127,9 +128,10 @@ def extend(
         UserError: a text names no effect.
     """
     if isinstance(found, VehicleDiagnosis):
-        return extended_model(found.findings, vehicle.prior, given=model.effects)
+        extended = extended_model(found.findings, vehicle.prior, given=model.effects)
+        return replace(extended, lag=model.lag)
     effects = [parse_effect(one) if isinstance(one, str) else one for one in found]
-    return ExtendedModel(model.parameters, combined(model.effects, effects))
+    return replace(model, effects=combined(model.effects, effects))
 
 
 def simulate(

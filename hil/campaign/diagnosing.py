@@ -215,6 +215,8 @@ def _vehicle_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
     diagnosis = replace(found.diagnosis, unseen=unseen_gaps(found.findings, records, confirming, vehicle, given))
     named = diagnosis.verdict.explains
     extended = extended_model(found.findings, vehicle.prior, given=given) if named else None
+    if extended is not None and model is not None:
+        extended = replace(extended, lag=model.lag)
     asked = asked_of_run(order, first, vehicle)
     return Answer(found.findings, diagnosis, extended, notes, vehicle.geometry, asked=asked)
 

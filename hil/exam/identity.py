@@ -102,7 +102,8 @@ def exam_identities(folder: ExamFolder) -> tuple[Identities, ...]:
     for text in exam.plans:
         plans = plans_from_text(text, vehicle, exam.cycle)
         records = [planned_record(plan, model.parameters) for plan in (plans.fit, plans.confirm)]
-        found.append(identities(build_problem(records, vehicle, model.parameters, given=model.effects), vehicle))
+        problem = build_problem(records, vehicle, model.parameters, lag=model.lag, given=model.effects)
+        found.append(identities(problem, vehicle))
     return tuple(found)
 
 

@@ -16,6 +16,7 @@ from ident.plant.simulation import Simulation
 from ident.plant.terms import delay_at, lag_at, steering_errors
 from ident.plant.transmissions import Spring, springs_of
 from ident.vehicle.geometry import Geometry
+from ident.vehicle.lag import Lag
 from ident.vehicle.parameters import Parameters
 
 Array = NDArray[np.float64]
@@ -28,10 +29,12 @@ class ExtendedModel:
     Attributes:
         parameters: p, refitted with the effects in place.
         effects: none for the plain model.
+        lag: of all torques in records of the vehicle, which no simulation has; None: not known.
     """
 
     parameters: Parameters
     effects: tuple[Effect, ...] = ()
+    lag: Lag | None = None
 
     @property
     def terms(self) -> list[EffectTerm]:

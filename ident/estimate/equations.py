@@ -80,6 +80,7 @@ class Equations:
         time: (N,) [s].
         regressor: (N, 11), columns in the order of (18).
         torque: (N,) generalized torque less what a known load takes [Nm or N].
+        growth: (N,) of that with time [Nm/s or N/s].
         moving: (N,) rows to be used; the others are stiction.
         period: (N,) number of the repeat, -1 outside of any.
     """
@@ -90,6 +91,7 @@ class Equations:
     time: Array
     regressor: Array
     torque: Array
+    growth: Array
     moving: NDArray[np.bool_]
     period: NDArray[np.int64]
 
@@ -143,6 +145,7 @@ def _filtered(
         time=segment.time,
         regressor=zero_phase(np.where(slides[:, None], theta, 0.0), processing.cutoff, dt, UNJUDGED),
         torque=zero_phase(np.where(slides, torque, 0.0), processing.cutoff, dt, UNJUDGED),
+        growth=zero_phase(np.where(slides, np.gradient(torque, dt), 0.0), processing.cutoff, dt, UNJUDGED),
         moving=moving_rows(rates, processing, dt),
         period=segment.period,
     )

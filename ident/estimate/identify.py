@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from ident.errors import EstimationError
 from ident.estimate.equations import Equations, usable_equations
 from ident.estimate.filters import Processing
+from ident.estimate.lag import lag_of
 from ident.estimate.least_squares import ORDINARY, Estimator, LinearSystem, Solution
 from ident.estimate.noise import noise_floor
 from ident.estimate.result import Estimate, Identification, KnownInertia
@@ -45,10 +46,11 @@ VALIDATION_STEPS: Final = (Step.LANE_CHANGE,)
 
 @dataclass(frozen=True)
 class _Fit:
-    """A solved system with its error covariance."""
+    """A solved system, its rows as they were fitted, and its error covariance."""
 
     system: LinearSystem
     solution: Solution
+    parts: tuple[FittedRows, ...]
     error: ErrorCovariance
     naive_covariance: Array
     method: str
@@ -100,6 +102,7 @@ def _identify(
         correlation=error.matrix / np.outer(deviations, deviations),
         condition=fit.solution.condition,
         floors=tuple(noise_floor(equation, values) for equation in equations),
+        lag=lag_of(fit.parts, [row.growth for row in rows]),
         equations=tuple(equations),
         processing=processing,
     )
@@ -153,11 +156,13 @@ def _fit(rows: Sequence[Equations], names: tuple[str, ...], known: dict[str, flo
     part = np.repeat(np.arange(len(rows)), [int(row.moving.sum()) for row in rows])
     system = LinearSystem(names, theta[:, columns], torque, part)
     solution = estimator(system)
+    parts = _fitted_rows(rows, solution, columns)
     freedom = max(len(torque) - len(names), 1)
     return _Fit(
         system=system,
         solution=solution,
-        error=error_covariance(_fitted_rows(rows, solution, columns)),
+        parts=tuple(parts),
+        error=error_covariance(parts),
         naive_covariance=solution.influence.T
         @ solution.influence
         * float(solution.residual @ solution.residual)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ident.estimate.equations import Equations
 from ident.estimate.filters import Processing
 from ident.estimate.noise import NoiseFloor
+from ident.vehicle.lag import Lag
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 Array = NDArray[np.float64]
@@ -75,6 +76,7 @@ class Identification:
         correlation: (11, 11).
         condition: cond(Θ₁ᵀΘ₁), unit-norm columns, unweighted, on measured, filtered and masked rows.
         floors: signal, residual, noise and model error of every step that was used or validated.
+        lag: of all torques; None where the samples of the fitted steps have several intervals.
         equations: all rows, fitted ones first, for plots.
         processing: the filters and thresholds used.
     """
@@ -83,6 +85,7 @@ class Identification:
     correlation: Array
     condition: float
     floors: tuple[NoiseFloor, ...]
+    lag: Lag | None
     equations: tuple[Equations, ...]
     processing: Processing
 

@@ -24,7 +24,7 @@ from ident.diagnosis.vehicle.causes.creep import (
     tolerated_over_time,
 )
 from ident.diagnosis.vehicle.causes.dependences import vehicle_dependences
-from ident.diagnosis.vehicle.causes.lag import LAG_NAME, LAG_STD, lag_columns
+from ident.diagnosis.vehicle.causes.lag import LAG_NAME, LAG_STD, lag_columns, stated_lag
 from ident.diagnosis.vehicle.causes.library import TermCause
 from ident.diagnosis.vehicle.records.inputs import SLICES
 from ident.diagnosis.vehicle.records.moments import apart_from_moments
@@ -36,6 +36,7 @@ from ident.effects import EFFECTS, Effect
 from ident.estimate.filters import Processing
 from ident.records.record import Record, Step
 from ident.vehicle.description import VehicleDescription
+from ident.vehicle.lag import Lag
 from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters
 
 Array = NDArray[np.float64]
@@ -49,6 +50,7 @@ def build_problem(
     vehicle: VehicleDescription,
     model: Parameters | None = None,
     *,
+    lag: Lag | None = None,
     given: Sequence[Effect] = (),
     effects: Sequence[EffectName] = tuple(EffectName),
     steps: Sequence[Step] = DIAGNOSED,
@@ -61,6 +63,7 @@ def build_problem(
         records: of campaigns with this vehicle as it is.
         vehicle: its geometry is taken as true, its prior only for what no row shows.
         model: values being judged; None: they are refitted, and changed values are no cause.
+        lag: of the torques, by the model; None: not known.
         given: effects that the model has already.
         effects: that are looked for.
         steps: whose rows are used, variants of them included.
@@ -76,7 +79,7 @@ def build_problem(
     lengths = vehicle.geometry
     found = [sources_of(record, lengths, steps, processing) for record in records]
     sources = [source for each in found for source in apart_from_moments(each, lengths, processing)]
-    context = make_context(sources, vehicle, model, given, processing)
+    context = replace(make_context(sources, vehicle, model, given, processing), lag=stated_lag(lag, sources))
     if model and not obeyed and EffectName.TORQUE_GAIN in effects:
         context = replace(context, asked=fitted_parameters(sources, vehicle, context))
     causes = causes_of(tuple(effects), model is not None)
@@ -98,16 +101,20 @@ def build_problem(
             for block, series, columns in zip(blocks, slid, beside, strict=True)
         ),
         candidates=tuple(seen_together(candidates, sources, tables, context)),
-        nominal=_nominal(model) if model else None,
+        nominal=_nominal(model, context.lag) if model else None,
         spreads=UNSTATED,
         dependences=tuple(vehicle_dependences(sources, context)),
     )
 
 
-def _nominal(model: Parameters) -> Nominal:
-    """Values of the model, whose wheels do not creep and whose torques act when they are reported."""
-    spreads = np.array(list(UNSTATED.values()))
-    return Nominal(np.append(model.values, np.zeros(len(spreads))), np.append(model.std, spreads))
+def _nominal(model: Parameters, lag: Lag | None) -> Nominal:
+    """Values of the model, whose wheels do not creep; lag in samples."""
+    beside = dict.fromkeys(UNSTATED, 0.0), dict(UNSTATED)
+    if lag is not None:
+        for known, number in zip(beside, (lag.value, lag.std), strict=True):
+            known[LAG_NAME] = number / lag.interval
+    values, std = (list(known.values()) for known in beside)
+    return Nominal(np.append(model.values, values), np.append(model.std, std))
 
 
 def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:

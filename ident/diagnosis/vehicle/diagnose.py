@@ -137,7 +137,7 @@ def _problem(
 ) -> Problem:
     if model is None:
         return build_problem(records, vehicle, effects=effects)
-    problem = build_problem(records, vehicle, model.parameters, given=model.effects, effects=effects)
+    problem = build_problem(records, vehicle, model.parameters, lag=model.lag, given=model.effects, effects=effects)
     assert problem.nominal is not None
     stated = problem.nominal.std
     std = np.where(stated > 0, stated, UNSTATED_STD * np.abs(problem.nominal.values))

@@ -26,6 +26,7 @@ def equations(periods: int, noise: float, repeated: float, moving: float = 0.8) 
         time=0.002 * np.arange(count),
         regressor=theta,
         torque=2 * np.sin(phase) + error,
+        growth=np.zeros(count),
         moving=np.arange(count) % PERIOD < moving * PERIOD,
         period=np.repeat(np.arange(periods), PERIOD),
     )

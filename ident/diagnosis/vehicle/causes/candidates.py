@@ -127,7 +127,7 @@ def candidate_of(
         contribution=None if linear else contribution_of(cause, acting_in(variants, sources), sources, context),
         drift=cause.name in DRIFTS,
         least=0.0 if cause.name in ONE_SIDED else None,
-        negligible=_by_sampling(cause, sources),
+        negligible=_by_sampling(cause, sources, context),
         spread=(SPREADS[cause.name, cause.where],) if (cause.name, cause.where) in SPREADS else (),
         part=PLAY_PART if cause.name == EffectName.BACKLASH and cause.where in DRIVES else 0.0,
         yielding=LOAD_STD[cause.where] if cause.name == EffectName.BACKLASH else 0.0,
@@ -136,12 +136,15 @@ def candidate_of(
     )
 
 
-def _by_sampling(cause: Cause, sources: Sequence[Source]) -> tuple[float, float]:
-    """Sizes of a delay or a filter [s], as a lead and as itself, up to which sampling may be what it is."""
+def _by_sampling(cause: Cause, sources: Sequence[Source], context: Context) -> tuple[float, float]:
+    """Sizes of a delay or a filter [s], as a lead and as itself, up to which sampling may be what it is.
+
+    How late it makes all drives the model may say.
+    """
     if cause.name not in LATE:
         return 0.0, 0.0
     held = HELD * max((source.interval for source in sources), default=0.0)
-    return held, held if cause.where == "drives" else 0.0
+    return held, held if cause.where == "drives" and context.lag is None else 0.0
 
 
 def slid_by_any(sources: Sequence[Source], context: Context) -> Sequence[Array | None]:

@@ -23,6 +23,7 @@ from ident.effects import Effect, EffectTerm, at_single_places, effect_term, ter
 from ident.estimate.filters import Processing, zero_phase
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.geometry import Geometry
+from ident.vehicle.lag import Lag
 from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES, Parameters
 
 Array = NDArray[np.float64]
@@ -56,6 +57,7 @@ class Context:
         asked: p (11,) by which the rows ask for torques: the model's, or the fit's where the model's may be wrong.
         formulas: the equations, effects that are given in them.
         given: effects with a memory that are part of the model too.
+        lag: of the torques, by the model; None: it says nothing of that in these records.
         kept: rows of every source for the parameters asked for last.
     """
 
@@ -66,6 +68,7 @@ class Context:
     asked: Array
     formulas: rows.Formulas
     given: tuple[tuple[Remembering, Array], ...] = ()
+    lag: Lag | None = None
     kept: dict[int, tuple[bytes, Array]] = field(default_factory=dict)
 
     @property

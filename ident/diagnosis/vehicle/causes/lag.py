@@ -1,7 +1,8 @@
 """Lag: by how much of a sample all torques act later, or earlier, than they are reported, as no cause explains.
 
 Torques are held over a sample, or ramp to the next one; angles are read anywhere within it; contacts yield. Which it is
-no record says, so that a part of a sample, the same at all drives, is fitted with everything else.
+no record says, so that a part of a sample, the same at all drives, is fitted with everything else. A model that was
+identified from other records of the vehicle says how much of it there was.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from ident.diagnosis.vehicle.causes.context import Context
 from ident.diagnosis.vehicle.causes.contribution import contribution_of
 from ident.diagnosis.vehicle.records.sources import Source
 from ident.diagnosis.vehicle.records.transforms import transform_cause
+from ident.vehicle.lag import Lag
 
 Array = NDArray[np.float64]
 
@@ -24,6 +26,20 @@ LAG_NAME: Final = "lag"
 
 LAG_STD: Final = 0.25
 """Standard deviation of it beforehand [samples]: a torque that is held acts half a sample late."""
+
+SAMPLED_ALIKE: Final = 1e-3
+"""Share by which intervals of records that were sampled alike may differ."""
+
+
+def stated_lag(lag: Lag | None, sources: Sequence[Source]) -> Lag | None:
+    """What a model says of the lag, where that holds for these records.
+
+    They are sampled as those that it was identified from, and it is no more than sampling explains: what is later than
+    that shall be found.
+    """
+    if lag is None or not all(np.isclose(one.interval, lag.interval, rtol=SAMPLED_ALIKE) for one in sources):
+        return None
+    return lag if abs(lag.value) <= 2 * (LAG_STD * lag.interval + lag.std) else None
 
 
 def lag_columns(sources: Sequence[Source], context: Context) -> list[Array]:
