@@ -15,7 +15,15 @@ from ident.assessment import Verdict
 from ident.errors import UserError
 from ident.estimate.result import KnownInertia
 from ident.report.assessment import assessment_lines
-from ident.report.tables import axis_table, condition_line, excitation_table, paper_table, parameter_table, step_table
+from ident.report.tables import (
+    axis_table,
+    condition_line,
+    excitation_table,
+    lag_line,
+    paper_table,
+    parameter_table,
+    step_table,
+)
 from quasiomni.application import app, console
 from quasiomni.options import (
     GivenVehicleOption,
@@ -120,6 +128,8 @@ def end_with(result: Result, out: Path) -> None:
     if content.paper:
         console.print(paper_table(identification))
     console.print(condition_line(identification))
+    if (lag := lag_line(identification)) is not None:
+        console.print(lag)
     for note in content.record.notes:
         console.print(note, style="yellow", markup=False)
     with console.status("writing the report"):

@@ -108,9 +108,10 @@ def write_report(content: ReportContent, path: Path) -> None:
 
 
 def _settings(content: ReportContent) -> dict[str, str]:
-    """Filters and thresholds of the estimate, and where B_w comes from."""
-    processing = content.identification.processing
+    """Filters and thresholds of the estimate, where B_w comes from, and how late torques act."""
+    processing, lag = content.identification.processing, content.identification.lag
     inertia = content.identification["B_w"]
+    late = {} if lag is None else {"Torques act later by": digits.quantity_text(lag.value, lag.std, "s")}
     return {
         "Record": content.record.source,
         "Filter on Θ and τ": f"zero-phase Butterworth, {processing.cutoff:g} rad/s",
@@ -118,6 +119,7 @@ def _settings(content: ReportContent) -> dict[str, str]:
         "Stiction": f"rows with a joint slower than {processing.moving:g} rad/s are left out, "
         f"and {processing.guard:g} s around them",
         "Source of B_w": f"{inertia.method}: {digits.with_std(inertia.value, inertia.std)} kg m²",
+        **late,
     }
 
 

@@ -12,7 +12,7 @@ from rich.text import Text
 from ident.campaign.plan import Plan
 from ident.estimate.axis import AxisIdentification
 from ident.estimate.result import Identification
-from ident.report.digits import MISSING, digits, percent, significant, unit_text, with_std
+from ident.report.digits import MISSING, digits, percent, quantity_text, significant, unit_text, with_std
 from ident.report.paper import PaperResult, load_paper_result
 from ident.report.rows import ParameterRow, StepRow, loop_rows, parameter_rows, step_rows
 from ident.vehicle.parameters import Parameters
@@ -168,6 +168,14 @@ def condition_line(identification: Identification, paper: PaperResult | None = N
         (f"{identification.condition:.2f}", "bold"),
         f"  (paper: {published.condition:.2f})",
     )
+
+
+def lag_line(identification: Identification) -> Text | None:
+    """How late all torques act, which is judged by `diagnose --model`; None where the record does not say."""
+    lag = identification.lag
+    if lag is None:
+        return None
+    return Text.assemble("Torques act later than they are recorded: ", (quantity_text(lag.value, lag.std, "s"), "bold"))
 
 
 def _signed(value: float | None) -> str:

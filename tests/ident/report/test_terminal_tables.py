@@ -14,12 +14,14 @@ from ident.report.digits import digits, percent, significant
 from ident.report.tables import (
     condition_line,
     excitation_table,
+    lag_line,
     loop_table,
     paper_table,
     parameter_table,
     room_table,
     step_table,
 )
+from ident.vehicle.lag import Lag
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 NARROW = 80
@@ -113,6 +115,13 @@ def test_the_room_is_that_of_the_plan_beside_what_the_vehicle_file_allows(plan: 
     along = line_of(printed(room_table(plan)), "along").split()
     assert float(along[1]) == pytest.approx(plan.room().length, abs=0.005)
     assert float(along[-1]) == plan.vehicle.limits.floor_length
+
+
+def test_the_lag_of_the_torques_has_its_standard_deviation(identification: Identification) -> None:
+    line = lag_line(replace(identification, lag=Lag(-1.04e-4, 9e-5, 0.002)))
+    assert line is not None
+    assert line.plain.endswith("-104 ± 90 µs")
+    assert lag_line(replace(identification, lag=None)) is None
 
 
 def test_the_condition_number_stands_beside_the_papers(identification: Identification) -> None:
