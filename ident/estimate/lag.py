@@ -17,7 +17,8 @@ def lag_of(parts: Sequence[FittedRows], growth: Sequence[Array]) -> Lag | None:
     """By how much all torques act later than recorded, if Θ p = τ of the moment at which they act.
 
     To first order the residual has lag times the growth of τ, less what the fit has taken of that. Least squares of the
-    one on the other; None where samples have several intervals, or nothing is left of the growth.
+    one on the other; None where samples have several intervals, nothing is left of the growth, or
+    nothing that would tell how well it is known.
 
     Args:
         parts: the fitted rows.
@@ -46,4 +47,5 @@ def lag_of(parts: Sequence[FittedRows], growth: Sequence[Array]) -> Lag | None:
         )
         for part, one in pairs
     ]
-    return Lag(value, float(np.sqrt(error_covariance(fitted).matrix[0, 0])), intervals[0])
+    std = float(np.sqrt(error_covariance(fitted).matrix[0, 0]))
+    return Lag(value, std, intervals[0]) if std > 0 else None

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+from ident.errors import DataFileError
 from ident.vehicle.quantities import read_quantities, require_table
 
 SAMPLING: Final = "sampling"
@@ -40,6 +41,11 @@ def read_lag(document: Mapping[str, Any], path: Path) -> Lag | None:
     if SAMPLING not in document:
         return None
     found = read_quantities(require_table(document, SAMPLING, path), _UNITS, f"{path}: {SAMPLING}")
+    if not found["lag"].std > 0:
+        raise DataFileError(
+            f"{path}: {SAMPLING}.lag has no standard deviation.",
+            f"Give std, in s, or leave [{SAMPLING}] out: nothing is said of the lag then.",
+        )
     return Lag(found["lag"].value, found["lag"].std, found["interval"].value)
 
 

@@ -28,6 +28,7 @@ def test_files_from_before_say_nothing_of_it() -> None:
         ('unit = "s"', 'unit = "ms"', "sampling.lag.*Give it in 's'"),
         ("[sampling.interval]", "[sampling.intervall]", "intervall.*Did you mean 'interval'"),
         ("value = -0.00025", "value = nan", "sampling.lag"),
+        ("std = 9e-05", "std = 0.0", "sampling.lag has no standard deviation"),
     ],
 )
 def test_a_table_that_cannot_be_used_is_refused_by_name(before: str, after: str, says: str) -> None:
