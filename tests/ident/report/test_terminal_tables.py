@@ -120,7 +120,7 @@ def test_the_room_is_that_of_the_plan_beside_what_the_vehicle_file_allows(plan: 
 def test_the_lag_of_the_torques_has_its_standard_deviation(identification: Identification) -> None:
     line = lag_line(replace(identification, lag=Lag(-1.04e-4, 9e-5, 0.002)))
     assert line is not None
-    assert line.plain.endswith("-104 ± 90 µs")
+    assert line.plain.endswith("-104 ± 90 \N{GREEK SMALL LETTER MU}s")
     assert lag_line(replace(identification, lag=None)) is None
 
 
