@@ -128,8 +128,7 @@ def extend(
         UserError: a text names no effect.
     """
     if isinstance(found, VehicleDiagnosis):
-        extended = extended_model(found.findings, vehicle.prior, given=model.effects)
-        return replace(extended, lag=model.lag)
+        return extended_model(found.findings, vehicle.prior, given=model.effects, lag=model.lag)
     effects = [parse_effect(one) if isinstance(one, str) else one for one in found]
     return replace(model, effects=combined(model.effects, effects))
 

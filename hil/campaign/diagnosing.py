@@ -210,13 +210,11 @@ def _vehicle_answer(order: DiagnosisOrder, stage: Stage) -> Answer:
     if faults:
         return Answer(None, faulty(faults), notes=notes)
     found = diagnose_vehicle(records, confirming, vehicle, model, seed=order.seed, stage=stage)
-    given = model.effects if model is not None else ()
+    given, lag = (model.effects, model.lag) if model is not None else ((), None)
     stage("what the steps left out show")
     diagnosis = replace(found.diagnosis, unseen=unseen_gaps(found.findings, records, confirming, vehicle, given))
     named = diagnosis.verdict.explains
-    extended = extended_model(found.findings, vehicle.prior, given=given) if named else None
-    if extended is not None and model is not None:
-        extended = replace(extended, lag=model.lag)
+    extended = extended_model(found.findings, vehicle.prior, given=given, lag=lag) if named else None
     asked = asked_of_run(order, first, vehicle)
     return Answer(found.findings, diagnosis, extended, notes, vehicle.geometry, asked=asked)
 

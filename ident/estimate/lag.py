@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.estimate.uncertainty import FittedRows, error_covariance
+from ident.records.rates import nominal
 from ident.vehicle.lag import Lag
 
 Array = NDArray[np.float64]
@@ -21,21 +22,20 @@ def lag_of(parts: Sequence[FittedRows], growth: Sequence[Array]) -> Lag | None:
     nothing that would tell how well it is known.
 
     Args:
-        parts: the fitted rows.
+        parts: the fitted rows; what is dropped has no influence.
         growth: (N,) of τ with time in every part, filtered as the rows are [Nm/s or N/s].
     """
     intervals = [part.sample_time for part in parts]
-    if not np.allclose(intervals, intervals[0], rtol=1e-6):
+    if len({nominal(interval) for interval in intervals}) > 1:
         return None
-    kept = [np.where(part.kept, grown, 0.0) for part, grown in zip(parts, growth, strict=True)]
-    taken = np.sum([part.influence.T @ grown for part, grown in zip(parts, kept, strict=True)], axis=0)
-    left = [np.where(part.kept, grown - part.regressor @ taken, 0.0) for part, grown in zip(parts, kept, strict=True)]
+    pairs = list(zip(parts, growth, strict=True))
+    taken = np.sum([part.influence.T @ grown for part, grown in pairs], axis=0)
+    left = [np.where(part.kept, grown - part.regressor @ taken, 0.0) for part, grown in pairs]
     power = float(np.sum([one @ one for one in left]))
     if power == 0:
         return None
-    pairs = list(zip(parts, left, strict=True))
-    value = float(np.sum([one @ part.residual for part, one in pairs])) / power
-    through = np.sum([part.regressor.T @ one for part, one in pairs], axis=0) / power
+    value = float(np.sum([one @ part.residual for part, one in zip(parts, left, strict=True)])) / power
+    through = np.sum([part.regressor.T @ one for part, one in zip(parts, left, strict=True)], axis=0) / power
     fitted = [
         FittedRows(
             regressor=one[:, None],
@@ -45,7 +45,7 @@ def lag_of(parts: Sequence[FittedRows], growth: Sequence[Array]) -> Lag | None:
             period=part.period,
             sample_time=part.sample_time,
         )
-        for part, one in pairs
+        for part, one in zip(parts, left, strict=True)
     ]
     std = float(np.sqrt(error_covariance(fitted).matrix[0, 0]))
     return Lag(value, std, intervals[0]) if std > 0 else None

@@ -21,7 +21,7 @@ from ident.diagnosis.axis.reference import (
     own_columns,
     refuse_other_axes,
 )
-from ident.diagnosis.axis.scale import Scale, nominal
+from ident.diagnosis.axis.scale import Scale
 from ident.diagnosis.check.refit import Refit
 from ident.diagnosis.check.sized import SURELY
 from ident.diagnosis.dependence import Dependence, across
@@ -32,6 +32,7 @@ from ident.estimate.axis.identify import PARAMETER_UNITS
 from ident.estimate.axis.processing import PARAMETERS
 from ident.estimate.filters import SEVEN, differentiate
 from ident.records.axis_record import AxisRecord, AxisSignals
+from ident.records.rates import nominal
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

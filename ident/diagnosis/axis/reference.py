@@ -23,7 +23,7 @@ from ident.diagnosis.axis.motion import (
     sample_noise,
 )
 from ident.diagnosis.axis.reversals import Sticking, Untold, turned_round, untold_while_sticking
-from ident.diagnosis.axis.scale import LARGEST_HOLD, Scale, nominal
+from ident.diagnosis.axis.scale import LARGEST_HOLD, Scale
 from ident.diagnosis.dependence import NEAREST, path_since_reversal
 from ident.diagnosis.observations.delays import delayed
 from ident.errors import EstimationError, RecordError
@@ -31,6 +31,7 @@ from ident.estimate.axis.cutoff import LARGEST_CUTOFF, position_cutoff
 from ident.estimate.axis.processing import BUTTERWORTH_ORDER, PARAMETERS
 from ident.estimate.filters import FILTER_ORDER, SEVEN, differentiate, mirrored
 from ident.records.axis_record import AxisRecord, AxisSignals
+from ident.records.rates import nominal
 
 Array = NDArray[np.float64]
 

@@ -9,6 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.records.rates import nominal
+
 Array = NDArray[np.float64]
 
 LARGEST_HOLD: Final = 1.0
@@ -54,8 +56,3 @@ class Scale:
             return self.hold if own is None else own
         beyond = own - self.lag / sample_time
         return beyond if abs(beyond) <= LARGEST_HOLD else None
-
-
-def nominal(sample_time: float) -> float:
-    """A sample time [s] to a thousandth: that of two clocks of one rate."""
-    return float(f"{sample_time:.4g}")

@@ -109,12 +109,10 @@ def build_problem(
 
 def _nominal(model: Parameters, lag: Lag | None) -> Nominal:
     """Values of the model, whose wheels do not creep; lag in samples."""
-    beside = dict.fromkeys(UNSTATED, 0.0), dict(UNSTATED)
+    values, std = dict.fromkeys(UNSTATED, 0.0), dict(UNSTATED)
     if lag is not None:
-        for known, number in zip(beside, (lag.value, lag.std), strict=True):
-            known[LAG_NAME] = number / lag.interval
-    values, std = (list(known.values()) for known in beside)
-    return Nominal(np.append(model.values, values), np.append(model.std, std))
+        values[LAG_NAME], std[LAG_NAME] = lag.value / lag.interval, lag.std / lag.interval
+    return Nominal(np.append(model.values, list(values.values())), np.append(model.std, list(std.values())))
 
 
 def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:

@@ -27,6 +27,7 @@ from ident.estimate.filters import Processing
 from ident.records.record import Record
 from ident.records.repeats import repeats_of
 from ident.vehicle.description import VehicleDescription
+from ident.vehicle.lag import Lag
 from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 Array = NDArray[np.float64]
@@ -52,7 +53,12 @@ class Series:
 
 
 def extended_model(
-    findings: Findings, guesses: Parameters, *, given: Sequence[Effect] = (), held_out: bool = False
+    findings: Findings,
+    guesses: Parameters,
+    *,
+    given: Sequence[Effect] = (),
+    lag: Lag | None = None,
+    held_out: bool = False,
 ) -> ExtendedModel:
     """The parameters refitted jointly with the effects that were found, and these effects.
 
@@ -63,6 +69,7 @@ def extended_model(
         guesses: the vehicle file's, for what the records do not show where no model was given (the four steps do not
             split B_w from inertias and mass, and a gear that gives way needs it).
         given: effects that the model that was judged has already; more of one of them is added to it.
+        lag: of the torques, by that model.
         held_out: whether the confirming rows take no part.
     """
     refit = findings.held_out.extended if held_out else findings.after
@@ -81,7 +88,7 @@ def extended_model(
     fitted = {part.key for part in refit.parts}
     drifts = [cause.law for cause in findings.causes if cause.law is not None and cause.candidate.key not in fitted]
     effects += [law for drift in drifts if (law := law_effect(drift, 1.0, 0.0)) is not None]
-    return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), combined(given, effects))
+    return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), combined(given, effects), lag)
 
 
 def plain_model(

@@ -18,6 +18,7 @@ from ident.diagnosis.vehicle.causes.context import Context
 from ident.diagnosis.vehicle.causes.contribution import contribution_of
 from ident.diagnosis.vehicle.records.sources import Source
 from ident.diagnosis.vehicle.records.transforms import transform_cause
+from ident.records.rates import nominal
 from ident.vehicle.lag import Lag
 
 Array = NDArray[np.float64]
@@ -27,9 +28,6 @@ LAG_NAME: Final = "lag"
 LAG_STD: Final = 0.25
 """Standard deviation of it beforehand [samples]: a torque that is held acts half a sample late."""
 
-SAMPLED_ALIKE: Final = 1e-3
-"""Share by which intervals of records that were sampled alike may differ."""
-
 
 def stated_lag(lag: Lag | None, sources: Sequence[Source]) -> Lag | None:
     """What a model says of the lag, where that holds for these records.
@@ -37,7 +35,7 @@ def stated_lag(lag: Lag | None, sources: Sequence[Source]) -> Lag | None:
     They are sampled as those that it was identified from, and it is no more than sampling explains: what is later than
     that shall be found.
     """
-    if lag is None or not all(np.isclose(one.interval, lag.interval, rtol=SAMPLED_ALIKE) for one in sources):
+    if lag is None or any(nominal(one.interval) != nominal(lag.interval) for one in sources):
         return None
     return lag if abs(lag.value) <= 2 * (LAG_STD * lag.interval + lag.std) else None
 
