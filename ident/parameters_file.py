@@ -6,7 +6,8 @@
 | `[parameters.NAME]` | value, unit, standard deviation, source; more where it was identified | all |
 | `[geometry]` | lengths that the values hold for | all, where known |
 | `[sampling]` | how late all torques act, in records of which interval | identification, where it shows |
-| `[correlation]`, `[fit]`, `[[steps]]`, `[assessment]` | how well the values are known | identification |
+| `[correlation]` | what the errors of the values have in common | all, where known |
+| `[fit]`, `[[steps]]`, `[assessment]` | how well the values are known | identification |
 | `[[effects]]` | what the model has beyond (1)-(21) | diagnosis |
 """
 
@@ -25,7 +26,7 @@ from ident.effects.text import effects_text, read_effects
 from ident.estimate.result import Estimate, Identification
 from ident.vehicle.geometry import Geometry, geometry_text
 from ident.vehicle.lag import lag_text, read_lag
-from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameters, read_parameters
+from ident.vehicle.parameters import CORRELATION, PARAMETER_NAMES, PARAMETER_UNITS, Parameters, read_parameters
 from ident.vehicle.quantities import read_toml
 from ident.writing import write_whole
 
@@ -98,6 +99,7 @@ def model_text(
     for name in PARAMETER_NAMES:
         estimate = None if identified is None else identified.identification[name]
         lines += ["", f"[{TABLE}.{name}]", *_entry(name, model.parameters, estimate, provenance.get("run", "record"))]
+    lines += _correlated(model.parameters)
     lines += [] if identified is None else _quality(identified.identification)
     sampled = "" if model.lag is None else lag_text(model.lag, provenance.get("run", "record"))
     assessed = "" if identified is None else assessment_text(identified.assessment)
@@ -118,11 +120,16 @@ def _entry(name: str, parameters: Parameters, estimate: Estimate | None, source:
     yield f"source = {json.dumps(source)}"
 
 
+def _correlated(parameters: Parameters) -> Iterator[str]:
+    if parameters.correlation is not None:
+        yield from ("", f"[{CORRELATION}]", f"names = {json.dumps(list(PARAMETER_NAMES))}", "matrix = [")
+        for row in parameters.correlation:
+            yield f"    [{', '.join(f'{value:.6f}' for value in row)}],"
+        yield "]"
+
+
 def _quality(identification: Identification) -> Iterator[str]:
-    yield from ("", "[correlation]", f"names = {json.dumps(list(PARAMETER_NAMES))}", "matrix = [")
-    for row in identification.correlation:
-        yield f"    [{', '.join(f'{value:.6f}' for value in row)}],"
-    yield from ("]", "", "[fit]", f"condition = {identification.condition:.6g}")
+    yield from ("", "[fit]", f"condition = {identification.condition:.6g}")
     for key, value in vars(identification.processing).items():
         yield f"{key} = {value!r}"
     for floor in identification.floors:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,10 @@ from hil.campaign.folder import RunFolder, open_run, sources_of
 from hil.cosimulation.export import Compiled, Exported, source_of_run
 from ident.campaign.extended_reference import with_effects
 from ident.effects.extended import ExtendedModel
-from ident.errors import DataFileError
 from ident.plant.modes import Mode
 from ident.records.record import Step
 from ident.vehicle.parameters import PARAMETER_NAMES
-from ident.vehicle.quantities import read_toml
+from ident.vehicle.quantities import read_numbers, read_toml
 from ident.writing import refuse_folder, refuse_inputs, write_whole
 
 Array = NDArray[np.float64]
@@ -96,30 +95,10 @@ def _knowledge(file: Path, source: ModelSource) -> Knowledge:
     for column, name in enumerate(PARAMETER_NAMES):
         interval = document["parameters"][name].get("ci95")
         if interval is not None:
-            low[column], high[column] = _numbers(interval, (2,), f"{file}: ci95 of {name}")
-    table = document.get("correlation")
-    correlation = np.eye(len(values)) if table is None else _correlation(table, str(file))
-    return Knowledge(low, high, std, correlation)
-
-
-def _correlation(table: Mapping[str, Any], where: str) -> Array:
-    size = len(PARAMETER_NAMES)
-    if not isinstance(table, Mapping) or table.get("names") != list(PARAMETER_NAMES):
-        raise DataFileError(f"{where}: [correlation] does not name the parameters of (18).", "Identify the run again.")
-    matrix = _numbers(table.get("matrix"), (size, size), f"{where}: matrix of [correlation]")
-    if not np.all(np.abs(matrix) <= 1.0 + 1e-9):
-        raise DataFileError(f"{where}: matrix of [correlation] has entries beyond 1.", "Identify the run again.")
-    return matrix
-
-
-def _numbers(found: object, shape: tuple[int, ...], where: str) -> Array:
-    try:
-        array = np.asarray(found, dtype=float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape != shape or not np.all(np.isfinite(array)):
-        raise DataFileError(f"{where} is not {' by '.join(map(str, shape))} numbers.", "Identify the run again.")
-    return array
+            where = f"{file}: ci95 of {name}"
+            low[column], high[column] = read_numbers(interval, (2,), where, "Identify the run again.")
+    correlation = source.parameters.correlation
+    return Knowledge(low, high, std, np.eye(len(values)) if correlation is None else correlation)
 
 
 def _unheard(_compiler: str, _done: int, _total: int) -> None:

@@ -14,12 +14,14 @@ import enum
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ident.diagnosis.dependence import Dependence
 from ident.effects import EffectParameter
+from ident.vehicle.parameters import ROUNDED
 
 Array = NDArray[np.float64]
 Series = Sequence[Array | None]
@@ -233,10 +235,27 @@ def summed(parts: Sequence[Series]) -> Series:
 
 @dataclass(frozen=True)
 class Nominal:
-    """Values of the model that is judged, and how well they are known: (p,) each, in the units of the baseline."""
+    """Values of the model that is judged, and how well they are known.
+
+    Attributes:
+        values, std: (p,) in the units of the baseline.
+        correlation: (p, p) of their errors; None: independent.
+    """
 
     values: Array
     std: Array
+    correlation: Array | None = None
+
+    def of(self, places: NDArray[np.int64]) -> Nominal:
+        """Of some parameters."""
+        correlation = None if self.correlation is None else self.correlation[np.ix_(places, places)]
+        return Nominal(self.values[places], self.std[places], correlation)
+
+    @property
+    def spread(self) -> Array:
+        """(p, p) whose columns are independent errors of one standard deviation each."""
+        powers, turn = np.linalg.eigh(np.eye(len(self.std)) if self.correlation is None else self.correlation)
+        return np.asarray(self.std[:, None] * turn * np.sqrt(np.maximum(powers, ROUNDED)))
 
 
 @dataclass(frozen=True)
@@ -245,12 +264,18 @@ class Known:
 
     Attributes:
         places: (k,) which.
-        values, std: (k,) of them.
+        values: (k,) of them.
+        spread: (k, k) whose columns are independent errors of one standard deviation each.
     """
 
     places: NDArray[np.int64]
     values: Array
-    std: Array
+    spread: Array
+
+    @cached_property
+    def precision(self) -> Array:
+        """(k, k) that turns errors into independent ones of one standard deviation each."""
+        return np.asarray(np.linalg.inv(self.spread))
 
 
 @dataclass(frozen=True)
@@ -278,9 +303,9 @@ class Problem:
     def known(self) -> Known:
         """Of all parameters where a model is judged, else of those with a spread of their own."""
         if self.nominal is not None:
-            return Known(np.arange(len(self.names)), self.nominal.values, self.nominal.std)
+            return Known(np.arange(len(self.names)), self.nominal.values, self.nominal.spread)
         places = np.array([self.names.index(name) for name in self.spreads], dtype=np.int64)
-        return Known(places, np.zeros(len(places)), np.array(list(self.spreads.values())))
+        return Known(places, np.zeros(len(places)), np.diag(list(self.spreads.values())))
 
     def candidate(self, key: str) -> Candidate:
         """The candidate of that key.

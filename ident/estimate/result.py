@@ -96,8 +96,8 @@ class Identification:
 
     @property
     def parameters(self) -> Parameters:
-        """Values and standard deviations of p (18)."""
-        return Parameters(self.values, np.array([estimate.std for estimate in self.estimates]))
+        """Values of p (18), their standard deviations and correlation."""
+        return Parameters(self.values, np.array([estimate.std for estimate in self.estimates]), self.correlation)
 
     def __getitem__(self, name: str) -> Estimate:
         """One estimate by its symbol."""

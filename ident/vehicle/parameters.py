@@ -1,16 +1,19 @@
-"""The eleven dynamic parameters of (18), by the paper's symbols."""
+"""The eleven dynamic parameters of (18), by the paper's symbols, and how well they are known together."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.vehicle.quantities import Quantity, read_quantities, read_toml, require_table
+from ident.errors import DataFileError
+from ident.vehicle.quantities import Quantity, read_numbers, read_quantities, read_toml, require_table
+
+Array = NDArray[np.float64]
 
 PARAMETER_UNITS: Final = {
     "C_l": "kg m^2",
@@ -28,6 +31,12 @@ PARAMETER_UNITS: Final = {
 PARAMETER_NAMES: Final = tuple(PARAMETER_UNITS)
 """Order of (18)."""
 
+CORRELATION: Final = "correlation"
+"""Table of what their errors have in common."""
+
+ROUNDED: Final = 1e-4
+"""By how much a correlation that was written down may miss one."""
+
 COULOMB_EPSILON: Final = 0.01
 """ε of tanh(rate/ε) in (16) [rad/s]; paper, section 7."""
 
@@ -44,10 +53,12 @@ class Parameters:
     Attributes:
         values: (11,) in the order of PARAMETER_NAMES.
         std: (11,) standard uncertainties, zero where none is known.
+        correlation: (11, 11) of their errors; None: not stated.
     """
 
-    values: NDArray[np.float64]
-    std: NDArray[np.float64]
+    values: Array
+    std: Array
+    correlation: Array | None = None
 
     def __getitem__(self, name: str) -> float:
         """Value of one parameter by its symbol."""
@@ -62,7 +73,7 @@ class Parameters:
         changed = self.values.copy()
         for name, value in values.items():
             changed[parameter_column(name)] = value
-        return Parameters(changed, self.std)
+        return Parameters(changed, self.std, self.correlation)
 
 
 def exact_parameters(values: Mapping[str, float] | Parameters) -> Parameters:
@@ -82,10 +93,27 @@ def read_parameters(path: Path, table: str) -> Parameters:
     """Parameters from the table of that name in a TOML file.
 
     Entries of [parameters], which an identification writes, hold more than value, unit, std and source; it is ignored.
+    Beside that table may be [correlation].
 
     Raises:
-        DataFileError: the file, the table or an entry is missing, a unit is another one, or a key is not known.
+        DataFileError: the file, the table or an entry is missing, a unit is another one, a key is not known, or the
+            correlation is none.
     """
-    entries: Mapping[str, Any] = require_table(read_toml(path), table, path)
+    document = read_toml(path)
+    entries: Mapping[str, Any] = require_table(document, table, path)
     result = table == "parameters"
-    return parameters_from(read_quantities(entries, PARAMETER_UNITS, f"{path}: {table}", more_keys=result))
+    found = parameters_from(read_quantities(entries, PARAMETER_UNITS, f"{path}: {table}", more_keys=result))
+    return replace(found, correlation=_correlation(document[CORRELATION], path)) if CORRELATION in document else found
+
+
+def _correlation(table: object, path: Path) -> Array:
+    """(11, 11) of the table of that name."""
+    remedy = f"Identify the run again, or leave [{CORRELATION}] out: errors count as independent then."
+    if not isinstance(table, Mapping) or table.get("names") != list(PARAMETER_NAMES):
+        raise DataFileError(f"{path}: [{CORRELATION}] does not name the parameters of (18).", remedy)
+    size = len(PARAMETER_NAMES)
+    matrix = read_numbers(table.get("matrix"), (size, size), f"{path}: matrix of [{CORRELATION}]", remedy)
+    ones, symmetric = np.allclose(np.diag(matrix), 1.0), np.allclose(matrix, matrix.T, atol=ROUNDED)
+    if not ones or not symmetric or np.linalg.eigvalsh(matrix).min() < -ROUNDED:
+        raise DataFileError(f"{path}: matrix of [{CORRELATION}] is not that of a correlation.", remedy)
+    return matrix

@@ -9,6 +9,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ident.errors import DataFileError
 from ident.reading import read_toml as read_toml
 
@@ -68,6 +71,21 @@ def read_quantities(
         for name in read:
             refuse_unknown(table[name], QUANTITY_KEYS, f"{where}.{name}")
     return read
+
+
+def read_numbers(found: object, shape: tuple[int, ...], where: str, remedy: str) -> NDArray[np.float64]:
+    """Finite numbers of that shape.
+
+    Raises:
+        DataFileError: they are not; with the remedy.
+    """
+    try:
+        array = np.asarray(found, dtype=float)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != shape or not np.all(np.isfinite(array)):
+        raise DataFileError(f"{where} is not {' by '.join(map(str, shape))} numbers.", remedy)
+    return array
 
 
 def refuse_unknown(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:

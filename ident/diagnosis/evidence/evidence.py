@@ -87,7 +87,7 @@ class Evidence:
         """(p,) of the plant beside what some members add (n,), in their units; those that are known as they are."""
         along, _ = self.products.with_others(self.sizes, (self.design.target - added)[:, None])
         own = linalg.cho_solve(self._baseline, along[: len(self._across), 0])
-        return np.asarray(self.design.known + np.where(self.design.free, self.design.spread * own, 0.0))
+        return np.asarray(self.design.known + np.where(self.design.free, self.design.spread @ own, 0.0))
 
     def _bent(self, bends: Collection[Bent]) -> Gram:
         width = len(self._across)

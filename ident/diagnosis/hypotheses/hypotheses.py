@@ -124,9 +124,10 @@ class Design:
     Attributes:
         hypotheses: of the problems.
         columns: (n, K) of all of them.
-        baseline: (n, p) of the parameters of the plant, each in standard deviations of what is known of it.
+        baseline: (n, p) of the parameters of the plant, by independent standard deviations of what is known of them.
         target: (n,) without what is known of them.
-        known, spread: (p,) of the parameters, in their units.
+        known: (p,) of the parameters, in their units.
+        spread: (p, p) whose columns are those standard deviations.
         free: (p,) of which nothing is known.
     """
 
@@ -148,13 +149,13 @@ def make_design(problems: Sequence[Problem], regression: Regression, colours: Co
     rows, known = regression.rows, problems[0].known
     length = np.linalg.norm(rows.baseline, axis=0)
     whole = UNKNOWN * float(np.linalg.norm(rows.target))
-    spread = np.divide(whole, length, out=np.zeros_like(length), where=length > 0)
-    spread[known.places] = known.std
+    spread = np.diag(np.divide(whole, length, out=np.zeros_like(length), where=length > 0))
+    spread[np.ix_(known.places, known.places)] = known.spread
     values, free = np.zeros(len(spread)), np.ones(len(spread), dtype=bool)
     free[known.places] = False
     values[known.places] = known.values
     target = rows.target - rows.baseline @ values
-    return Design(tuple(found), np.hstack(builder.columns), rows.baseline * spread, target, values, spread, free)
+    return Design(tuple(found), np.hstack(builder.columns), rows.baseline @ spread, target, values, spread, free)
 
 
 class _Builder:

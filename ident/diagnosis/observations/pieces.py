@@ -16,7 +16,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ident.diagnosis.dependence import Basis, Dependence
-from ident.diagnosis.problem import Candidate, Contribution, Nominal, Problem, Series, Turned
+from ident.diagnosis.problem import Candidate, Contribution, Problem, Series, Turned
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -113,7 +113,7 @@ def _part(problem: Problem, kept: list[int], parameters: Indices, candidates: In
         candidates=tuple(
             _candidate(problem.candidates[number], kept, parameters, len(problem.names)) for number in candidates
         ),
-        nominal=None if nominal is None else Nominal(nominal.values[parameters], nominal.std[parameters]),
+        nominal=None if nominal is None else nominal.of(parameters),
         spreads={name: spread for name, spread in problem.spreads.items() if name in names},
         dependences=tuple(_dependence(problem.dependences[number], kept) for number in laws),
     )

@@ -161,14 +161,14 @@ class Regression:
         return White(white[:, 0], white[:, 1:split], white[:, split:], confirming)
 
     def prior_residual(self, baseline: Array) -> Array:
-        """What is known beforehand of parameters (p,), minus these, in standard deviations (k,)."""
+        """What is known beforehand of parameters (p,), minus these, in independent standard deviations (k,)."""
         known = self.problem.known
-        return (known.values - baseline[known.places]) / known.std
+        return np.asarray(known.precision @ (known.values - baseline[known.places]))
 
     def prior_jacobian(self, width: int) -> Array:
         """Derivative of what `prior_residual` is compared with, by `width` values, the parameters in front."""
         known = self.problem.known
-        return np.eye(width)[known.places] / known.std[:, None]
+        return np.asarray(known.precision @ np.eye(width)[known.places])
 
     def _prior_rows(self, width: int) -> Array:
         parameters = self.rows.baseline.shape[1]

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Final
 
+from ident.diagnosis.names import LAW
+
 COVERAGE: Final = 0.95
 """Probability that an ambiguity set holds together."""
 
@@ -21,16 +23,23 @@ class Ranked:
         names: of every effect by name, whatever its place.
         alike: keys that are the same as the one taken in these records, itself first.
         log_odds: of every candidate by key, against nothing in this place, the greatest first.
+        unlisted: probability that it is none of them as they are written.
     """
 
     probabilities: Mapping[str, float]
     names: Mapping[str, float]
     alike: tuple[str, ...]
     log_odds: Mapping[str, float]
+    unlisted: float
 
     def ambiguity_set(self, name: str) -> tuple[str, ...]:
-        """Names up to a probability of `COVERAGE`, and those of candidates that are the same; `name` first."""
-        return tuple(dict.fromkeys([name, *_covering(self.names), *map(_name_of, self.alike)]))
+        """Names up to a probability of `COVERAGE`, and those of candidates that are the same; `name` first.
+
+        What is none of them as they are written is a cause without a name.
+        """
+        nameless = self.names.get(LAW, 0.0) + self.unlisted
+        names = dict(sorted({**self.names, LAW: nameless}.items(), key=lambda entry: -entry[1]))
+        return tuple(dict.fromkeys([name, *_covering(names), *map(_name_of, self.alike)]))
 
     @property
     def untold(self) -> tuple[str, ...]:

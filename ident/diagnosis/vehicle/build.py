@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from ident.diagnosis.names import EffectName, refuse_strangers
 from ident.diagnosis.observations.linear import rms
@@ -112,7 +113,12 @@ def _nominal(model: Parameters, lag: Lag | None) -> Nominal:
     values, std = dict.fromkeys(UNSTATED, 0.0), dict(UNSTATED)
     if lag is not None:
         values[LAG_NAME], std[LAG_NAME] = lag.value / lag.interval, lag.std / lag.interval
-    return Nominal(np.append(model.values, list(values.values())), np.append(model.std, list(std.values())))
+    correlation = np.eye(len(PARAMETER_NAMES)) if model.correlation is None else model.correlation
+    return Nominal(
+        np.append(model.values, list(values.values())),
+        np.append(model.std, list(std.values())),
+        block_diag(correlation, np.eye(len(UNSTATED))),
+    )
 
 
 def _blocks(source: Source, table: Array, context: Context) -> Iterable[Block]:

@@ -97,7 +97,7 @@ def plain_model(
     """The model that is judged: as given, or refitted without any effect; all else as in `extended_model`."""
     nominal = findings.problem.nominal
     if nominal is not None:
-        return ExtendedModel(_stated(nominal.values, nominal.std), tuple(given))
+        return ExtendedModel(_stated(nominal.values, nominal.std, nominal.correlation), tuple(given))
     refit = findings.held_out.plain if held_out else findings.before
     return ExtendedModel(_guessed_where_unseen(refit, findings.problem, guesses), tuple(given))
 
@@ -105,19 +105,19 @@ def plain_model(
 def _guessed_where_unseen(refit: Refit, problem: Problem, guesses: Parameters) -> Parameters:
     """The fit, moved towards the guesses along what the rows do not show."""
     if problem.nominal is not None:
-        return _stated(refit.baseline, refit.baseline_std)
+        return _stated(refit.baseline, refit.baseline_std, refit.baseline_correlation)
     size, found = np.where(guesses.std > 0, guesses.std, np.abs(guesses.values)), refit.baseline[: len(PARAMETER_NAMES)]
     rows = np.concatenate([block.baseline[block.moving, : len(size)] for block in problem.blocks]) * size
     scale = np.maximum(np.linalg.norm(rows, axis=0).max(), np.finfo(float).tiny)
     normal = (rows / scale).T @ (rows / scale) + PRIOR_WEIGHT**2 * np.eye(len(size))
     pull = PRIOR_WEIGHT**2 * (guesses.values - found) / size
-    return _stated(found + size * np.linalg.solve(normal, pull), refit.baseline_std)
+    return _stated(found + size * np.linalg.solve(normal, pull), refit.baseline_std, refit.baseline_correlation)
 
 
-def _stated(values: Array, std: Array) -> Parameters:
+def _stated(values: Array, std: Array, correlation: Array | None) -> Parameters:
     """The parameters of (18) among those of the rows."""
     stated = slice(len(PARAMETER_NAMES))
-    return Parameters(values[stated], std[stated])
+    return Parameters(values[stated], std[stated], None if correlation is None else correlation[stated, stated])
 
 
 @dataclass(frozen=True)

@@ -146,7 +146,7 @@ class Imagined:
     @cached_property
     def _baseline(self) -> Array:
         known, found = self.four.known, self._over_noise(self._rows.baseline)
-        found[len(self._rows) + np.arange(len(known.places)), known.places] = 1 / known.std
+        found[np.ix_(len(self._rows) + np.arange(len(known.places)), known.places)] = known.precision
         return found
 
 

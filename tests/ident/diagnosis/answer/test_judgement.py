@@ -346,6 +346,31 @@ def test_with_a_model_a_changed_parameter_is_a_cause_and_without_one_it_is_not(w
     assert _names(judge(*problems, seed=1)) == []
 
 
+@pytest.mark.parametrize(("trade", "named"), [(-1.0, []), (1.0, ["parameter_change"])])
+def test_a_change_of_what_a_model_is_sure_of_is_found_though_each_of_its_parameters_may_be_so_far_off(
+    world: type[Any], trade: float, named: list[str]
+) -> None:
+    """Two columns that are nearly one: what the first lacks the second has, and their sum is known."""
+    errors = np.array([0.15, trade * 0.15, 0.0])
+    correlation = np.array([[1.0, -0.98, 0.0], [-0.98, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    nominal = Nominal(np.array([0.9, -2.0, 0.5]), np.full(3, 0.15), correlation)
+
+    def moved(problem: Problem) -> Problem:
+        blocks, columns = [], []
+        for block in problem.blocks:
+            baseline = block.baseline.copy()
+            baseline[:, 1] = baseline[:, 0] + 0.2 * baseline[:, 1]
+            columns.append(baseline[:, :1])
+            target = block.target - block.baseline @ [1.0, -2.0, 0.5] + baseline @ (nominal.values + errors)
+            blocks.append(replace(block, baseline=baseline, target=target))
+        *others, drift = problem.candidates
+        drift = replace(drift, variants=(replace(drift.variants[0], columns=tuple(columns)),))
+        return replace(problem, blocks=tuple(blocks), candidates=(*others, drift), nominal=nominal)
+
+    judged = judge(*(moved(problem) for problem in _with_drift(world(seed=13))), seed=1)
+    assert _names(judged) == named
+
+
 def test_with_a_model_each_of_two_causes_closes_what_the_models_values_lack_without_it(world: type[Any]) -> None:
     """Both are as large; what the model knows of its values is so little that a refit could stand in for the first."""
     problems = _with_drift(world(seed=13, true={"c": 0.3}, samples=1600))

@@ -15,7 +15,7 @@ from ident.diagnosis.evidence.evidence import Evidence
 from ident.diagnosis.evidence.tables import Member
 from ident.diagnosis.hypotheses.gram import Beside, Gram
 from ident.diagnosis.noise.colours import SIZES
-from ident.diagnosis.problem import Problem, Variant
+from ident.diagnosis.problem import Nominal, Problem, Variant
 from ident.diagnosis.search.slots import slot_of
 
 Array = NDArray[np.float64]
@@ -54,6 +54,25 @@ def test_evidence_is_that_of_gaussian_rows(problems: tuple[Problem, Problem], as
     assert target.nothing + target.log_likelihood(members) == pytest.approx(
         dense(question, sizes, np.hstack(columns)), abs=1e-4
     )
+
+
+def test_what_errors_of_a_model_have_in_common_is_known_of_its_parameters(
+    problems: tuple[Problem, Problem], asked: Asked
+) -> None:
+    """Against the density of rows whose parameters are Gaussian with that covariance."""
+    correlation = np.array([[1.0, -0.9, 0.2], [-0.9, 1.0, 0.0], [0.2, 0.0, 1.0]])
+    nominal = Nominal(np.array([0.9, -1.7, 0.4]), np.array([0.3, 0.5, 0.1]), correlation)
+    question = asked(*(replace(one, nominal=nominal) for one in problems))
+    rows = question.regression.rows
+    white, _ = question.colours.white(np.eye(len(rows.target)), question.colours.usual)
+    covariance = np.outer(nominal.std, nominal.std) * correlation
+    expected = stats.multivariate_normal(
+        rows.baseline @ nominal.values,
+        np.linalg.inv(white.T @ white) + rows.baseline @ covariance @ rows.baseline.T,
+        allow_singular=True,
+    )
+    found = Evidence(question.products, question.colours.usual).target_beside(()).nothing
+    assert found == pytest.approx(expected.logpdf(rows.target) + 0.5 * len(rows.target) * np.log(2 * np.pi), abs=1e-3)
 
 
 def test_the_evidence_of_a_hypothesis_integrates_its_scale(problems: tuple[Problem, Problem], asked: Asked) -> None:

@@ -8,7 +8,7 @@ from ident.diagnosis.search.ranked import Ranked
 
 
 def ranked(probabilities: dict[str, float], *alike: str) -> Ranked:
-    return Ranked(probabilities, {}, alike, {})
+    return Ranked(probabilities, {}, alike, {}, 0.03)
 
 
 def test_a_name_that_may_be_at_either_side_is_said_to_be() -> None:
@@ -39,3 +39,11 @@ def test_places_are_listed_until_95_percent_of_the_name_are(most: float, named: 
 def test_what_adds_the_same_is_never_left_out() -> None:
     found = ranked({"slip@wheel_rl": 0.99}, "slip@wheel_rl", "payload@chassis").untold
     assert found == ("slip@wheel_rl", "payload@chassis")
+
+
+@pytest.mark.parametrize(("unlisted", "names"), [(0.03, ("backlash",)), (0.5, ("backlash", "law"))])
+def test_what_is_more_likely_none_of_the_names_than_one_in_twenty_is_a_set(
+    unlisted: float, names: tuple[str, ...]
+) -> None:
+    key, own = "backlash@drive_rl", 1 - unlisted
+    assert Ranked({key: own}, {"backlash": own}, (key,), {}, unlisted).ambiguity_set("backlash") == names
