@@ -132,12 +132,12 @@ def _invisible(standing: Standing) -> tuple[str, ...]:
 
 def _cause(standing: Standing, place: int, index: int) -> Cause:
     slot, law, hypotheses = standing.slots[index], standing.taken.laws.get(index), standing.design.hypotheses
-    ranked, dependences = slot.ranked(hypotheses), standing.taken.problems[0].dependences
+    ranked, dependences = slot.ranked(hypotheses, standing.unlisted), standing.taken.problems[0].dependences
     return Cause(
         candidate=standing.fitted.candidate(place),
         part=standing.fitted.after.parts[place],
         ranked=ranked,
-        probability=slot.probability(hypotheses),
+        probability=slot.probability(hypotheses, standing.unlisted),
         log_odds=slot.logs[index],
         # Nothing is said to widen a gap within the accidents of its noise.
         closed=max(standing.fitted.lacking[place], -math.inf if standing.is_measurable else 0.0),

@@ -14,7 +14,7 @@ from ident.diagnosis.law.reach import told_samples
 from ident.diagnosis.noise.colours import SIZES, Colours
 from ident.diagnosis.search.asked import Asked
 from ident.diagnosis.search.search import Search
-from ident.diagnosis.search.slots import slot_of
+from ident.diagnosis.search.slots import UNLISTED, slot_of
 
 MEASURABLE: Final = 0.05
 """Power of what causes could close of a held-out gap, over the noise's, from which that is no accident of the noise."""
@@ -83,5 +83,18 @@ class Standing:
         """
         if any(SIZES[size] > MISTAKEN for size in self.state.evidence.sizes):
             return True
+        return not Colours.repeats(self.taken.regression) and self._leaves_more
+
+    @property
+    def unlisted(self) -> float:
+        """Probability that what stands in a place is none of the hypotheses as they are written.
+
+        Where the members leave more held out than noise that is not known exactly, there is something that the library
+        does not have: beside them, or in the place of one, of which neither is likelier.
+        """
+        return 1 / (1 + len(self.taken.variants)) if self._leaves_more else UNLISTED
+
+    @property
+    def _leaves_more(self) -> bool:
         gap = self.fitted.beside_what_is_known
-        return not Colours.repeats(self.taken.regression) and gap.after > math.hypot(1.0, MISTAKEN) * gap.floor
+        return gap.after > math.hypot(1.0, MISTAKEN) * gap.floor

@@ -10,7 +10,6 @@ most likely beside the hypotheses that are taken; each next one has a price.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -166,7 +165,7 @@ class Noise:
         return self.colours.white(columns, self.sizes)[0].reshape(np.shape(values))
 
 
-def price_of(sizes: Sequence[int]) -> float:
+def price_of(sizes: Sizes) -> float:
     """Log odds against so much being lacking."""
     return PRICE * sum(sizes)
 

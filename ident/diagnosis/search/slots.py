@@ -16,7 +16,6 @@ from ident.diagnosis.evidence.misfit import tempered
 from ident.diagnosis.evidence.state import State
 from ident.diagnosis.hypotheses.gram import Beside
 from ident.diagnosis.hypotheses.hypotheses import Hypothesis
-from ident.diagnosis.noise.colours import price_of
 from ident.diagnosis.observations.linear import ROUNDING
 from ident.diagnosis.search.ranked import Ranked
 from ident.diagnosis.search.search import Search
@@ -34,7 +33,7 @@ RIVALS: Final = 4
 
 UNLISTED: Final = 0.03
 """Probability that what stands in a place is none of the hypotheses as they are written, however likely one is among
-them, before anything is known of what they leave: of 35 names of drawn machines that were sure, one was wrong."""
+them, where next to nothing is left of the rows: of 35 names of drawn machines that were sure, one was wrong."""
 
 SAME: Final = 0.9999
 """Cosine of what two names of as many numbers add to the rows, from which those do not tell them apart."""
@@ -53,7 +52,6 @@ class Slot:
         alike: hypotheses of its kind, names or laws, that add the same, the member first.
         rivals: sets with another hypothesis there, of those that were fitted exactly.
         excess: of the scatter of the rows over their noise, along the member.
-        unlisted: probability that what stands there is none of the hypotheses as they are written.
     """
 
     logs: Mapping[int, float]
@@ -61,7 +59,6 @@ class Slot:
     alike: tuple[int, ...]
     rivals: Mapping[int, State]
     excess: float
-    unlisted: float
 
     def ahead(self, barred: Collection[int]) -> tuple[float, int] | None:
         """By how much the most likely rival is more likely, of those fitted exactly and not barred; None if none is."""
@@ -74,9 +71,8 @@ class Slot:
     def _whole(self) -> float:
         return float(logsumexp([0.0, *self.logs.values()]))
 
-    @cached_property
-    def _probabilities(self) -> dict[int, float]:
-        return {index: (1 - self.unlisted) * math.exp(log - self._whole) for index, log in self.logs.items()}
+    def _probabilities(self, unlisted: float) -> dict[int, float]:
+        return {index: (1 - unlisted) * math.exp(log - self._whole) for index, log in self.logs.items()}
 
     @property
     def nothing(self) -> float:
@@ -88,25 +84,30 @@ class Slot:
         others = [self.logs[one] for one in barred if one in self.logs and one not in self.alike]
         return math.exp(float(logsumexp([0.0, *others])) - self._whole)
 
-    def names(self, hypotheses: Sequence[Hypothesis]) -> dict[str, float]:
-        """Probability of every name, the most probable first."""
+    def names(self, hypotheses: Sequence[Hypothesis], unlisted: float) -> dict[str, float]:
+        """Probability of every name, the most probable first; arguments of `ranked`."""
         found: dict[str, float] = {}
-        for index, probability in self._probabilities.items():
+        for index, probability in self._probabilities(unlisted).items():
             name = hypotheses[index].name
             found[name] = found.get(name, 0.0) + probability
         return dict(sorted(found.items(), key=lambda entry: -entry[1]))
 
-    def probability(self, hypotheses: Sequence[Hypothesis]) -> float:
-        """That the name of the member is right, or that of one which adds the same."""
-        names = self.names(hypotheses)
+    def probability(self, hypotheses: Sequence[Hypothesis], unlisted: float) -> float:
+        """That the name of the member is right, or that of one which adds the same; arguments of `ranked`."""
+        names = self.names(hypotheses, unlisted)
         return min(sum(names[name] for name in {hypotheses[one].name for one in self.alike}), 1.0)
 
-    def ranked(self, hypotheses: Sequence[Hypothesis]) -> Ranked:
-        """As reports show it."""
-        probabilities = {hypotheses[index].key: probability for index, probability in self._probabilities.items()}
+    def ranked(self, hypotheses: Sequence[Hypothesis], unlisted: float) -> Ranked:
+        """As reports show it.
+
+        Args:
+            hypotheses: all of them.
+            unlisted: probability that what stands there is none of them as they are written.
+        """
+        named = {hypotheses[index].key: each for index, each in self._probabilities(unlisted).items()}
         evidence = {hypotheses[index].key: log for index, log in self.logs.items()}
         alike = tuple(hypotheses[one].key for one in self.alike)
-        return Ranked(probabilities, self.names(hypotheses), alike, evidence, self.unlisted)
+        return Ranked(named, self.names(hypotheses, unlisted), alike, evidence, unlisted)
 
 
 def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
@@ -131,21 +132,7 @@ def slot_of(search: Search, state: State, index: int, excess: float) -> Slot:
         and hypotheses[one].free is law
         and (cosine > SAME_LAW if law else cosine > SAME and size == len(block.factor))
     ]
-    told = {one: cosine for one, (cosine, _) in cosines.items()}
-    return Slot(logs, told, (index, *alike), place.rivals, excess, unlisted(state, index))
-
-
-def unlisted(state: State, index: int) -> float:
-    """Probability that what stands in the place of a member is none of the hypotheses as they are written.
-
-    Where more is lacking in its steps than noise and tolerance, either nothing is wrong but that, which has its price,
-    or what the library does not have is beside the member or in its place, of which neither is likelier.
-    """
-    colours, evidence = state.evidence.products.colours, state.evidence
-    columns = evidence.design.columns[:, evidence.design.hypotheses[index].blocks[state.members[index].block].place]
-    own = [size for rows, size in zip(colours.rows_of_labels, evidence.sizes, strict=True) if columns[rows].any()]
-    beside = (1 - UNLISTED) * math.exp(-price_of(own)) + UNLISTED
-    return UNLISTED / (UNLISTED + (1 - UNLISTED) * beside)
+    return Slot(logs, {one: cosine for one, (cosine, _) in cosines.items()}, (index, *alike), place.rivals, excess)
 
 
 class _Place:

@@ -75,3 +75,16 @@ def test_what_lasts_in_rows_of_which_the_model_says_nothing_is_said_beside_the_c
     assert findings.causes[0].closed > 0.9
     assert findings.verdict is Verdict.EFFECT
     assert findings.lacking == (misfit > 0)
+
+
+@pytest.mark.parametrize(("hidden", "believed", "names"), [(0.0, 0.97, ("b",)), (1.5, 0.5, ("b", "law"))])
+def test_a_name_beside_which_much_is_left_is_believed_half(
+    world: Callable[..., Any], hidden: float, believed: float, names: tuple[str, ...]
+) -> None:
+    """What the library lacks is beside it or in its place."""
+    made = world(7, true={"b": 3.0}, hidden=hidden)
+    findings = judge(made.problem(0), made.problem(1), seed=1)
+    first, *others = findings.diagnosis().effects
+    assert (first.name, others) == ("b", [])
+    assert first.probability == pytest.approx(believed, abs=0.01)
+    assert first.ambiguity_set == names
