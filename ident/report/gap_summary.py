@@ -7,6 +7,7 @@ from typing import Final
 
 from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Share, Verdict
+from ident.diagnosis.names import LAW
 from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.report.digits import percent, plain, quantity_text, significant
 from ident.report.headline import headline
@@ -14,6 +15,8 @@ from ident.report.law_text import law_line
 from ident.vehicle.quantities import Quantity
 
 MOST_LINES: Final = 10
+
+NAMELESS: Final = "something without a name"
 
 _UNSEEN: Final = {REPEATED: "Held-out steps, times the noise", LANE_CHANGE: "Lane change, times the noise"}
 
@@ -59,7 +62,7 @@ def numbers_text(quantities: Mapping[str, Quantity]) -> str:
 
 def rivals_of(effect: NamedEffect) -> list[str]:
     """What a cause might as well be, and where."""
-    names = [plain(name) for name in effect.ambiguity_set if name != effect.name]
+    names = [NAMELESS if name == LAW else plain(name) for name in effect.ambiguity_set if name != effect.name]
     return [*names, *(f"at {where}" for where in effect.elsewhere)]
 
 

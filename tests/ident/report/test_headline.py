@@ -53,6 +53,11 @@ def test_where_else_a_cause_may_be_is_said_without_its_number() -> None:
     assert cause_line(effect).endswith("; might as well be at steering_right")
 
 
+def test_a_cause_that_may_be_none_of_the_library_is_said_to_be() -> None:
+    doubted = replace(STICKS, probability=0.5, ambiguity_set=("stribeck", "law"))
+    assert cause_line(doubted).endswith("; might as well be something without a name")
+
+
 def test_of_many_other_places_the_first_line_says_how_many() -> None:
     wheels = tuple(Alternative("stribeck", None, wheel) for wheel in WHEEL_PLACES)
     text = headline(answer(Verdict.EFFECT, [replace(STICKS, alternatives=wheels)], (REPEATED, "dynamic", 5.0, 1.02)))
