@@ -13,6 +13,7 @@ than no model on held-out data, and the HSM150 turns in one direction only, so n
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -57,6 +58,7 @@ class Result:
     Attributes:
         outcome: against what was expected.
         answer: in words.
+        stated: probability of its first name; NaN without one.
         before, after: held-out gap over noise.
         predicted: share of the mean square of the held-out effort that the model misses which its causes take away;
             no estimate of a noise is in that, so that it compares one diagnosis with another.
@@ -65,6 +67,7 @@ class Result:
 
     outcome: Outcome
     answer: str
+    stated: float
     before: float
     after: float
     predicted: float
@@ -248,11 +251,12 @@ def result_of(row: Row, fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord]
     try:
         findings = diagnose_axis(fit, confirm, seed=SEED)
     except UserError as error:
-        return Result(Outcome.REFUSED, str(error), nothing, nothing, nothing, time.process_time() - start)
+        return Result(Outcome.REFUSED, str(error), nothing, nothing, nothing, nothing, time.process_time() - start)
     diagnosis, seconds = findings.diagnosis(), time.process_time() - start
     before, after = diagnosis.gap.before / diagnosis.gap.floor, diagnosis.gap.after / diagnosis.gap.floor
     predicted = predicted_share(findings.held_out)
-    return Result(outcome_of(row, diagnosis), words(row, diagnosis), before, after, predicted, seconds)
+    stated = max((one.probability for one in diagnosis.effects[:1]), default=nothing)
+    return Result(outcome_of(row, diagnosis), words(row, diagnosis), stated, before, after, predicted, seconds)
 
 
 def predicted_share(held_out: HeldOut) -> float:
@@ -277,8 +281,8 @@ def _expectation(row: Row) -> str:
 
 def lines(folder: Path, machines: Sequence[str]) -> Iterator[str]:
     """The table, a row a line, as Markdown; rows without records say where to get them."""
-    yield "| machine | expected (closes) | answer (closes) | outcome | gap over noise | predicts | time |"
-    yield "|---|---|---|---|---|---|---|"
+    yield "| machine | expected (closes) | answer (closes) | outcome | stated | gap over noise | predicts | time |"
+    yield "|---|---|---|---|---|---|---|---|"
     for row in ROWS:
         if machines and row.machine not in machines:
             continue
@@ -286,11 +290,12 @@ def lines(folder: Path, machines: Sequence[str]) -> Iterator[str]:
         try:
             fit, confirm = read_row(row, folder)
         except UserError as error:
-            yield f"| {name} | {_expectation(row)} | skipped: {error} | | | | |"
+            yield f"| {name} | {_expectation(row)} | skipped: {error} | | | | | |"
             continue
-        result, answered = result_of(row, fit, confirm), ("", "")
+        result, answered = result_of(row, fit, confirm), ("", "", "")
         if result.outcome is not Outcome.REFUSED:
-            answered = (f"{result.before:.2f}, then {result.after:.2f}", f"{result.predicted:.2f}")
+            stated = "" if math.isnan(result.stated) else f"{result.stated:.2f}"
+            answered = (stated, f"{result.before:.2f}, then {result.after:.2f}", f"{result.predicted:.2f}")
         cells = (name, _expectation(row), result.answer, result.outcome.value, *answered, f"{result.seconds:.0f} s")
         yield f"| {' | '.join(cells)} |"
 

@@ -24,7 +24,8 @@ from ident.diagnosis.search.search import Search
 from ident.stages import Stage, untold
 
 WIDENING: Final = 0.1
-"""Share of the held-out gap by which members may seem to widen it together."""
+"""Share of the held-out gap by which members may seem to widen it together; of all that is held out, where that is
+within the accidents of its noise."""
 
 
 def answer_of(fit: Problem, confirm: Problem, *, seed: int, stage: Stage = untold) -> Findings:
@@ -111,8 +112,10 @@ def _doubtful(standing: Standing) -> dict[str, float]:
 def _verdict(standing: Standing) -> Verdict:
     if not standing.taken.variants:
         return Verdict.UNKNOWN if standing.is_lacking or _nameless(standing) else Verdict.NONE
-    least = 1 - OPEN if standing.is_lacking else -WIDENING if standing.is_measurable else -math.inf
-    if standing.fitted.exactly.closed < least:
+    gap = standing.fitted.exactly
+    closable = gap.before**2 - (gap.floor**2 if standing.is_measurable else 0.0)
+    widened = gap.after**2 - gap.before**2 > WIDENING * closable
+    if widened or (standing.is_lacking and gap.closed < 1 - OPEN):
         return Verdict.UNKNOWN
     return Verdict.LAW if standing.taken.laws else Verdict.EFFECT
 

@@ -88,3 +88,18 @@ def test_a_name_beside_which_much_is_left_is_believed_half(
     assert (first.name, others) == ("b", [])
     assert first.probability == pytest.approx(believed, abs=0.01)
     assert first.ambiguity_set == names
+
+
+def test_what_makes_quiet_held_out_rows_worse_is_no_answer(world: Callable[..., Any]) -> None:
+    """What the fitted record has, and the confirming one has not: of that all is noise, and less of it."""
+    confirm, truth = world(32, repeats=1, samples=3200).problem(1), np.array([1.0, -2.0, 0.5])
+    quiet = replace(
+        confirm,
+        blocks=tuple(
+            replace(block, target=0.4 * block.target + 0.6 * block.baseline @ truth) for block in confirm.blocks
+        ),
+    )
+    findings = judge(world(32, repeats=1, samples=3200, true={"c": 0.2}).problem(0), quiet, seed=1)
+    assert findings.gap.before < findings.gap.floor
+    assert findings.gap.after**2 > 1.1 * findings.gap.before**2
+    assert findings.verdict is Verdict.UNKNOWN
