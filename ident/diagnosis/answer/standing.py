@@ -90,9 +90,11 @@ class Standing:
         """Probability that what stands in a place is none of the hypotheses as they are written.
 
         Where the members leave more held out than noise that is not known exactly, there is something that the library
-        does not have: beside them, or in the place of one, of which neither is likelier.
+        does not have: beside them, or in the place of one, of which neither is likelier. The same where what is held
+        out is no nearer with them: what they are in the fitted rows was not seen again.
         """
-        return 1 / (1 + len(self.taken.variants)) if self._leaves_more else UNLISTED
+        gap = self.fitted.exactly
+        return 1 / (1 + self.fitted.count) if self._leaves_more or gap.after >= gap.before else UNLISTED
 
     @property
     def _leaves_more(self) -> bool:
