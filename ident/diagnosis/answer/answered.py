@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from scipy.special import logsumexp
 
 from ident.diagnosis.answer.contest import better
 from ident.diagnosis.answer.findings import Cause, Findings, ordered
-from ident.diagnosis.answer.standing import OPEN, Standing
+from ident.diagnosis.answer.standing import INEXACT, OPEN, Standing
 from ident.diagnosis.check.remainder import repeated, shares
 from ident.diagnosis.diagnosis import LawAnswer, Verdict
 from ident.diagnosis.evidence.state import State
@@ -22,10 +21,6 @@ from ident.diagnosis.problem import Problem
 from ident.diagnosis.search.asked import Asked, asked_beside, asked_beside_a_law, asked_of, asked_once_more
 from ident.diagnosis.search.search import Search
 from ident.stages import Stage, untold
-
-WIDENING: Final = 0.1
-"""Share of the held-out gap by which members may seem to widen it together; of all that is held out, where that is
-within the accidents of its noise."""
 
 
 def answer_of(fit: Problem, confirm: Problem, *, seed: int, stage: Stage = untold) -> Findings:
@@ -114,7 +109,7 @@ def _verdict(standing: Standing) -> Verdict:
         return Verdict.UNKNOWN if standing.is_lacking or _nameless(standing) else Verdict.NONE
     gap = standing.fitted.exactly
     closable = gap.before**2 - (gap.floor**2 if standing.is_measurable else 0.0)
-    widened = gap.after**2 - gap.before**2 > WIDENING * closable
+    widened = gap.after**2 - gap.before**2 > INEXACT * closable
     if widened or (standing.is_lacking and gap.closed < 1 - OPEN):
         return Verdict.UNKNOWN
     return Verdict.LAW if standing.taken.laws else Verdict.EFFECT

@@ -22,6 +22,10 @@ MEASURABLE: Final = 0.05
 MISTAKEN: Final = 1.0
 """What is lacking, over noise and tolerance, that may be a mistake in those."""
 
+INEXACT: Final = 0.1
+"""Share of the held-out gap by which members may miss it together, or seem to widen it; of all that is held out, where
+the gap is within the accidents of its noise."""
+
 OPEN: Final = 0.5
 """Share of the held-out gap that members leave, more being lacking than is tolerated, from which they are no answer."""
 
@@ -89,12 +93,12 @@ class Standing:
     def unlisted(self) -> float:
         """Probability that what stands in a place is none of the hypotheses as they are written.
 
-        Where the members leave more held out than noise that is not known exactly, there is something that the library
-        does not have: beside them, or in the place of one, of which neither is likelier. The same where what is held
-        out is no nearer with them: what they are in the fitted rows was not seen again.
+        Where the members leave more held out than noise that is not known exactly, and more than forms of what is large
+        are exact to, there is something that the library does not have: beside them, or in the place of one, of which
+        neither is likelier.
         """
-        gap = self.fitted.exactly
-        return 1 / (1 + self.fitted.count) if self._leaves_more or gap.after >= gap.before else UNLISTED
+        is_open = self._leaves_more and self.fitted.exactly.closed < 1 - INEXACT
+        return 1 / (1 + self.fitted.count) if is_open else UNLISTED
 
     @property
     def _leaves_more(self) -> bool:
