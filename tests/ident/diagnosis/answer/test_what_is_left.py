@@ -77,12 +77,15 @@ def test_what_lasts_in_rows_of_which_the_model_says_nothing_is_said_beside_the_c
     assert findings.lacking == (misfit > 0)
 
 
-@pytest.mark.parametrize(("hidden", "believed", "names"), [(0.0, 0.97, ("b",)), (1.5, 0.5, ("b", "law"))])
-def test_a_name_beside_which_much_is_left_is_believed_half(
-    world: Callable[..., Any], hidden: float, believed: float, names: tuple[str, ...]
+@pytest.mark.parametrize(
+    ("size", "hidden", "believed", "names"),
+    [(2.0, 0.0, 0.97, ("b",)), (6.0, 1.8, 0.97, ("b",)), (2.0, 1.8, 0.5, ("b", "law"))],
+)
+def test_a_name_beside_which_much_of_the_gap_is_left_is_believed_half(
+    world: Callable[..., Any], size: float, hidden: float, believed: float, names: tuple[str, ...]
 ) -> None:
-    """What the library lacks is beside it or in its place."""
-    made = world(7, true={"b": 3.0}, hidden=hidden)
+    """What the library lacks is beside it or in its place; of a large gap a little is left by what is right."""
+    made = world(7, true={"b": size}, hidden=hidden)
     findings = judge(made.problem(0), made.problem(1), seed=1)
     first, *others = findings.diagnosis().effects
     assert (first.name, others) == ("b", [])
