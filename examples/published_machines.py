@@ -255,7 +255,7 @@ def result_of(row: Row, fit: Sequence[AxisRecord], confirm: Sequence[AxisRecord]
     diagnosis, seconds = findings.diagnosis(), time.process_time() - start
     before, after = diagnosis.gap.before / diagnosis.gap.floor, diagnosis.gap.after / diagnosis.gap.floor
     predicted = predicted_share(findings.held_out)
-    stated = max((one.probability for one in diagnosis.effects[:1]), default=nothing)
+    stated = diagnosis.effects[0].probability if diagnosis.effects else nothing
     return Result(outcome_of(row, diagnosis), words(row, diagnosis), stated, before, after, predicted, seconds)
 
 

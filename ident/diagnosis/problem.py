@@ -299,7 +299,7 @@ class Problem:
     spreads: Mapping[str, float] = field(default_factory=dict)
     dependences: tuple[Dependence, ...] = ()
 
-    @property
+    @cached_property
     def known(self) -> Known:
         """Of all parameters where a model is judged, else of those with a spread of their own."""
         if self.nominal is not None:

@@ -17,7 +17,7 @@ from ident.estimate.lag import lag_of
 from ident.estimate.least_squares import ORDINARY, Estimator, LinearSystem, Solution
 from ident.estimate.noise import noise_floor
 from ident.estimate.result import Estimate, Identification, KnownInertia
-from ident.estimate.uncertainty import ErrorCovariance, FittedRows, error_covariance, interval_factor
+from ident.estimate.uncertainty import ErrorCovariance, FittedRows, correlation_of, error_covariance, interval_factor
 from ident.records.record import FOUR_STEPS, Record, Step
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, parameter_column
@@ -96,10 +96,9 @@ def _identify(
     ]
     _refuse_unexcited(estimates)
     values = np.array([*(estimate.value for estimate in estimates), inertia.value])
-    deviations = np.sqrt(np.diag(error.matrix))
     return Identification(
         estimates=(*estimates, _inertia_estimate(inertia, lifted)),
-        correlation=error.matrix / np.outer(deviations, deviations),
+        correlation=correlation_of(error.matrix),
         condition=fit.solution.condition,
         floors=tuple(noise_floor(equation, values) for equation in equations),
         lag=lag_of(fit.parts, [row.growth for row in rows]),

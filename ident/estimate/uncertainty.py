@@ -96,6 +96,14 @@ def error_covariance(parts: Sequence[FittedRows]) -> ErrorCovariance:
     return ErrorCovariance.total([found for part in parts for found in _of_part(part)])
 
 
+def correlation_of(covariance: Array) -> Array:
+    """(n, n) of a covariance; what is known exactly has none with anything else."""
+    deviations = np.maximum(np.sqrt(np.diag(covariance)), np.finfo(float).tiny)
+    found = covariance / deviations / deviations[:, None]
+    np.fill_diagonal(found, 1.0)
+    return np.asarray(found)
+
+
 def interval_factor(degrees_of_freedom: float, level: float = 0.95) -> float:
     """Half-width of a two-sided interval in standard deviations (Student's t)."""
     return float(stats.t.ppf((1 + level) / 2, max(degrees_of_freedom, 1.0)))

@@ -70,14 +70,6 @@ class Refit:
         """Standard deviations (p,) of the model's parameters."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
-    @property
-    def baseline_correlation(self) -> Array:
-        """(p, p) of them; what is known exactly has none."""
-        deviations = np.maximum(self.baseline_std, np.finfo(float).tiny)
-        found = self.covariance / deviations / deviations[:, None]
-        np.fill_diagonal(found, 1.0)
-        return np.asarray(found)
-
 
 def refit(
     problems: Sequence[Problem],

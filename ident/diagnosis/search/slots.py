@@ -33,7 +33,7 @@ RIVALS: Final = 4
 
 UNLISTED: Final = 0.03
 """Probability that what stands in a place is none of the hypotheses as they are written, however likely one is among
-them, where next to nothing is left of the rows: of 35 names of drawn machines that were sure, one was wrong."""
+them, where little of the gap is left: of 35 names of drawn machines that were sure, one was wrong."""
 
 SAME: Final = 0.9999
 """Cosine of what two names of as many numbers add to the rows, from which those do not tell them apart."""

@@ -113,11 +113,10 @@ def _nominal(model: Parameters, lag: Lag | None) -> Nominal:
     values, std = dict.fromkeys(UNSTATED, 0.0), dict(UNSTATED)
     if lag is not None:
         values[LAG_NAME], std[LAG_NAME] = lag.value / lag.interval, lag.std / lag.interval
-    correlation = np.eye(len(PARAMETER_NAMES)) if model.correlation is None else model.correlation
     return Nominal(
         np.append(model.values, list(values.values())),
         np.append(model.std, list(std.values())),
-        block_diag(correlation, np.eye(len(UNSTATED))),
+        None if model.correlation is None else block_diag(model.correlation, np.eye(len(UNSTATED))),
     )
 
 

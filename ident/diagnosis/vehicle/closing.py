@@ -24,6 +24,7 @@ from ident.effects.combining import combined
 from ident.effects.extended import ExtendedModel
 from ident.estimate.equations import ROWS
 from ident.estimate.filters import Processing
+from ident.estimate.uncertainty import correlation_of
 from ident.records.record import Record
 from ident.records.repeats import repeats_of
 from ident.vehicle.description import VehicleDescription
@@ -105,13 +106,13 @@ def plain_model(
 def _guessed_where_unseen(refit: Refit, problem: Problem, guesses: Parameters) -> Parameters:
     """The fit, moved towards the guesses along what the rows do not show."""
     if problem.nominal is not None:
-        return _stated(refit.baseline, refit.baseline_std, refit.baseline_correlation)
+        return _stated(refit.baseline, refit.baseline_std, correlation_of(refit.covariance))
     size, found = np.where(guesses.std > 0, guesses.std, np.abs(guesses.values)), refit.baseline[: len(PARAMETER_NAMES)]
     rows = np.concatenate([block.baseline[block.moving, : len(size)] for block in problem.blocks]) * size
     scale = np.maximum(np.linalg.norm(rows, axis=0).max(), np.finfo(float).tiny)
     normal = (rows / scale).T @ (rows / scale) + PRIOR_WEIGHT**2 * np.eye(len(size))
     pull = PRIOR_WEIGHT**2 * (guesses.values - found) / size
-    return _stated(found + size * np.linalg.solve(normal, pull), refit.baseline_std, refit.baseline_correlation)
+    return _stated(found + size * np.linalg.solve(normal, pull), refit.baseline_std, correlation_of(refit.covariance))
 
 
 def _stated(values: Array, std: Array, correlation: Array | None) -> Parameters:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ident.errors import EstimationError
 from ident.estimate.axis.processing import PARAMETERS, AxisEquations, AxisProcessing, axis_equations
 from ident.estimate.least_squares import LinearSystem, Solution, solve
-from ident.estimate.uncertainty import ErrorCovariance, FittedRows, error_covariance, interval_factor
+from ident.estimate.uncertainty import ErrorCovariance, FittedRows, correlation_of, error_covariance, interval_factor
 from ident.records.axis_record import AxisKind, AxisRecord
 
 Array = NDArray[np.float64]
@@ -101,11 +101,10 @@ def identify_axis(record: AxisRecord, processing: AxisProcessing, axis: str | No
         equations.regressor, solution.influence, solution.residual, kept, equations.period, equations.sample_time
     )
     error = error_covariance([rows])
-    deviations = np.sqrt(np.diag(error.matrix))
     return AxisIdentification(
         axis=signals.name,
         estimates=_estimates(solution, error, signals.kind),
-        correlation=error.matrix / np.outer(deviations, deviations),
+        correlation=correlation_of(error.matrix),
         condition=solution.condition,
         regressor_condition=float(np.linalg.cond(equations.regressor)),
         relative_error=float(np.linalg.norm(solution.residual) / np.linalg.norm(equations.effort)),
