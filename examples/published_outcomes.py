@@ -45,6 +45,7 @@ class Outcome(enum.Enum):
     """How an answer compares with what was expected."""
 
     RIGHT = "right"
+    SET = "in its set"
     VARIABLE = "right variable"
     UNKNOWN = "unknown"
     MISSED = "missed"
@@ -83,12 +84,17 @@ def cause_of(effect: NamedEffect) -> str:
     return f"law {effect.law.variable}" + (f" x {effect.law.partner}" if effect.law.partner else "")
 
 
+def _alike(effect: NamedEffect) -> list[str]:
+    """The cause, and laws of what the records do not tell from its variable."""
+    return [cause_of(effect), *(f"law {other.variable}" for other in effect.alternatives if other.variable)]
+
+
 def _variable(cause: str) -> str:
     return VARIABLES.get(cause, cause.removeprefix("law ").partition(" x ")[0])
 
 
-def _expected_of(row: Row, effect: NamedEffect) -> tuple[str, ...]:
-    return row.expected.get(effect.where.partition("<")[0], ())
+def _expected_of(row: Row, effect: NamedEffect) -> frozenset[str]:
+    return frozenset(row.expected.get(effect.where.partition("<")[0], ()))
 
 
 def outcome_of(row: Row, diagnosis: Diagnosis) -> Outcome:
@@ -101,6 +107,8 @@ def outcome_of(row: Row, diagnosis: Diagnosis) -> Outcome:
     cause, expected = cause_of(strongest), _expected_of(row, strongest)
     if cause in expected:
         return Outcome.RIGHT
+    if not expected.isdisjoint(_alike(strongest)):
+        return Outcome.SET
     return Outcome.VARIABLE if _variable(cause) in map(_variable, expected) else Outcome.WRONG
 
 
@@ -108,8 +116,8 @@ def words(row: Row, diagnosis: Diagnosis) -> str:
     """The verdict, and its causes with what each closes, strongest first."""
     effects = sorted(diagnosis.effects, key=lambda effect: -effect.gap_closed_held_out)
     told = [
-        f"{cause_of(e)}@{e.where} {e.gap_closed_held_out:.2f}"
-        + ("" if cause_of(e) in _expected_of(row, e) else " (not expected)")
+        f"{' or '.join(_alike(e))}@{e.where} {e.gap_closed_held_out:.2f}"
+        + (" (not expected)" if _expected_of(row, e).isdisjoint(_alike(e)) else "")
         for e in effects
     ]
     return f"{diagnosis.verdict}: {', '.join(told)}" if told else str(diagnosis.verdict)

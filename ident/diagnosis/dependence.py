@@ -69,6 +69,7 @@ class Dependence:
         of: which motion, where that is not the place's own or comes around: another axis, a sum with it, a turn.
         period: of the variable where it comes around, else 0.
         noise: log evidence that the noise of what it is made of may be for a law of it.
+        unrecorded: of what else that the records do not have the rows of one record may be a function; None: nothing.
     """
 
     where: str
@@ -81,6 +82,7 @@ class Dependence:
     of: str = ""
     period: float = 0.0
     noise: float = 0.0
+    unrecorded: Variable | None = None
 
     @property
     def effect(self) -> str:

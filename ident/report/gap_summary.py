@@ -11,12 +11,14 @@ from ident.diagnosis.names import LAW
 from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.report.digits import percent, plain, quantity_text, significant
 from ident.report.headline import headline
-from ident.report.law_text import law_line
+from ident.report.law_text import is_unrecorded, law_line
 from ident.vehicle.quantities import Quantity
 
 MOST_LINES: Final = 10
 
 NAMELESS: Final = "something without a name"
+
+_BESIDE: Final = "record beside it what else moves, as the other joints of an arm, or another motion (--confirm)"
 
 _UNSEEN: Final = {REPEATED: "Held-out steps, times the noise", LANE_CHANGE: "Lane change, times the noise"}
 
@@ -107,6 +109,8 @@ def next_text(diagnosis: Diagnosis) -> str:
     """What to do now."""
     if diagnosis.next_experiment:
         return diagnosis.next_experiment
+    if any(is_unrecorded(effect) for effect in diagnosis.effects):
+        return f"{_BESIDE}: within one record, time and what else moves are one."
     if diagnosis.verdict.explains:
         model = "put the causes into the model"
         written = f"{model} (--extended FILE writes it)" if diagnosis.unseen else model

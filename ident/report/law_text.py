@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from ident.diagnosis.dependence import Variable
 from ident.diagnosis.diagnosis import LawAnswer, NamedEffect
 from ident.report.digits import percent, plain, range_text, unit_text, value_text
 
@@ -68,6 +69,12 @@ def law_line(effect: NamedEffect, law: LawAnswer) -> str:
     closes = percent(effect.gap_closed_held_out)
     head = f"  {effect.probability:.0%} law@{effect.where}: from {swing_text(law)}{sure} over {variable_text(law)}"
     return f"{head}{formula}; closes {closes} of the gap{other}{near}"
+
+
+def is_unrecorded(effect: NamedEffect) -> bool:
+    """Whether a law of time may be one of what else moves, which is not recorded."""
+    law, others = effect.law, {other.variable for other in effect.alternatives}
+    return law is not None and law.variable == Variable.TIME and str(Variable.OTHER_AXIS) in others
 
 
 def swing_text(law: LawAnswer, count: int = 3) -> str:

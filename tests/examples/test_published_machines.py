@@ -1,6 +1,7 @@
 """Published records of real machines: what is done to them and what is expected of them, without any of them."""
 
 import importlib
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -11,7 +12,7 @@ from scipy import io
 
 from ident.diagnosis.axis.model import AxisEffect
 from ident.diagnosis.dependence import Partner, Variable
-from ident.diagnosis.diagnosis import Diagnosis, Gap, NamedEffect, Verdict
+from ident.diagnosis.diagnosis import Alternative, Diagnosis, Gap, NamedEffect, Verdict
 from ident.diagnosis.names import EffectName
 from ident.records.axis_record import AxisKind, AxisRecord, AxisSignals
 
@@ -148,6 +149,14 @@ def test_the_cause_that_closes_most_decides(
 ) -> None:
     row = outcomes.Row("m", "t", ("1",), ("f",), (), 1.0, {"axis": expected}, {"axis": 0.5})
     assert outcomes.outcome_of(row, answer).value == outcome
+
+
+def test_what_records_do_not_tell_from_an_answer_is_in_its_set(outcomes: ModuleType) -> None:
+    row = outcomes.Row("m", "t", ("1",), ("f",), (), 1.0, {"axis": outcomes.GRAVITY}, {"axis": 0.5})
+    answer = _answer(Verdict.LAW, friction_warming=0.8)
+    alike = replace(answer.effects[0], alternatives=(Alternative(None, str(Variable.OTHER_AXIS), "axis"),))
+    assert outcomes.outcome_of(row, answer).value == "wrong"
+    assert outcomes.outcome_of(row, replace(answer, effects=(alike,))).value == "in its set"
 
 
 def test_least_squares_alone_find_the_gravity_of_a_swinging_arm(load: Any) -> None:

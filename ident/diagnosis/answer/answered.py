@@ -12,7 +12,7 @@ from ident.diagnosis.answer.standing import INEXACT, OPEN, Standing
 from ident.diagnosis.check.remainder import repeated, shares
 from ident.diagnosis.diagnosis import LawAnswer, Verdict
 from ident.diagnosis.evidence.state import State
-from ident.diagnosis.law.answer import channel_of, law_answer, same_laws, same_names
+from ident.diagnosis.law.answer import channel_of, law_answer, same_laws, same_names, unrecorded_laws
 from ident.diagnosis.law.law import Law
 from ident.diagnosis.names import LAW
 from ident.diagnosis.noise.colours import Colours
@@ -143,7 +143,9 @@ def _cause(standing: Standing, place: int, index: int) -> Cause:
         biased=standing.fitted.biased(place),
         law=law,
         law_answer=None if law is None else _law_answer(standing, law, index),
-        alternatives=same_names(ranked.untold) if law is None else same_laws(ranked.alike, dependences),
+        alternatives=same_names(ranked.untold)
+        if law is None
+        else same_laws(ranked.alike, dependences) + unrecorded_laws(law, standing.taken.problems),
     )
 
 

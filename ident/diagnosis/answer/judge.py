@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -26,6 +26,10 @@ _STRONGEST: Final = (Verdict.LAW, Verdict.EFFECT, Verdict.UNKNOWN, Verdict.NONE)
 """Verdicts, of which that of all pieces is the first that any has."""
 
 
+Names = tuple[str, ...]
+"""Of the parameters of a piece, which no other piece has."""
+
+
 def judge(fit: Problem, confirm: Problem, *, seed: int, stage: Stage = untold) -> Findings:
     """Find the causes of a gap.
 
@@ -35,21 +39,54 @@ def judge(fit: Problem, confirm: Problem, *, seed: int, stage: Stage = untold) -
         seed: of the smooth function of what is left.
         stage: told what begins.
     """
-    pieces = pieces_of((fit, confirm))
-    if len(pieces) == 1:
-        return answer_of(fit, confirm, seed=seed, stage=stage)
-    found = [answer_of(*piece.problems, seed=seed, stage=stage) for piece in pieces]
-    return _Together((fit, confirm), pieces, found).findings()
+    return answers_of(fit, confirm, seed=seed, stage=stage).findings()
 
 
-class _Together:
-    """What was found of the pieces of problems, as it is of the whole.
+def answers_of(
+    fit: Problem, confirm: Problem, *, seed: int, known: Mapping[Names, Findings] | None = None, stage: Stage = untold
+) -> Answers:
+    """The answer of every piece.
 
     Args:
+        fit, confirm, seed, stage: as of `judge`.
+        known: answers of pieces that are as they were.
+    """
+    problems, known = (fit, confirm), known or {}
+    pieces = pieces_of(problems)
+    # What is one piece is asked as it is.
+    asked = [piece.problems for piece in pieces] if len(pieces) > 1 else [problems]
+    found = [known.get(own.names) or answer_of(own, other, seed=seed, stage=stage) for own, other in asked]
+    return Answers(problems, pieces, found)
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What was found of the pieces of problems.
+
+    Attributes:
         problems: to fit and to confirm.
         pieces: of them.
         found: of every piece.
     """
+
+    problems: tuple[Problem, Problem]
+    pieces: Sequence[Piece]
+    found: Sequence[Findings]
+
+    @property
+    def by_names(self) -> dict[Names, Findings]:
+        """Of every piece, by its parameters."""
+        return {piece.problems[0].names: one for piece, one in zip(self.pieces, self.found, strict=True)}
+
+    def findings(self) -> Findings:
+        """Of the whole."""
+        if len(self.pieces) == 1:
+            return self.found[0]
+        return _Together(self.problems, self.pieces, self.found).findings()
+
+
+class _Together:
+    """What was found of the pieces of problems, as it is of the whole; arguments are the attributes of `Answers`."""
 
     def __init__(self, problems: Sequence[Problem], pieces: Sequence[Piece], found: Sequence[Findings]) -> None:
         self._problems, self._pieces, self._found = problems, pieces, [_as_answered(one) for one in found]

@@ -68,7 +68,14 @@ def _dependence(axis: AxisModel, variable: Variable, partner: Partner, x: Array,
         arguments=arguments,
         design=design,
         of=of,
+        unrecorded=_unrecorded(axis, variable, partner),
     )
+
+
+def _unrecorded(axis: AxisModel, variable: Variable, partner: Partner) -> Variable | None:
+    """What else moves while a single axis does, as the other joints of an arm, is some function of time."""
+    is_time = variable is Variable.TIME and partner is Partner.NOTHING
+    return Variable.OTHER_AXIS if is_time and not axis.others else None
 
 
 _PER = {Partner.NOTHING: "", Partner.DIRECTION: "", Partner.RATE: " s/q", Partner.ACCELERATION: " s^2/q"}

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
 from ident.diagnosis.answer.findings import Findings
-from ident.diagnosis.answer.judge import judge
-from ident.diagnosis.axis.problem import axis_problem, delayed_axes
+from ident.diagnosis.answer.judge import Answers, Names, answers_of
+from ident.diagnosis.axis.problem import axis_problem, delayed_scales
 from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_other_axes
-from ident.diagnosis.axis.scale import Scale
-from ident.diagnosis.names import LATE
 from ident.diagnosis.observations.split import split_problem
 from ident.diagnosis.problem import Problem
-from ident.records.axis_record import AxisRecord, AxisSignals
+from ident.records.axis_record import AxisRecord
 from ident.stages import Stage, untold
 
 
@@ -59,15 +57,17 @@ def _diagnosed(
     stage("filter of the records")
     reference = axis_reference(fit, cutoff, confirm)
 
-    def found_by(reference: Reference) -> Findings:
-        return judge(*pose_axis(fit, confirm, reference, lacking), seed=seed, stage=stage)
+    def found_by(reference: Reference, known: Mapping[Names, Findings] | None = None) -> Answers:
+        return answers_of(*pose_axis(fit, confirm, reference, lacking), seed=seed, known=known, stage=stage)
 
-    findings = found_by(reference)
-    scales = tuple(_on_second_thought(reference.scales, findings, fit[0].axes))
-    if all(scale is before for scale, before in zip(scales, reference.scales, strict=True)):
+    answers = found_by(reference)
+    findings = answers.findings()
+    late = delayed_scales(findings.after, findings.problem, fit[0], reference.scales)
+    if late is None:
         return findings
-    stage("again, an axis being late, or not")
-    return found_by(replace(reference, scales=scales))
+    stage("again, an axis being late")
+    # An axis that is late has no lag among its parameters: names tell which pieces are as they were.
+    return found_by(replace(reference, scales=late), answers.by_names).findings()
 
 
 def pose_axis(
@@ -76,19 +76,6 @@ def pose_axis(
     """The rows of records to fit and to confirm, and the candidates; arguments of `diagnose_axis`."""
     fitted = _without(axis_problem(fit, reference), lacking)
     return (fitted, _without(axis_problem(confirm, reference), lacking)) if confirm else split_problem(fitted)
-
-
-def _on_second_thought(scales: Sequence[Scale], findings: Findings, axes: Sequence[AxisSignals]) -> Iterator[Scale]:
-    """Scales without a hold where the lag is a delay, and with one where a seeming delay was something else."""
-    named = {cause.candidate.where for cause in findings.causes if cause.candidate.effect in LATE}
-    late = delayed_axes(findings.after, findings.problem, axes, scales)
-    for scale, axis, delayed in zip(scales, axes, late, strict=True):
-        if delayed:
-            yield replace(scale, hold=None)
-        elif scale.hold is None and axis.named("axis") not in named:
-            yield replace(scale, hold=0.0)
-        else:
-            yield scale
 
 
 def _without(problem: Problem, names: Collection[str]) -> Problem:

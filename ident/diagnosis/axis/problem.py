@@ -78,7 +78,7 @@ def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], lis
     period = with_repeats(signals.record)
     scales, width = reference.scales, len(PARAMETERS) + len(reference.scales) - 1
     sampled = 1 + len(reference.strange)
-    first = np.cumsum([0, *(width + sampled + (scale.hold is not None) for scale in scales)]).tolist()
+    first = np.cumsum([0, *(width + sampled + (not scale.delayed) for scale in scales)]).tolist()
     models = [_model(signals, index, scale, first[index]) for index, scale in enumerate(scales)]
     baselines = _baselines(models, signals, reference)
     blocks = [_block(signals, model, columns, period) for model, columns in zip(models, baselines, strict=True)]
@@ -90,25 +90,31 @@ def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], lis
     return blocks, candidates, dependences
 
 
-def delayed_axes(found: Refit, problem: Problem, axes: Sequence[AxisSignals], scales: Sequence[Scale]) -> list[bool]:
-    """Which axes follow their effort later than sampling can explain, surely, by the lag in the baseline.
+def delayed_scales(
+    found: Refit, problem: Problem, record: AxisRecord, scales: Sequence[Scale]
+) -> tuple[Scale, ...] | None:
+    """Scales whose axes are delayed where their motion surely follows later than sampling can explain; None: none does.
 
     Args:
-        found: refit of the problem.
+        found: refit of the problem, with the lag of every axis in the baseline.
         problem: whose baseline it is.
-        axes, scales: of the problem.
+        record: the first of the problem.
+        scales: of its axes.
     """
     values = dict(zip(problem.names, zip(found.baseline, found.baseline_std, strict=True), strict=True))
-    late = []
-    for axis, scale in zip(axes, scales, strict=True):
-        lag, std = (0.0, 0.0) if scale.hold is None else values[axis.named(LAG)]
-        late.append(abs((scale.hold or 0.0) + lag) - SURELY * std > HELD)
-    return late
+    lags = [values[axis.named(LAG)] for axis in record.axes]
+    late = [
+        replace(scale, hold=0.0, late=(scale.hold + lag) * record.sample_time, delayed=True)
+        if abs(scale.hold + lag) - SURELY * std > HELD
+        else scale
+        for scale, (lag, std) in zip(scales, lags, strict=True)
+    ]
+    return tuple(late) if any(scale.delayed for scale in late) else None
 
 
 def _candidates(model: AxisModel, scale: Scale) -> list[Candidate]:
     """Without a delay where the baseline has the lag."""
-    return [one for one in axis_candidates(model) if scale.hold is None or one.effect != EffectName.TIME_DELAY]
+    return [one for one in axis_candidates(model) if scale.delayed or one.effect != EffectName.TIME_DELAY]
 
 
 def _model(signals: Signals, index: int, scale: Scale, first: int) -> AxisModel:
@@ -168,7 +174,7 @@ def _baseline_names(axes: Sequence[AxisSignals], reference: Reference) -> list[t
         named += [(f"M_{axis.name}_{other.name}", inertia) for other in axes if other is not axis]
         named += [(axis.named(HOLD), "samples^2")]
         named += [(axis.named(_lag_at(time)), "samples") for time in reference.strange]
-        named += [(axis.named(LAG), "samples")] if scale.hold is not None else []
+        named += [] if scale.delayed else [(axis.named(LAG), "samples")]
     return named
 
 
@@ -181,7 +187,7 @@ def _baselines(models: Sequence[AxisModel], signals: Signals, reference: Referen
         force = model.inertia * model.motion.acceleration
         sampled = [dt**2 * differentiate(differentiate(force, dt, SEVEN), dt, SEVEN)]
         sampled += [change if nominal(dt) == time else np.zeros_like(change) for time in reference.strange]
-        sampled += [change] if scale.hold is not None else []
+        sampled += [] if scale.delayed else [change]
         own[index] = np.column_stack([own[index], *sampled])
     return [
         np.hstack([columns if place == index else np.zeros_like(columns) for place, columns in enumerate(own)])

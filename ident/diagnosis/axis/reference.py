@@ -87,7 +87,7 @@ class Signals:
         found = []
         for motion, scale in zip(self.motions, self.scales, strict=True):
             # Efforts that are on time turn with the motion; those that are not lead it.
-            lead = 0 if scale.hold is not None else round(scale.lag / dt)
+            lead = round(scale.late / dt) if scale.delayed else 0
             sticking = Sticking(
                 where=np.roll(motion.sticking, -lead),
                 friction=float(scale.values[PARAMETERS.index("Fc")]),
@@ -204,8 +204,7 @@ def axis_signals(record: AxisRecord, cutoff: float, bandwidth: float, scales: Se
 
 def _on_time(axis: AxisSignals, scale: Scale, sample_time: float) -> AxisSignals:
     """The axis with its effort when it acts, where sampling can be why that is not when it is recorded."""
-    hold = scale.hold_at(sample_time)
-    return axis if hold is None else replace(axis, effort=delayed(axis.effort, hold * sample_time, sample_time))
+    return replace(axis, effort=delayed(axis.effort, scale.hold_at(sample_time) * sample_time, sample_time))
 
 
 def refuse_other_axes(records: Sequence[AxisRecord]) -> None:
@@ -247,8 +246,8 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
         slowest,
         float(np.quantile(np.concatenate(paths), NEAREST)),
         reach,
-        float(lag) if sampled else None,
-        lag * record.sample_time,
+        float(lag) if sampled else 0.0,
+        0.0 if sampled else float(lag) * record.sample_time,
         float(rest @ rest) / len(rest) / (PASSED * signals[0].bandwidth / (2 * np.pi)),
     )
 

@@ -14,7 +14,7 @@ from ident.records.rates import nominal
 Array = NDArray[np.float64]
 
 LARGEST_HOLD: Final = 1.0
-"""Sample intervals up to which a first estimate of the lag may be what sampling does; other effects shift it."""
+"""Sample intervals by which efforts are moved at most, by a first estimate of the lag: other effects shift it."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,13 @@ class Scale:
         slowest: than which it is seldom slower in a row [m/s or rad/s].
         nearest: path since a reversal within which few rows are: what is over by then, none can bound [m or rad].
         reach: range of its position [m or rad].
-        hold: sample intervals by which its motion follows its effort as recorded, if sampling can be why: an effort
-            that is held over the interval acts half of one late. None: longer, and a cause of its own.
-        holds: by how many their motion follows in records that confirm at another rate, by nominal sample time [s]: a
-            position may be read at another part of those intervals.
-        lag: the same as a time, a first estimate [s].
+        hold: sample intervals by which its efforts are moved: by which its motion follows them, a first estimate, if
+            sampling can be why. An effort that is held over the interval acts half of one late.
+        late: by how much longer its motion follows [s].
         noise: power density of what the first estimate leaves of the rows, one-sided [N² or (Nm)², per Hz].
+        holds: by how many intervals it follows in records that confirm at another rate, by nominal sample time [s]: a
+            position may be read at another part of those.
+        delayed: whether that is a cause of its own; else how late sampling makes it is a parameter of the baseline.
     """
 
     values: Array
@@ -40,19 +41,16 @@ class Scale:
     slowest: float
     nearest: float
     reach: float
-    hold: float | None
-    lag: float
+    hold: float
+    late: float
     noise: float
     holds: Mapping[float, float] = field(default_factory=dict)
+    delayed: bool = False
 
-    def hold_at(self, sample_time: float) -> float | None:
-        """The hold of records of a sample time [s], in such intervals.
-
-        Where the motion is later than sampling can explain, that is left to a cause, and what differs at another rate
-        is sampling, if it can be.
-        """
+    def hold_at(self, sample_time: float) -> float:
+        """The hold of records of a sample time [s], in such intervals: what differs at another rate may be sampling."""
         own = self.holds.get(nominal(sample_time))
-        if self.hold is not None or own is None:
-            return self.hold if own is None else own
-        beyond = own - self.lag / sample_time
-        return beyond if abs(beyond) <= LARGEST_HOLD else None
+        if own is None:
+            return self.hold
+        beyond = own - self.late / sample_time
+        return beyond if abs(beyond) <= LARGEST_HOLD else 0.0

@@ -74,6 +74,20 @@ def same_laws(keys: Sequence[str], dependences: Sequence[Dependence]) -> tuple[A
     return tuple(Alternative(None, variable, where) for variable, where in found)
 
 
+def unrecorded_laws(law: Law, problems: Sequence[Problem]) -> tuple[Alternative, ...]:
+    """What is not recorded and may be the variable of a law that no other record than those fitted to confirms.
+
+    Args:
+        law: as it was learnt.
+        problems: to fit and to confirm.
+    """
+    fitted, confirming = ({block.record for block in problem.blocks} for problem in problems)
+    variable = law.dependence.unrecorded
+    if variable is None or not confirming <= fitted:
+        return ()
+    return (Alternative(None, str(variable), law.dependence.where),)
+
+
 def same_names(keys: Sequence[str]) -> tuple[Alternative, ...]:
     """The effects that these records do not tell from the first of them."""
     pairs = (key.split("@", 1) for key in keys[1:])

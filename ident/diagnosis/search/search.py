@@ -18,8 +18,9 @@ TURNS: Final = 4
 INSTEAD: Final = 2
 """Names that may stand for a law."""
 
-SURVIVORS: Final = 5
-"""Hypotheses that are fitted exactly at every step, by either noise."""
+SURVIVORS: Final = 3
+"""Hypotheses that are fitted exactly at every step, by either noise: of 1015 steps on four records of robots, whose
+sets are large, 3 took a later one, and none of 57 on vehicles."""
 
 MARGIN: Final = 4.0
 """Log posterior below the best one's from which a hypothesis is not fitted exactly."""

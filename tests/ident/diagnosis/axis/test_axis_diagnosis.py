@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hil.exam.sources.machine import Machine
 from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.axis.candidates import in_gap
 from ident.diagnosis.axis.diagnose import diagnose_axis
@@ -21,7 +22,8 @@ from ident.diagnosis.observations.delays import DAMPING, delayed, sprung
 from ident.errors import EstimationError, RecordError
 from ident.estimate.filters import SEVEN, differentiate
 from ident.records.axis_record import AxisRecord, read_axis_record
-from ident.report.gap_summary import summary_lines
+from ident.report.gap_summary import next_text, summary_lines
+from ident.report.headline import headline
 
 Make = Callable[..., Any]
 
@@ -167,6 +169,45 @@ def test_friction_that_follows_another_axis_is_named(machine: Make) -> None:
     assert findings.causes[0].candidate.key == "coupled_friction@axis_1<2"
     assert _value(findings, "coupled_friction")[0] == pytest.approx(15.0, rel=0.02)
     assert _value(findings, "coupled_friction", 1)[0] == pytest.approx(3.0, rel=0.02)
+
+
+def test_of_two_axes_the_late_one_alone_is_asked_again(machine: Make) -> None:
+    stages: list[str] = []
+    made = machine(follower=(15.0, 3.0), delay=0.002)
+    findings = diagnose_axis([made.drive(11)], [made.drive(12)], seed=1, stage=stages.append)
+    words = [stage.split()[0] for stage in stages]
+    # Both, then one.
+    assert [words[: words.index("again,")].count("comparing"), words.count("comparing")] == [2, 3]
+    assert {cause.candidate.key for cause in findings.causes} == {"time_delay@axis_1", "coupled_friction@axis_1<2"}
+
+
+def _beside_another_joint(machine: Machine, seed: int, start: float) -> AxisRecord:
+    """A record of a motion without repeats, under the load of a joint that is not in it."""
+    record = machine.drive(seed)
+    (axis,) = record.axes
+    load = 3.0 * np.sin(0.4 * (start + np.arange(len(axis.effort)) * record.sample_time))
+    return replace(record, axes=(replace(axis, effort=axis.effort + load),))
+
+
+def test_within_one_record_a_force_over_time_may_be_one_over_a_joint_that_is_not_recorded(machine: Make) -> None:
+    made = machine(repeats=1, duration=20.0, strokes=32)
+    record = _beside_another_joint(made, 11, 0.0)
+    findings = diagnose_axis([record], [], seed=1)
+    (law,) = findings.diagnosis().effects
+    assert law.law is not None
+    assert law.law.variable == "time"
+    assert [other.variable for other in law.alternatives] == ["other_axis"]
+    assert "or on another axis that is not recorded" in headline(findings.diagnosis())
+    assert "what else moves" in next_text(findings.diagnosis())
+
+
+def test_a_force_over_time_that_another_motion_confirms_is_one_over_time(machine: Make) -> None:
+    made = machine(repeats=1, duration=20.0, strokes=32)
+    findings = diagnose_axis([_beside_another_joint(made, 11, 0.0)], [_beside_another_joint(made, 12, 0.0)], seed=1)
+    (law,) = findings.diagnosis().effects
+    assert law.law is not None
+    assert law.law.variable == "time"
+    assert not law.alternatives
 
 
 def test_repeats_are_found_where_the_record_does_not_number_them(machine: Make) -> None:

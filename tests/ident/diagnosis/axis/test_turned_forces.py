@@ -94,7 +94,7 @@ def test_an_axis_that_is_late_makes_nothing_of_a_force_on_another() -> None:
     """Of two axes the first is late, the second has a drag."""
     record = Machine(follower=(15.0, 3.0), repeats=1, duration=8.0).drive(5)
     reference = axis_reference([record])
-    punctual = replace(reference, scales=tuple(replace(scale, hold=None) for scale in reference.scales))
+    punctual = replace(reference, scales=tuple(replace(scale, delayed=True) for scale in reference.scales))
     problem = axis_problem([record], punctual)
     first, second = (axis.named("axis") for axis in record.axes)
     drag, late = problem.candidate(f"quadratic_drag@{second}"), problem.candidate(f"time_delay@{first}")

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from hil.exam.sources.machine import Machine
-from ident.diagnosis.answer.judge import judge
+from ident.diagnosis.answer.judge import answers_of, judge
 from ident.diagnosis.axis.diagnose import pose_axis
 from ident.diagnosis.axis.reference import axis_reference
 from ident.diagnosis.observations.pieces import pieces_of
@@ -76,6 +76,17 @@ def test_what_two_worlds_lack_is_found_in_both_as_in_each(world: type[Any]) -> N
     assert sum(share.share for share in found.where if share.region == "all") == pytest.approx(1.0)
     late = next(cause for cause in found.causes if cause.candidate.where == "elsewhere")
     assert [one is None for one in late.part.added] == [True, True, False, False, True, True, False, False]
+
+
+def test_what_is_known_of_a_piece_is_not_asked_again(world: type[Any]) -> None:
+    first, second = world(seed=2, true={"b": 0.4}), world(seed=3, true={"d": 0.8})
+    whole = [beside(first.problem(part), second.problem(part)) for part in (0, 1)]
+    before, stages = answers_of(*whole, seed=1), list[str]()
+    known = {names: one for names, one in before.by_names.items() if names == first.problem(0).names}
+    again = answers_of(*whole, seed=1, known=known, stage=stages.append)
+    assert sum(stage.startswith("comparing") for stage in stages) == 1
+    assert again.found[0] is before.found[0]
+    assert again.findings().gap == before.findings().gap
 
 
 def test_a_piece_that_nothing_explains_does_not_take_the_causes_of_another(world: type[Any]) -> None:
