@@ -1,13 +1,14 @@
-"""What becomes of slow, short and mixed-rate records of axes: how many are refused, and how many get a wrong name.
+"""What becomes of records of axes without repeats: how many are refused, and how many get a wrong name.
 
-    python examples/axes_as_people_have_them.py                    # 200 records from seed 60000 on
+    python examples/axes_as_people_have_them.py                    # 200 slow, short, mixed-rate ones, from seed 60000 on
+    python examples/axes_as_people_have_them.py --usual            # 200 usual ones: 3 to 35 s at 250 to 2000 Hz
     python examples/axes_as_people_have_them.py --first-seed 1 --count 30
 
-Each is a record of another machine, without repeats: a third slow (60 to 180 s, a tenth of the usual speed), a third
-short (two strokes of 0.5 to 1.5 s), both confirmed by a part of themselves, and a third of mixed rates (another record,
-at a half or a quarter of the rate, confirms). Half of the machines lack nothing; of the others one in nine, and the
-rest one of eight things (`hil/exam/sources/axes.py`). A name is wrong where something else is missing and its set says
-nothing of that, and any name or law where nothing is.
+Each is a record of another machine: a third slow (60 to 180 s, a tenth of the usual speed), a third short (two strokes of
+0.5 to 1.5 s), both confirmed by a part of themselves, and a third of mixed rates (another record, at a half or a quarter
+of the rate, confirms); or all of them usual, confirmed by a part of themselves. Half of the machines lack nothing; of
+the others one in nine, and the rest one of eight things (`hil/exam/sources/axes.py`). A name is wrong where something
+else is missing and its set says nothing of that, and any name or law where nothing is.
 """
 
 from __future__ import annotations
@@ -52,6 +53,10 @@ class Trouble(enum.StrEnum):
     SLOW = "slow"
     SHORT = "short"
     MIXED = "mixed rates"
+    USUAL = "none"
+
+
+TROUBLED = (Trouble.SLOW, Trouble.SHORT, Trouble.MIXED)
 
 
 @dataclass(frozen=True)
@@ -76,9 +81,9 @@ class Outcome:
 Drawn = tuple[Trouble, DrawnAxis, Sequence[AxisRecord], Sequence[AxisRecord]]
 
 
-def drawn(seed: int) -> Drawn:
+def drawn(seed: int, troubles: Sequence[Trouble] = TROUBLED) -> Drawn:
     """Trouble, machine, records to fit and to confirm; of machines that run away at a rate, the next one."""
-    machines = (_drawn(seed, attempt) for attempt in itertools.count())
+    machines = (_drawn(seed, attempt, troubles) for attempt in itertools.count())
     return next(found for found in machines if all(_follows(record) for record in (*found[2], *found[3])))
 
 
@@ -87,9 +92,9 @@ def _follows(record: AxisRecord) -> bool:
     return bool(np.abs(record.axes[0].position).max() < FARTHEST)
 
 
-def _drawn(seed: int, attempt: int) -> Drawn:
+def _drawn(seed: int, attempt: int, troubles: Sequence[Trouble]) -> Drawn:
     generator = np.random.default_rng([seed, 7, attempt] if attempt else [seed, 7])
-    trouble = list(Trouble)[seed % len(Trouble)]
+    trouble = troubles[seed % len(troubles)]
     number = seed if not attempt else int(generator.integers(2**31))
     axis = draw_axis(number, Lacking.NOTHING if generator.random() < 0.5 else None)
     machine = axis.machine
@@ -106,9 +111,9 @@ def _drawn(seed: int, attempt: int) -> Drawn:
     return trouble, axis, [record], [slower.drive(seed + 1)]
 
 
-def outcome_of(seed: int) -> Outcome:
+def outcome_of(seed: int, troubles: Sequence[Trouble] = TROUBLED) -> Outcome:
     """Diagnose one."""
-    trouble, axis, fit, confirm = drawn(seed)
+    trouble, axis, fit, confirm = drawn(seed, troubles)
     try:
         findings = diagnose_axis(fit, confirm, seed=1)
     except UserError as error:
@@ -120,10 +125,10 @@ def outcome_of(seed: int) -> Outcome:
     return Outcome(trouble, axis.lacking, str(findings.verdict), wrong=wrong)
 
 
-def outcomes(first_seed: int, count: int) -> Iterator[Outcome]:
+def outcomes(first_seed: int, count: int, troubles: Sequence[Trouble]) -> Iterator[Outcome]:
     """Of `count` seeds, one line each."""
     for seed in range(first_seed, first_seed + count):
-        outcome = outcome_of(seed)
+        outcome = outcome_of(seed, troubles)
         print(seed, outcome.trouble, outcome.lacking, outcome.said, *outcome.wrong, sep=" | ", flush=True)
         yield outcome
 
@@ -133,9 +138,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--first-seed", type=int, default=60000)
     parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--usual", action="store_true", help="usual records in place of hard ones")
     arguments = parser.parse_args()
-    found = list(outcomes(arguments.first_seed, arguments.count))
-    for trouble in Trouble:
+    troubles = (Trouble.USUAL,) if arguments.usual else TROUBLED
+    found = list(outcomes(arguments.first_seed, arguments.count, troubles))
+    for trouble in troubles:
         own = [one for one in found if one.trouble is trouble]
         refused, wrong = sum(one.refused for one in own), sum(bool(one.wrong) for one in own)
         print(f"{trouble}: {len(own)} records, {refused} refused, {wrong} with a wrong name")
