@@ -1,14 +1,14 @@
 """What becomes of records of axes without repeats: how many are refused, and how many get a wrong name.
 
-    python examples/axes_as_people_have_them.py                    # 200 slow, short, mixed-rate ones, from seed 60000 on
+    python examples/axes_as_people_have_them.py                    # 200 slow, short or mixed ones, from seed 60000 on
     python examples/axes_as_people_have_them.py --usual            # 200 usual ones: 3 to 35 s at 250 to 2000 Hz
     python examples/axes_as_people_have_them.py --first-seed 1 --count 30
 
-Each is a record of another machine: a third slow (60 to 180 s, a tenth of the usual speed), a third short (two strokes of
-0.5 to 1.5 s), both confirmed by a part of themselves, and a third of mixed rates (another record, at a half or a quarter
-of the rate, confirms); or all of them usual, confirmed by a part of themselves. Half of the machines lack nothing; of
-the others one in nine, and the rest one of eight things (`hil/exam/sources/axes.py`). A name is wrong where something
-else is missing and its set says nothing of that, and any name or law where nothing is.
+Each is a record of another machine: a third slow (60 to 180 s, a tenth of the usual speed), a third short (two strokes
+of 0.5 to 1.5 s), both confirmed by a part of themselves, and a third of mixed rates (another record, at a half or a
+quarter of the rate, confirms); or all of them usual, confirmed by a part of themselves. Half of the machines lack
+nothing; of the others one in nine, and the rest one of eight things (`hil/exam/sources/axes.py`). A name is wrong
+where something else is missing and its set says nothing of that, and any name or law where nothing is.
 """
 
 from __future__ import annotations
