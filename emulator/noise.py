@@ -101,10 +101,11 @@ class Disturbances:
 
     def advance(self) -> None:
         """Go on to the next engine step."""
-        self._row += 1
-        if self._row == BLOCK:
+        # Who is stopped meanwhile, as by Ctrl-C, brings the drives to rest from here.
+        if self._row + 1 == BLOCK:
             self._refill()
         else:
+            self._row += 1
             self._select()
 
     def _refill(self) -> None:

@@ -32,6 +32,25 @@ def test_how_many_steps_are_drawn_at_once_changes_nothing(monkeypatch: pytest.Mo
         assert history(2500) == usual
 
 
+def test_who_is_stopped_while_numbers_are_drawn_goes_on_from_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C comes at any place; what follows it brings the drives to rest."""
+    monkeypatch.setattr(noise, "BLOCK", 2)
+    drawn = Disturbances(load_prototype(), seed=3, scale=1.0, step=STEP)
+    draw = OrnsteinUhlenbeck.draw
+
+    def stopped(self: OrnsteinUhlenbeck, steps: int) -> None:
+        monkeypatch.setattr(OrnsteinUhlenbeck, "draw", draw)
+        raise KeyboardInterrupt
+
+    drawn.advance()
+    monkeypatch.setattr(OrnsteinUhlenbeck, "draw", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        drawn.advance()
+    for _ in range(3):
+        drawn.advance()
+    assert len(drawn.load) == 8
+
+
 def test_correlated_noise_is_the_recursion_that_it_is_said_to_be() -> None:
     scales = np.array([1.0, 0.3])
     drawn = OrnsteinUhlenbeck(np.random.default_rng(5), scales, step=STEP, correlation_time=MEMORY)
