@@ -287,7 +287,7 @@ class Problem:
         blocks: rows.
         candidates: possible causes; the same ones, in the same order, in a problem to fit and one to confirm.
         nominal: model that is judged; None: the baseline is refitted freely.
-        spreads: standard deviations, about zero, of parameters by name that no model states, judged or not.
+        spreads: means and standard deviations of parameters by name that no model states, judged or not.
         dependences: on what a remainder may depend; the same ones, in the same order, in a problem to confirm.
     """
 
@@ -296,7 +296,7 @@ class Problem:
     blocks: tuple[Block, ...]
     candidates: tuple[Candidate, ...]
     nominal: Nominal | None = None
-    spreads: Mapping[str, float] = field(default_factory=dict)
+    spreads: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     dependences: tuple[Dependence, ...] = ()
 
     @cached_property
@@ -305,7 +305,8 @@ class Problem:
         if self.nominal is not None:
             return Known(np.arange(len(self.names)), self.nominal.values, self.nominal.spread)
         places = np.array([self.names.index(name) for name in self.spreads], dtype=np.int64)
-        return Known(places, np.zeros(len(places)), np.diag(list(self.spreads.values())))
+        means, std = np.array(list(self.spreads.values())).reshape(-1, 2).T
+        return Known(places, means, np.diag(std))
 
     def candidate(self, key: str) -> Candidate:
         """The candidate of that key.

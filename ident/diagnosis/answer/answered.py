@@ -90,6 +90,7 @@ def _findings(standing: Standing) -> Findings:
         repeated_after=repeated(regression.rows, fitted.floors, fitted.after.blocks),
         problem=standing.taken.problems[0],
         held_out=fitted.held_out(),
+        log_posterior=standing.state.log_posterior,
     )
 
 

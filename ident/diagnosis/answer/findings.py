@@ -78,6 +78,7 @@ class Findings:
         repeated_before, repeated_after: rms over noise of what repeats, by step and coordinate.
         problem: that was fitted.
         held_out: models that the confirming rows took no part in.
+        log_posterior: of the causes, found or not believed at last, but for a constant of the rows.
     """
 
     verdict: Verdict
@@ -95,6 +96,7 @@ class Findings:
     repeated_after: Mapping[str, float]
     problem: Problem
     held_out: HeldOut
+    log_posterior: float
 
     def diagnosis(self, next_experiment: str | None = None) -> Diagnosis:
         """The answer as it is written down."""

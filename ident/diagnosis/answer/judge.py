@@ -78,6 +78,10 @@ class Answers:
         """Of every piece, by its parameters."""
         return {piece.problems[0].names: one for piece, one in zip(self.pieces, self.found, strict=True)}
 
+    def of(self, parameter: str) -> Findings:
+        """Of the piece that has this parameter."""
+        return next(one for names, one in self.by_names.items() if parameter in names)
+
     def findings(self) -> Findings:
         """Of the whole."""
         if len(self.pieces) == 1:
@@ -112,6 +116,7 @@ class _Together:
             repeated_after={label: value for one in self._found for label, value in one.repeated_after.items()},
             problem=self._problems[0],
             held_out=self._held_out(),
+            log_posterior=sum(one.log_posterior for one in self._found),
         )
 
     def _causes(self) -> Iterator[Cause]:

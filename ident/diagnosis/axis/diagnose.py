@@ -9,7 +9,8 @@ from threadpoolctl import threadpool_limits
 
 from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.answer.judge import Answers, Names, answers_of
-from ident.diagnosis.axis.problem import axis_problem, delayed_scales
+from ident.diagnosis.axis.late import delayed_scales, likelier_scales
+from ident.diagnosis.axis.problem import axis_problem
 from ident.diagnosis.axis.reference import Reference, axis_reference, refuse_other_axes
 from ident.diagnosis.observations.split import split_problem
 from ident.diagnosis.problem import Problem
@@ -62,12 +63,14 @@ def _diagnosed(
 
     answers = found_by(reference)
     findings = answers.findings()
-    late = delayed_scales(findings.after, findings.problem, fit[0], reference.scales)
+    late = delayed_scales(findings, fit[0], reference.scales)
     if late is None:
         return findings
     stage("again, an axis being late")
     # An axis that is late has no lag among its parameters: names tell which pieces are as they were.
-    return found_by(replace(reference, scales=late), answers.by_names).findings()
+    again = found_by(replace(reference, scales=late), answers.by_names)
+    scales = tuple(likelier_scales(answers, again, fit[0].axes, reference, late))
+    return found_by(replace(reference, scales=scales), answers.by_names | again.by_names).findings()
 
 
 def pose_axis(

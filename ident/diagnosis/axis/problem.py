@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -22,11 +22,8 @@ from ident.diagnosis.axis.reference import (
     refuse_other_axes,
 )
 from ident.diagnosis.axis.scale import Scale
-from ident.diagnosis.check.refit import Refit
-from ident.diagnosis.check.sized import SURELY
 from ident.diagnosis.dependence import Dependence, across
 from ident.diagnosis.names import EffectName
-from ident.diagnosis.observations.delays import HELD
 from ident.diagnosis.problem import Block, Candidate, Channel, Problem, Variant, contributions_of, forces_of, turned_by
 from ident.estimate.axis.identify import PARAMETER_UNITS
 from ident.estimate.axis.processing import PARAMETERS
@@ -48,7 +45,8 @@ HOLDS = 1 / 12
 """Deviation of that over T²: an effort that is held over the interval acts as one with T²/24 of it less, a position
 that is averaged over the interval as one with as much more."""
 LAGS = 1 / math.sqrt(12)
-"""Deviation of a lag over T: a position may be read at any part of an interval, at each rate at another one."""
+"""Deviation of a lag over T: an effort acts half of an interval late, a position is read at any part of one, at each
+rate at another."""
 
 
 def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem:
@@ -69,9 +67,17 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
     dependences = tuple(across(each) for each in zip(*(those for _, _, those in parts), strict=True))
     axes = records[0].axes
     parameters, units = zip(*_baseline_names(axes, reference), strict=True)
-    spreads = {axis.named(HOLD): HOLDS for axis in axes}
-    spreads |= {axis.named(_lag_at(time)): LAGS for axis in axes for time in reference.strange}
-    return Problem(parameters, units, blocks, candidates, spreads=spreads, dependences=dependences)
+    known = dict(entry for pair in zip(axes, reference.scales, strict=True) for entry in _sampling(*pair, reference))
+    return Problem(parameters, units, blocks, candidates, spreads=known, dependences=dependences)
+
+
+def _sampling(axis: AxisSignals, scale: Scale, reference: Reference) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Mean and standard deviation of what sampling does to an axis, beyond what its efforts have been moved by."""
+    yield axis.named(HOLD), (0.0, HOLDS)
+    for time in reference.strange:
+        yield axis.named(_lag_at(time)), (scale.hold - scale.hold_at(time), LAGS)
+    if not scale.delayed:
+        yield axis.named(LAG), (-scale.hold, LAGS)
 
 
 def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]], list[Dependence]]:
@@ -88,28 +94,6 @@ def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], lis
         candidates.append([replace(one, noise=noise) if one.effect in OF_ACCELERATIONS else one for one in own])
         dependences += [replace(one, noise=noise) if one.is_noisy else one for one in axis_dependences(model)]
     return blocks, candidates, dependences
-
-
-def delayed_scales(
-    found: Refit, problem: Problem, record: AxisRecord, scales: Sequence[Scale]
-) -> tuple[Scale, ...] | None:
-    """Scales whose axes are delayed where their motion surely follows later than sampling can explain; None: none does.
-
-    Args:
-        found: refit of the problem, with the lag of every axis in the baseline.
-        problem: whose baseline it is.
-        record: the first of the problem.
-        scales: of its axes.
-    """
-    values = dict(zip(problem.names, zip(found.baseline, found.baseline_std, strict=True), strict=True))
-    lags = [values[axis.named(LAG)] for axis in record.axes]
-    late = [
-        replace(scale, hold=0.0, late=(scale.hold + lag) * record.sample_time, delayed=True)
-        if abs(scale.hold + lag) - SURELY * std > HELD
-        else scale
-        for scale, (lag, std) in zip(scales, lags, strict=True)
-    ]
-    return tuple(late) if any(scale.delayed for scale in late) else None
 
 
 def _candidates(model: AxisModel, scale: Scale) -> list[Candidate]:

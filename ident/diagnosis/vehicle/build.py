@@ -42,8 +42,10 @@ from ident.vehicle.parameters import PARAMETER_NAMES, PARAMETER_UNITS, Parameter
 
 Array = NDArray[np.float64]
 
-UNSTATED: Final[Mapping[str, float]] = MappingProxyType(dict.fromkeys(CREEP_NAMES, CREEP_STD) | {LAG_NAME: LAG_STD})
-"""Standard deviations, about zero, of what is fitted beside the parameters and is no cause."""
+UNSTATED: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
+    dict.fromkeys(CREEP_NAMES, (0.0, CREEP_STD)) | {LAG_NAME: (0.0, LAG_STD)}
+)
+"""Means and standard deviations of what is fitted beside the parameters and is no cause."""
 
 
 def build_problem(
@@ -110,12 +112,13 @@ def build_problem(
 
 def _nominal(model: Parameters, lag: Lag | None) -> Nominal:
     """Values of the model, whose wheels do not creep; lag in samples."""
-    values, std = dict.fromkeys(UNSTATED, 0.0), dict(UNSTATED)
+    unstated = dict(UNSTATED)
     if lag is not None:
-        values[LAG_NAME], std[LAG_NAME] = lag.value / lag.interval, lag.std / lag.interval
+        unstated[LAG_NAME] = lag.value / lag.interval, lag.std / lag.interval
+    values, std = zip(*unstated.values(), strict=True)
     return Nominal(
-        np.append(model.values, list(values.values())),
-        np.append(model.std, list(std.values())),
+        np.append(model.values, values),
+        np.append(model.std, std),
         None if model.correlation is None else block_diag(model.correlation, np.eye(len(UNSTATED))),
     )
 

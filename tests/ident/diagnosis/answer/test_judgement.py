@@ -307,9 +307,11 @@ def test_what_is_known_of_a_parameter_holds_without_a_model_too(world: type[Any]
     """The third parameter is 0.5, and was expected to be 0 within 0.01."""
     problems = [world(seed=29).problem(part) for part in (0, 1)]
     free = judge(*problems, seed=1).after
-    held = judge(*(replace(problem, spreads={"r": 1e-2}) for problem in problems), seed=1).after
+    held = judge(*(replace(problem, spreads={"r": (0.0, 1e-2)}) for problem in problems), seed=1).after
     assert free.baseline == pytest.approx([1.0, -2.0, 0.5], abs=0.1)
     assert abs(held.baseline[2]) < 0.5 * free.baseline[2]
+    elsewhere = judge(*(replace(problem, spreads={"r": (2.0, 1e-3)}) for problem in problems), seed=1).after
+    assert elsewhere.baseline[2] == pytest.approx(2.0, abs=0.1)
 
 
 def test_what_the_parameters_absorb_is_invisible(world: type[Any]) -> None:

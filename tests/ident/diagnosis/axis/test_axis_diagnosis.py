@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,11 +17,13 @@ from hil.exam.sources.machine import Machine
 from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.axis.candidates import in_gap
 from ident.diagnosis.axis.diagnose import diagnose_axis
+from ident.diagnosis.axis.late import likelier_scales
 from ident.diagnosis.axis.motion import with_repeats
+from ident.diagnosis.axis.reference import axis_reference
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.observations.delays import DAMPING, delayed, sprung
 from ident.errors import EstimationError, RecordError
-from ident.estimate.filters import SEVEN, differentiate
+from ident.estimate.filters import SEVEN, differentiate, zero_phase
 from ident.records.axis_record import AxisRecord, read_axis_record
 from ident.report.gap_summary import next_text, summary_lines
 from ident.report.headline import headline
@@ -208,6 +211,43 @@ def test_a_force_over_time_that_another_motion_confirms_is_one_over_time(machine
     assert law.law is not None
     assert law.law.variable == "time"
     assert not law.alternatives
+
+
+def test_what_no_cause_explains_is_not_what_sampling_does(machine: Make) -> None:
+    """A force that wanders by itself: a first estimate of the lag is many samples, sampling explains a part of one."""
+    record = machine(repeats=1, duration=20.0, strokes=32, speeds=(0.01, 0.02)).drive(11)
+    (axis,) = record.axes
+    wanders = zero_phase(np.random.default_rng(5).normal(size=len(axis.effort)), 3.0, record.sample_time)
+    effort = axis.effort + 20.0 * wanders / wanders.std()
+    record = replace(record, axes=(replace(axis, effort=effort),))
+    (scale,) = axis_reference([record]).scales
+    findings = diagnose_axis([record], [], seed=1)
+    found = dict(zip(findings.problem.names, findings.after.baseline.tolist(), strict=True))
+    assert abs(scale.late) > 5 * record.sample_time
+    assert abs(scale.hold + found["lag"]) < 1
+
+
+class _Answered:
+    """Answers of one axis, as likely as they are."""
+
+    def __init__(self, log_posterior: float) -> None:
+        self._said = SimpleNamespace(log_posterior=log_posterior)
+
+    def of(self, parameter: str) -> SimpleNamespace:
+        assert parameter == "M"
+        return self._said
+
+
+@pytest.mark.parametrize(("lag", "delay", "kept"), [(0.0, 1.0, "delay"), (10.0, 1.0, "delay"), (30.0, 1.0, "lag")])
+def test_the_likelier_of_lag_and_delay_stands_the_noise_of_an_acceleration_apart(
+    machine: Make, lag: float, delay: float, kept: str
+) -> None:
+    """Log odds of 20 that noise may bring are taken off the lag, as they were off the delay."""
+    record = machine().drive(11)
+    reference = replace(axis_reference([record]), noises=(20.0,))
+    late = [replace(scale, delayed=True) for scale in reference.scales]
+    (scale,) = likelier_scales(_Answered(lag), _Answered(delay), record.axes, reference, late)
+    assert scale.delayed == (kept == "delay")
 
 
 def test_repeats_are_found_where_the_record_does_not_number_them(machine: Make) -> None:

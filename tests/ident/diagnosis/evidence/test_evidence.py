@@ -40,7 +40,7 @@ def dense(question: Any, sizes: tuple[int, ...], columns: Array) -> float:
 
 
 def test_evidence_is_that_of_gaussian_rows(problems: tuple[Problem, Problem], asked: Asked) -> None:
-    known = tuple(replace(one, spreads=dict.fromkeys(one.names, 3.0)) for one in problems)
+    known = tuple(replace(one, spreads=dict.fromkeys(one.names, (0.0, 3.0))) for one in problems)
     question = asked(*known)
     sizes = tuple(1 if label else 0 for label in range(len(question.colours.labels)))
     members = {question.number("b@place"): Member(0, 0.5), question.number("d@place"): Member(0, 2.0)}

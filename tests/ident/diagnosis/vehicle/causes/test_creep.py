@@ -117,7 +117,7 @@ def test_creep_is_known_to_be_small_and_no_parameter_of_the_model(problem: Probl
     assert problem.names[COLUMNS] == CREEP_NAMES
     assert problem.nominal is not None
     assert not problem.nominal.values[len(PARAMETER_NAMES) :].any()
-    assert all(0.01 <= problem.spreads[name] <= 0.1 for name in CREEP_NAMES)
+    assert all(0.01 <= problem.spreads[name][1] <= 0.1 for name in CREEP_NAMES)
 
 
 def test_less_is_tolerated_than_wheels_may_creep(problem: Problem, prototype: VehicleDescription) -> None:
