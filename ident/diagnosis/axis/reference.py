@@ -23,9 +23,9 @@ from ident.diagnosis.axis.motion import (
     sample_noise,
 )
 from ident.diagnosis.axis.reversals import Sticking, Untold, turned_round, untold_while_sticking
-from ident.diagnosis.axis.scale import LARGEST_HOLD, Scale
+from ident.diagnosis.axis.scale import Scale
 from ident.diagnosis.dependence import NEAREST, path_since_reversal
-from ident.diagnosis.observations.delays import delayed
+from ident.diagnosis.observations.delays import HELD, delayed
 from ident.errors import EstimationError, RecordError
 from ident.estimate.axis.cutoff import LARGEST_CUTOFF, position_cutoff
 from ident.estimate.axis.processing import BUTTERWORTH_ORDER, PARAMETERS
@@ -238,7 +238,7 @@ def _scale(signals: Sequence[Signals], index: int) -> Scale:
     slowest = float(np.quantile(np.concatenate([np.abs(one.velocity[one.moving]) for one in motions]), NEAREST))
     paths = [path_since_reversal(one.position, one.velocity)[one.moving] for one in motions]
     reach = float(np.ptp(np.concatenate([motion.position for motion in motions])))
-    sampled = abs(lag) <= LARGEST_HOLD
+    sampled = abs(lag) <= HELD
     rest = right - np.column_stack([left, bend]) @ [*refined, lag]
     return Scale(
         np.array(refined) if sampled else values,

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.observations.delays import HELD
 from ident.records.rates import nominal
 
 Array = NDArray[np.float64]
-
-LARGEST_HOLD: Final = 1.0
-"""Sample intervals by which efforts are moved at most, by a first estimate of the lag: other effects shift it."""
 
 
 @dataclass(frozen=True)
@@ -53,4 +50,4 @@ class Scale:
         if own is None:
             return self.hold
         beyond = own - self.late / sample_time
-        return beyond if abs(beyond) <= LARGEST_HOLD else 0.0
+        return beyond if abs(beyond) <= HELD else 0.0
