@@ -53,7 +53,7 @@ class Trouble(enum.StrEnum):
     SLOW = "slow"
     SHORT = "short"
     MIXED = "mixed rates"
-    USUAL = "none"
+    USUAL = "usual"
 
 
 TROUBLED = (Trouble.SLOW, Trouble.SHORT, Trouble.MIXED)

@@ -48,6 +48,7 @@ class LawAnswer:
         formula: one that does as well as the curve; None where none that is short does.
         nearest: effect of the library that comes nearest, with its place; None where none is near.
         distance: share of what the law adds that the nearest effect cannot, as an rms.
+        unrecorded: of what else that the records do not have it may be a function, an alternative; None: nothing.
     """
 
     variable: str
@@ -61,6 +62,7 @@ class LawAnswer:
     formula: str | None
     nearest: str | None
     distance: float | None
+    unrecorded: str | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Plain values; what does not apply is null."""

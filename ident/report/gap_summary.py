@@ -11,7 +11,7 @@ from ident.diagnosis.names import LAW
 from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.report.digits import percent, plain, quantity_text, significant
 from ident.report.headline import headline
-from ident.report.law_text import is_unrecorded, law_line
+from ident.report.law_text import law_line
 from ident.vehicle.quantities import Quantity
 
 MOST_LINES: Final = 10
@@ -109,7 +109,7 @@ def next_text(diagnosis: Diagnosis) -> str:
     """What to do now."""
     if diagnosis.next_experiment:
         return diagnosis.next_experiment
-    if any(is_unrecorded(effect) for effect in diagnosis.effects):
+    if any(effect.law is not None and effect.law.unrecorded is not None for effect in diagnosis.effects):
         return f"{_BESIDE}: within one record, time and what else moves are one."
     if diagnosis.verdict.explains:
         model = "put the causes into the model"

@@ -11,7 +11,7 @@ from ident.diagnosis.diagnosis import Diagnosis, NamedEffect, Unseen, Verdict
 from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.effects import EFFECTS
 from ident.report.digits import percent, plain, quantity_text, significant
-from ident.report.law_text import is_unrecorded, law_words
+from ident.report.law_text import law_words
 
 ABOVE: Final = 1.5
 """Times the noise from which a held-out step is said to be unexplained."""
@@ -42,7 +42,6 @@ _GROUPS: Final = MappingProxyType(
 
 _NONE: Final = "Nothing is missing: what is left is noise, as far as these records can tell."
 _NONE_REPEATS: Final = "Nothing is missing in the steps that repeat."
-_UNRECORDED: Final = ", or on another axis that is not recorded"
 _UNKNOWN: Final = "Something is missing that the library has no name for."
 
 
@@ -71,7 +70,7 @@ def worst_left(unseen: Sequence[Unseen]) -> Unseen | None:
 def effect_words(effect: NamedEffect) -> str:
     """A cause in words, with its numbers and without its place."""
     if effect.law is not None:
-        return law_words(effect.law) + (_UNRECORDED if is_unrecorded(effect) else "")
+        return law_words(effect.law)
     numbers = {name: quantity_text(one.value, one.std, one.unit) for name, one in effect.parameters.items()}
     kind = EFFECTS.get(effect.name)
     if kind is not None and _fields(kind.words) <= numbers.keys():

@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from ident.diagnosis.dependence import Variable
 from ident.diagnosis.diagnosis import LawAnswer, NamedEffect
 from ident.report.digits import percent, plain, range_text, unit_text, value_text
 
@@ -39,7 +38,8 @@ VARIABLES: Final = MappingProxyType(
 
 def law_words(law: LawAnswer) -> str:
     """What it is and how large, as part of a sentence."""
-    return f"{law_kind(law.partner, law.variable, law.of)}, from {swing_text(law)}"
+    other = f", or on {variable_name(law.unrecorded)} that is not recorded" if law.unrecorded is not None else ""
+    return f"{law_kind(law.partner, law.variable, law.of)}, from {swing_text(law)}{other}"
 
 
 def law_kind(partner: str, variable: str, of: str = "") -> str:
@@ -69,12 +69,6 @@ def law_line(effect: NamedEffect, law: LawAnswer) -> str:
     closes = percent(effect.gap_closed_held_out)
     head = f"  {effect.probability:.0%} law@{effect.where}: from {swing_text(law)}{sure} over {variable_text(law)}"
     return f"{head}{formula}; closes {closes} of the gap{other}{near}"
-
-
-def is_unrecorded(effect: NamedEffect) -> bool:
-    """Whether a law of time may be one of what else moves, which is not recorded."""
-    law, others = effect.law, {other.variable for other in effect.alternatives}
-    return law is not None and law.variable == Variable.TIME and str(Variable.OTHER_AXIS) in others
 
 
 def swing_text(law: LawAnswer, count: int = 3) -> str:

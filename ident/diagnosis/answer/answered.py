@@ -12,7 +12,7 @@ from ident.diagnosis.answer.standing import INEXACT, OPEN, Standing
 from ident.diagnosis.check.remainder import repeated, shares
 from ident.diagnosis.diagnosis import LawAnswer, Verdict
 from ident.diagnosis.evidence.state import State
-from ident.diagnosis.law.answer import channel_of, law_answer, same_laws, same_names, unrecorded_laws
+from ident.diagnosis.law.answer import channel_of, law_answer, same_laws, same_names, unrecorded_variable
 from ident.diagnosis.law.law import Law
 from ident.diagnosis.names import LAW
 from ident.diagnosis.noise.colours import Colours
@@ -132,6 +132,7 @@ def _invisible(standing: Standing) -> tuple[str, ...]:
 def _cause(standing: Standing, place: int, index: int) -> Cause:
     slot, law, hypotheses = standing.slots[index], standing.taken.laws.get(index), standing.design.hypotheses
     ranked, dependences = slot.ranked(hypotheses, standing.unlisted), standing.taken.problems[0].dependences
+    told = None if law is None else _law_answer(standing, law, index)
     return Cause(
         candidate=standing.fitted.candidate(place),
         part=standing.fitted.after.parts[place],
@@ -143,10 +144,10 @@ def _cause(standing: Standing, place: int, index: int) -> Cause:
         needed=standing.fitted.closed[place],
         biased=standing.fitted.biased(place),
         law=law,
-        law_answer=None if law is None else _law_answer(standing, law, index),
+        law_answer=told,
         alternatives=same_names(ranked.untold)
-        if law is None
-        else same_laws(ranked.alike, dependences) + unrecorded_laws(law, standing.taken.problems),
+        if told is None
+        else same_laws(ranked.alike, dependences, told.unrecorded),
     )
 
 
@@ -158,4 +159,5 @@ def _law_answer(standing: Standing, law: Law, index: int) -> LawAnswer:
     named = [(one, cosine) for one, cosine in standing.slots[index].cosines.items() if not hypotheses[one].free]
     nearest = max(named, key=lambda one: one[1], default=None)
     near = None if nearest is None else (hypotheses[nearest[0]].key, nearest[1])
-    return law_answer(law, channel_of(standing.taken.problems[0], column), near)
+    problems = standing.taken.problems
+    return law_answer(law, channel_of(problems[0], column), near, unrecorded_variable(law, problems))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
@@ -70,6 +71,9 @@ def _diagnosed(
     # An axis that is late has no lag among its parameters: names tell which pieces are as they were.
     again = found_by(replace(reference, scales=late), answers.by_names)
     scales = tuple(likelier_scales(answers, again, fit[0].axes, reference, late))
+    for asked, by in ((again, late), (answers, reference.scales)):
+        if all(map(operator.is_, scales, by)):
+            return asked.findings()
     return found_by(replace(reference, scales=scales), answers.by_names | again.by_names).findings()
 
 

@@ -67,17 +67,18 @@ def axis_problem(records: Sequence[AxisRecord], reference: Reference) -> Problem
     dependences = tuple(across(each) for each in zip(*(those for _, _, those in parts), strict=True))
     axes = records[0].axes
     parameters, units = zip(*_baseline_names(axes, reference), strict=True)
-    known = dict(entry for pair in zip(axes, reference.scales, strict=True) for entry in _sampling(*pair, reference))
+    of_axes = zip(axes, reference.scales, strict=True)
+    known = {name: beforehand for pair in of_axes for name, _, beforehand in _sampling(*pair, reference)}
     return Problem(parameters, units, blocks, candidates, spreads=known, dependences=dependences)
 
 
-def _sampling(axis: AxisSignals, scale: Scale, reference: Reference) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Mean and standard deviation of what sampling does to an axis, beyond what its efforts have been moved by."""
-    yield axis.named(HOLD), (0.0, HOLDS)
+def _sampling(axis: AxisSignals, scale: Scale, reference: Reference) -> Iterator[tuple[str, str, tuple[float, float]]]:
+    """What sampling does to an axis, beyond what its efforts have been moved by: name, unit, mean and deviation."""
+    yield axis.named(HOLD), "samples^2", (0.0, HOLDS)
     for time in reference.strange:
-        yield axis.named(_lag_at(time)), (scale.hold - scale.hold_at(time), LAGS)
+        yield axis.named(_lag_at(time)), "samples", (scale.hold - scale.hold_at(time), LAGS)
     if not scale.delayed:
-        yield axis.named(LAG), (-scale.hold, LAGS)
+        yield axis.named(LAG), "samples", (-scale.hold, LAGS)
 
 
 def _of_record(signals: Signals, reference: Reference) -> tuple[list[Block], list[list[Candidate]], list[Dependence]]:
@@ -156,9 +157,7 @@ def _baseline_names(axes: Sequence[AxisSignals], reference: Reference) -> list[t
         inertia = PARAMETER_UNITS[axis.kind]["M"]
         named += [(axis.named(name), PARAMETER_UNITS[axis.kind][name]) for name in PARAMETERS]
         named += [(f"M_{axis.name}_{other.name}", inertia) for other in axes if other is not axis]
-        named += [(axis.named(HOLD), "samples^2")]
-        named += [(axis.named(_lag_at(time)), "samples") for time in reference.strange]
-        named += [] if scale.delayed else [(axis.named(LAG), "samples")]
+        named += [(name, unit) for name, unit, _ in _sampling(axis, scale, reference)]
     return named
 
 

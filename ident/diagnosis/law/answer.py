@@ -33,13 +33,14 @@ def curve_of(law: Law) -> Array:
     return np.stack([x, basis @ law.learnt.whole, np.sqrt(np.maximum(np.diag(covariance), 0.0))], axis=1)
 
 
-def law_answer(law: Law, channel: str, nearest: tuple[str, float] | None) -> LawAnswer:
+def law_answer(law: Law, channel: str, nearest: tuple[str, float] | None, unrecorded: str | None = None) -> LawAnswer:
     """What a law says.
 
     Args:
         law: as it was learnt.
         channel: of its rows.
         nearest: key of the nearest effect of the library, and the cosine of what both add.
+        unrecorded: of what else that the records do not have it may be a function.
     """
     dependence, knots = law.dependence, law.learnt.knots
     curve = curve_of(law)
@@ -56,6 +57,7 @@ def law_answer(law: Law, channel: str, nearest: tuple[str, float] | None) -> Law
         formula=formula_of(x, y, std, knots.period),
         nearest=None if nearest is None else nearest[0],
         distance=None if nearest is None else math.sqrt(max(1 - nearest[1] ** 2, 0.0)),
+        unrecorded=unrecorded,
     )
 
 
@@ -65,17 +67,27 @@ def channel_of(problem: Problem, column: Column) -> str:
     return str(next(block.channel for block, one in zip(problem.blocks, series, strict=True) if one is not None))
 
 
-def same_laws(keys: Sequence[str], dependences: Sequence[Dependence]) -> tuple[Alternative, ...]:
-    """The laws of another variable, or elsewhere, that add the same to these records as the first of them does."""
+def same_laws(
+    keys: Sequence[str], dependences: Sequence[Dependence], unrecorded: str | None = None
+) -> tuple[Alternative, ...]:
+    """The laws of another variable, or elsewhere, that add the same to these records as the first of them does.
+
+    Args:
+        keys: of those that are recorded.
+        dependences: of the records.
+        unrecorded: the variable of one that is not.
+    """
     by_key = {one.key: one for one in dependences}
     own, *others = (by_key[key] for key in keys)
     found = dict.fromkeys((str(other.variable), other.where) for other in others)
     found.pop((str(own.variable), own.where), None)
+    if unrecorded is not None:
+        found[unrecorded, own.where] = None
     return tuple(Alternative(None, variable, where) for variable, where in found)
 
 
-def unrecorded_laws(law: Law, problems: Sequence[Problem]) -> tuple[Alternative, ...]:
-    """What is not recorded and may be the variable of a law that no other record than those fitted to confirms.
+def unrecorded_variable(law: Law, problems: Sequence[Problem]) -> str | None:
+    """Of what that is not recorded a law may be, which no other record than those fitted to confirms.
 
     Args:
         law: as it was learnt.
@@ -83,9 +95,7 @@ def unrecorded_laws(law: Law, problems: Sequence[Problem]) -> tuple[Alternative,
     """
     fitted, confirming = ({block.record for block in problem.blocks} for problem in problems)
     variable = law.dependence.unrecorded
-    if variable is None or not confirming <= fitted:
-        return ()
-    return (Alternative(None, str(variable), law.dependence.where),)
+    return None if variable is None or not confirming <= fitted else str(variable)
 
 
 def same_names(keys: Sequence[str]) -> tuple[Alternative, ...]:

@@ -6,14 +6,15 @@ import string
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from ident.diagnosis.diagnosis import Alternative, Diagnosis, Gap, NamedEffect, Unseen, Verdict
+from ident.diagnosis.diagnosis import Alternative, Diagnosis, Gap, LawAnswer, NamedEffect, Unseen, Verdict
 from ident.diagnosis.vehicle.unseen import LANE_CHANGE, REPEATED
 from ident.effects import EFFECTS
 from ident.plant.places import CHASSIS, DRIVES, ENCODERS, GROUPS, STEERING, WHEEL_PLACES
-from ident.report.gap_summary import cause_line
-from ident.report.headline import ABOVE, headline, place_words
+from ident.report.gap_summary import cause_line, next_text
+from ident.report.headline import ABOVE, effect_words, headline, place_words
 from ident.vehicle.quantities import Quantity
 
 STICKS = NamedEffect(
@@ -125,3 +126,16 @@ def test_every_effect_reads_in_words_with_its_size(name: str) -> None:
 @pytest.mark.parametrize("where", [*CHASSIS, *DRIVES, *ENCODERS, *STEERING, *WHEEL_PLACES, *GROUPS])
 def test_every_place_reads_in_words(where: str) -> None:
     assert "_" not in place_words(where)
+
+
+def test_a_recorded_axis_that_is_alike_is_not_said_to_be_unrecorded() -> None:
+    """Both stand among the alternatives; what is not recorded the law itself says."""
+    curve = np.column_stack([np.linspace(0.0, 9.0, 5), np.linspace(-1.0, 2.0, 5), np.full(5, 0.1)])
+    law = LawAnswer("time", "", "", "dynamic", None, "s", "N", curve, None, None, None)
+    alike = (Alternative(None, "other_axis", "axis_1"),)
+    recorded = NamedEffect("law", "axis_1", {}, 0.97, ("law",), 0.9, alike, law)
+    unrecorded = replace(recorded, law=replace(law, unrecorded="other_axis"))
+    assert "not recorded" not in effect_words(recorded)
+    assert "what else moves" not in next_text(answer(Verdict.LAW, [recorded]))
+    assert effect_words(unrecorded).endswith(", or on another axis that is not recorded")
+    assert "what else moves" in next_text(answer(Verdict.LAW, [unrecorded]))
