@@ -11,7 +11,8 @@ most likely beside the hypotheses that are taken; each next one has a price.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -173,7 +174,8 @@ def price_of(sizes: Sizes) -> float:
 def most_likely(colours: Colours, columns: Array, target: Array, known: Array, start: Sizes) -> Sizes:
     """Sizes of what is lacking, by label, that are the most likely.
 
-    One label after the other: what a coefficient is in one step holds in all.
+    One label after the other, and of each one size after the next: what a coefficient is in one step holds in all, and
+    that more is lacking is the likelier the nearer it is to what the rows say.
 
     Args:
         colours: of the rows.
@@ -183,24 +185,25 @@ def most_likely(colours: Colours, columns: Array, target: Array, known: Array, s
         start: sizes to begin with.
     """
     whole = np.column_stack([columns, target])
-    parts: list[list[tuple[Array, float]]] = []
-    for label in range(len(colours.labels)):
-        made = [colours.of_label(label, size, whole) for size in range(len(SIZES))]
-        parts.append([(white.T @ white, volume) for white, volume in made])
+
+    @cache
+    def part(label: int, size: int) -> tuple[Array, float]:
+        white, volume = colours.of_label(label, size, whole)
+        return white.T @ white, volume
+
     found = list(start)
-    products = known + np.sum([parts[label][size][0] for label, size in enumerate(found)], axis=0)
-    logs = -sum(parts[label][size][1] + PRICE * size for label, size in enumerate(found))
-    best = logs + _log(products)
+    products = known + np.sum([part(*one)[0] for one in enumerate(found)], axis=0)
+    log = _log(products)
     for _ in range(ROUNDS):
         before = tuple(found)
-        for label, sizes in enumerate(parts):
-            for size, (other, volume) in enumerate(sizes):
-                now, now_volume = sizes[found[label]]
+        for label, step in product(range(len(found)), (1, -1)):
+            while 0 <= (size := found[label] + step) < len(SIZES):
+                (now, now_volume), (other, volume) = part(label, found[label]), part(label, size)
                 changed = products - now + other
-                gained = now_volume - volume + PRICE * (found[label] - size)
-                log = logs + gained + _log(changed)
-                if log > best:
-                    best, products, logs, found[label] = log, changed, logs + gained, size
+                beside = _log(changed)
+                if beside - log + now_volume - volume <= PRICE * step:
+                    break
+                products, log, found[label] = changed, beside, size
         if tuple(found) == before:
             break
     return tuple(found)
