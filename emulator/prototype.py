@@ -167,7 +167,7 @@ class Prototype:
     power_stage: PowerStageData
     encoder: EncoderData
     noise: NoiseData
-    solver_sweeps: int = 50
+    solver_sweeps: int = 100
 
 
 def load_prototype(name_or_path: str | Path = "prototype") -> Prototype:

@@ -26,7 +26,7 @@ class SolverSettings:
         residual_threshold: the solver stops early below it; 0 does all sweeps.
     """
 
-    iterations: int = 50
+    iterations: int = 100
     coupling_erp: float = 0.2
     coupling_force: float = 1e5
     residual_threshold: float = 0.0
