@@ -115,8 +115,8 @@ class VehicleServer:
     """Emulated nodes on any python-can bus.
 
     In real time, simulated time follows the clock. In lockstep it follows the clock until the first SYNC, so
-    that boot-up and SDO time-outs elapse, and each SYNC then moves it by one cycle period, as fast as the master
-    likes; when a master pauses, the clock takes over until its next SYNC.
+    that boot-up and SDO time-outs elapse, a cycle period at once at most, and each SYNC then moves it by one cycle
+    period, as fast as the master likes; when a master pauses, the clock takes over until its next SYNC.
 
     Args:
         vehicle: the hardware; the caller closes it.
@@ -242,6 +242,9 @@ class VehicleServer:
             # The master pauses: the clock counts on from the instant that the SYNCs have reached.
             self._stepping = False
             self._behind = now - self._devices.time
+        if self._lockstep:
+            # Nothing here keeps to the clock: a machine that is too slow for it answers, and leaves the rest out.
+            self._behind = max(self._behind, now - self._devices.time - self._period)
         self._advance_to(now - self._behind)
 
     def _advance_to(self, instant: float) -> None:

@@ -72,3 +72,15 @@ def test_falling_behind_the_clock_is_counted() -> None:
     assert served.server.report.overruns == 1
     assert served.server.report.worst_lag == pytest.approx(0.5, abs=0.003)
     assert served.vehicle.time == pytest.approx(served.clock.now(), abs=0.0011)
+
+
+def test_a_machine_too_slow_for_the_clock_answers_in_lockstep_and_leaves_the_rest_of_the_time_out() -> None:
+    served = Served(lockstep=True)
+    served.run(0.1)
+    before = served.vehicle.time
+    # A step of the vehicle that took half a second of the processor, and a master that has asked meanwhile.
+    served.clock.wait_until(served.clock.now() + 0.5)
+    served.run(0.001)
+    assert served.vehicle.time - before <= 0.002 + 0.0011
+    assert served.server.report.overruns == 0
+    assert served.run(1.0) == pytest.approx(1.0, abs=0.0031)
