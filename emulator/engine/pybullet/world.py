@@ -12,6 +12,7 @@ from typing import Final
 import pybullet
 
 from emulator.as_built import AsBuilt
+from emulator.prototype import Prototype
 from ident.vehicle.quantities import GRAVITY
 
 
@@ -26,7 +27,7 @@ class SolverSettings:
         residual_threshold: the solver stops early below it; 0 does all sweeps.
     """
 
-    iterations: int = 100
+    iterations: int = Prototype.solver_sweeps
     coupling_erp: float = 0.2
     coupling_force: float = 1e5
     residual_threshold: float = 0.0

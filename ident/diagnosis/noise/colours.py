@@ -174,8 +174,8 @@ def price_of(sizes: Sizes) -> float:
 def most_likely(colours: Colours, columns: Array, target: Array, known: Array, start: Sizes) -> Sizes:
     """Sizes of what is lacking, by label, that are the most likely.
 
-    One label after the other, and of each one size after the next: what a coefficient is in one step holds in all, and
-    that more is lacking is the likelier the nearer it is to what the rows say.
+    One label after the other, since what a coefficient is in one step holds in all. Of each, the next size as long as
+    that is likelier: the likelihood of a size is taken to have one maximum.
 
     Args:
         colours: of the rows.
