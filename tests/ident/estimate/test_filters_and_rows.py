@@ -16,6 +16,7 @@ from ident.estimate.filters import (
     differentiate,
     mirrored,
     moving_rows,
+    sliding_samples,
     second_derivative,
     zero_phase,
 )
@@ -104,12 +105,21 @@ def test_derivatives_of_a_parabola_are_exact() -> None:
     np.testing.assert_allclose(curvature, np.tile([6.0, -2.0], (100, 1)), atol=1e-7)
 
 
+def test_a_joint_that_turns_round_between_two_samples_sticks_there() -> None:
+    """Slow in neither of them; left out are both, with the memory of the filter of positions and one sample more."""
+    processing = Processing(moving=0.05, guard=0.1, cutoff=40.0, signal_cutoff=500.0)
+    rates = np.where(np.arange(100) < 50, -3.0, 3.0)[:, None]
+    reach = round(0.1 * 40 / 500 / DT) + 1
+    left_out = np.flatnonzero(~sliding_samples(rates, processing, DT)[reach:-reach]) + reach
+    np.testing.assert_array_equal(left_out, np.arange(50 - reach, 50 + reach + 1))
+
+
 def test_stiction_and_the_memory_of_the_filter_around_it_are_dropped() -> None:
     """One joint of two stops for a moment: those samples go, and 0.1 s on either side of them."""
     processing = Processing(moving=0.05, guard=0.1)
     rates = np.full((1000, 2), 0.5)
     rates[:, 1] *= -1
-    rates[400:410, 1] = 0.04
+    rates[400:410, 1] = -0.04
     found = moving_rows(rates, processing, DT)
     expected = np.ones(1000, dtype=bool)
     expected[350:460] = False

@@ -50,7 +50,7 @@ class Shape:
 
 SHAPES: Final[Mapping[EffectName, Shape]] = MappingProxyType(
     {
-        EffectName.STRIBECK: Shape(("amplitude",), tried={"velocity": (0.2, 0.3, 0.5, 0.8)}),
+        EffectName.STRIBECK: Shape(("amplitude",), tried={"velocity": (0.05, 0.1, 0.2, 0.4, 0.8)}),
         EffectName.ASYMMETRIC_COULOMB: Shape(("imbalance",)),
         EffectName.ASYMMETRIC_VISCOUS: Shape(("imbalance",)),
         EffectName.QUADRATIC_DRAG: Shape(("coefficient",)),

@@ -19,10 +19,11 @@ from ident.diagnosis.vehicle.records.signals import Signals, decimation, signals
 from ident.diagnosis.vehicle.records.wandering import wanders
 from ident.errors import RecordError
 from ident.estimate.equations import ROWS, RowsOfStep
-from ident.estimate.filters import Processing, moving_rows, sliding_samples, zero_phase
+from ident.estimate.filters import Processing, sliding_samples, zero_phase
 from ident.plant.modes import Mode
 from ident.records.record import Record, Step, base_step
 from ident.vehicle.geometry import Geometry
+from ident.vehicle.parameters import COULOMB_EPSILON
 
 Array = NDArray[np.float64]
 
@@ -37,6 +38,12 @@ SIGNAL_BANDWIDTH: Final = 1000.0
 
 SIGNAL_SHARE: Final = 0.64
 """The same at most, in units of the Nyquist frequency."""
+
+SLIDING: Final = 2 * COULOMB_EPSILON
+"""Joint rate from which dry friction is what (16) says, to a thirtieth [rad/s]: below, a joint may stick."""
+
+SHOWN: Final = 0.5
+"""Part of what the filter makes a row of that must be samples in which its equation holds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +147,7 @@ def sources_of(
 
 def processing_of(records: Sequence[Record]) -> Processing:
     """Filters of the estimate, but signals that still show a motor that rattles in its gear."""
-    usual = Processing()
+    usual = Processing(moving=SLIDING)
     nyquist = min((np.pi / segment.sample_time for record in records for segment in record.segments), default=0.0)
     return replace(usual, signal_cutoff=float(np.clip(SIGNAL_SHARE * nyquist, usual.signal_cutoff, SIGNAL_BANDWIDTH)))
 
@@ -176,9 +183,10 @@ def _sources(
         "rattles": loose.rattles[::stride],
     }
     rates = [signals.joint_rates[:, _joints(spec, name)] for name in spec.coordinates]
-    dynamic = tuple(moving_rows(of_joints, processing, segment.sample_time)[::stride] for of_joints in rates)
-    slides = [sliding_samples(of_joints, processing, segment.sample_time)[::stride] for of_joints in rates]
-    yield Source(channel=Channel.DYNAMIC, moving=dynamic, holds=np.stack(slides, axis=1), **common)  # type: ignore[arg-type]
+    slides = [sliding_samples(of_joints, processing, segment.sample_time) for of_joints in rates]
+    dynamic = tuple(_shown(samples, processing, segment.sample_time)[::stride] for samples in slides)
+    holds = np.stack(slides, axis=1)[::stride]
+    yield Source(channel=Channel.DYNAMIC, moving=dynamic, holds=holds, **common)  # type: ignore[arg-type]
     names = rows.kinematic_coordinates(spec)
     if names and loose.rolls:
         kinematic = (_rolling(signals, spec, processing)[::stride],) * len(names)
@@ -219,6 +227,17 @@ def _wandering(sources: Sequence[Source]) -> Iterator[Source]:
 def _throughout(moving: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
     """What rolls, or is loose, has equations that hold at rest as well."""
     return np.ones((len(moving[0]), len(moving)), dtype=bool)
+
+
+def _shown(holds: NDArray[np.bool_], processing: Processing, sample_time: float) -> NDArray[np.bool_]:
+    """Rows (N,) of mostly those samples in which their equation holds, away from the ends of the filter.
+
+    Rows beside and among samples that stick hold as well: all of their terms are zero there (`Context.in_rows`).
+    """
+    shown = zero_phase(holds.astype(float), processing.cutoff, sample_time) > SHOWN
+    ends = round(processing.guard / sample_time)
+    shown[:ends] = shown[len(shown) - ends :] = False
+    return np.asarray(shown, dtype=np.bool_)
 
 
 def _joints(spec: RowsOfStep, coordinate: str) -> list[int]:

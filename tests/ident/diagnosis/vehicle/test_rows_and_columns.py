@@ -80,22 +80,25 @@ def test_a_load_that_the_record_does_not_state_is_found_as_a_payload(vehicle: Ve
     assert mass == pytest.approx(LOADED[0].payload, rel=0.01)
 
 
-def test_dynamic_rows_are_those_of_the_estimator(vehicle: VehicleDescription) -> None:
-    record = ideal_record(FOUR, vehicle)
-    blocks = [block for block in problem_of(record, vehicle).blocks if block.channel is Channel.DYNAMIC]
-    for block, equations in zip(
-        blocks, usable_equations(list(record.segments), vehicle.geometry, Processing()), strict=True
-    ):
+def test_dynamic_rows_are_those_of_the_estimator_and_some_beside_what_sticks(vehicle: VehicleDescription) -> None:
+    record, filters = ideal_record(FOUR, vehicle), Processing()
+    every = build_problem([record], vehicle, vehicle.prior, effects=(EffectName.TORQUE_BIAS,), processing=filters)
+    blocks = [block for block in every.blocks if block.channel is Channel.DYNAMIC]
+    for block, equations in zip(blocks, usable_equations(list(record.segments), vehicle.geometry, filters), strict=True):
         step = round(block.sample_time / equations.sample_time)
         scale = np.abs(equations.regressor).max(axis=0) + 1e-12
-        kept = block.moving
+        kept = equations.moving[::step]
+        assert np.all(block.moving[kept])
+        assert block.moving.sum() > kept.sum()
         assert np.allclose((of_the_model(block) / scale)[kept], (equations.regressor[::step] / scale)[kept], atol=5e-3)
         loudest = np.abs(equations.torque).max()
         assert np.allclose(block.target[kept], equations.torque[::step][kept], atol=2e-3 * loudest)
 
 
-def test_what_holds_a_joint_that_sticks_is_in_no_row_beside_it(vehicle: VehicleDescription) -> None:
-    """A jerk of one motor where the steering turns round, and where it moves."""
+def test_what_holds_a_joint_that_sticks_is_hardly_in_the_rows_about_it(vehicle: VehicleDescription) -> None:
+    """A jerk of one motor before and behind the moment in which the steering turns round, and where it moves: what is
+    left is what torques' own filter makes of it.
+    """
     record = ideal_record(FOUR, vehicle)
 
     def jerked(after: int) -> Flaw:
@@ -116,7 +119,7 @@ def test_what_holds_a_joint_that_sticks_is_in_no_row_beside_it(vehicle: VehicleD
         of_step = [pair for pair in pairs if (pair[0].channel, pair[0].step) == (Channel.DYNAMIC, "steering_left")]
         return max(float(np.abs(one.target - other.target)[one.moving].max()) for one, other in of_step)
 
-    assert change(0) < 0.002 * change(60)
+    assert max(change(0), change(1)) < 0.03 * change(60)
 
 
 def test_a_bias_of_one_motor_is_found_at_its_drive(vehicle: VehicleDescription) -> None:
@@ -127,12 +130,15 @@ def test_a_bias_of_one_motor_is_found_at_its_drive(vehicle: VehicleDescription) 
     assert recovered(problem, "torque_bias@drive_rl", vehicle) == pytest.approx(0.05, rel=0.02)
 
 
-def test_friction_that_rises_towards_rest_is_found_with_its_amplitude(vehicle: VehicleDescription) -> None:
+@pytest.mark.parametrize("velocity", [0.4, 0.05])
+def test_friction_that_rises_towards_rest_is_found_with_its_amplitude(
+    velocity: float, vehicle: VehicleDescription
+) -> None:
     g = vehicle.geometry
 
     def flaw(segment: Segment) -> Segment:
         rate = np.gradient(segment.steering_angles[:, 1], segment.sample_time)
-        extra = 4.0 * np.exp(-((rate / 0.5) ** 2)) * np.tanh(rate / COULOMB_EPSILON)
+        extra = 4.0 * np.exp(-((rate / velocity) ** 2)) * np.tanh(rate / COULOMB_EPSILON)
         wheels = extra * g.wheel_radius / (2 * g.wheel_offset * g.gear_ratio)
         change = np.stack([0 * wheels, 0 * wheels, wheels, -wheels], axis=1)
         return replace(segment, motor_torques=segment.motor_torques + change)
@@ -140,7 +146,7 @@ def test_friction_that_rises_towards_rest_is_found_with_its_amplitude(vehicle: V
     problem = problem_of(flawed(ideal_record(FOUR, vehicle), flaw), vehicle, EffectName.STRIBECK)
     candidate = problem.candidate("stribeck@steering_right")
     values = [float(variant.start(np.array([1.0]))[1]) for variant in candidate.variants if variant.start]
-    chosen = replace(candidate, variants=(candidate.variants[values.index(0.5)],))
+    chosen = replace(candidate, variants=(candidate.variants[values.index(velocity)],))
     only = replace(problem, candidates=(chosen,))
     assert recovered(only, candidate.key, vehicle) == pytest.approx(4.0, rel=0.03)
 
