@@ -16,8 +16,8 @@ from ident.estimate.filters import (
     differentiate,
     mirrored,
     moving_rows,
-    sliding_samples,
     second_derivative,
+    sliding_samples,
     zero_phase,
 )
 from ident.records.record import Record, Step

@@ -84,7 +84,8 @@ def test_dynamic_rows_are_those_of_the_estimator_and_some_beside_what_sticks(veh
     record, filters = ideal_record(FOUR, vehicle), Processing()
     every = build_problem([record], vehicle, vehicle.prior, effects=(EffectName.TORQUE_BIAS,), processing=filters)
     blocks = [block for block in every.blocks if block.channel is Channel.DYNAMIC]
-    for block, equations in zip(blocks, usable_equations(list(record.segments), vehicle.geometry, filters), strict=True):
+    estimated = usable_equations(list(record.segments), vehicle.geometry, filters)
+    for block, equations in zip(blocks, estimated, strict=True):
         step = round(block.sample_time / equations.sample_time)
         scale = np.abs(equations.regressor).max(axis=0) + 1e-12
         kept = equations.moving[::step]
