@@ -241,16 +241,16 @@ def sliding_samples(rates: Array, processing: Processing, sample_time: float) ->
     """Samples in which every joint of `rates` (N, n) slides, before any filter of `cutoff`.
 
     The rates themselves come from positions filtered at `signal_cutoff`; that filter forgets as much sooner as it is
-    faster. Differences are taken from the samples beside as well.
+    faster.
     """
-    memory = processing.guard * processing.cutoff / processing.signal_cutoff + sample_time
+    memory = processing.guard * processing.cutoff / processing.signal_cutoff
     return _away_from_rest(rates, processing.moving, memory, sample_time)
 
 
 def _away_from_rest(rates: Array, slow: float, memory: float, sample_time: float) -> NDArray[np.bool_]:
-    forward = rates > 0
+    moving = np.all(np.abs(rates) > slow, axis=1)
     # A joint may turn round between two samples, slow in neither.
-    turned = np.any(forward != np.concatenate([forward[:1], forward[:-1]]), axis=1)
-    moving = np.all(np.abs(rates) > slow, axis=1) & ~turned
+    turns = np.flatnonzero(np.any(np.diff(rates > 0, axis=0), axis=1))
+    moving[turns] = moving[turns + 1] = False
     width = 2 * round(memory / sample_time) + 1
     return np.asarray(ndimage.binary_erosion(moving, np.ones(width, dtype=bool), border_value=0))

@@ -106,12 +106,12 @@ def test_derivatives_of_a_parabola_are_exact() -> None:
 
 
 def test_a_joint_that_turns_round_between_two_samples_sticks_there() -> None:
-    """Slow in neither of them; left out are both, with the memory of the filter of positions and one sample more."""
+    """Slow in neither of them; left out are both, with the memory of the filter of positions."""
     processing = Processing(moving=0.05, guard=0.1, cutoff=40.0, signal_cutoff=500.0)
     rates = np.where(np.arange(100) < 50, -3.0, 3.0)[:, None]
-    reach = round(0.1 * 40 / 500 / DT) + 1
+    reach = round(0.1 * 40 / 500 / DT)
     left_out = np.flatnonzero(~sliding_samples(rates, processing, DT)[reach:-reach]) + reach
-    np.testing.assert_array_equal(left_out, np.arange(50 - reach, 50 + reach + 1))
+    np.testing.assert_array_equal(left_out, np.arange(49 - reach, 51 + reach))
 
 
 def test_stiction_and_the_memory_of_the_filter_around_it_are_dropped() -> None:
