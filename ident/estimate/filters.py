@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import fft, ndimage, signal, sparse
 
 from ident.errors import EstimationError
@@ -232,22 +232,46 @@ def smooth(
     return Smoothed(smoothed, rates, second_derivative(smoothed, sample_time, samples))
 
 
+SETTLED: Final = 100
+"""Samples after which nothing is left of an impulse behind the filter of the signals."""
+
+
 def moving_rows(rates: Array, processing: Processing, sample_time: float) -> NDArray[np.bool_]:
     """Rows in which every joint of `rates` (N, n) moves, and has moved for the filter's memory."""
     return _away_from_rest(rates, processing.moving, processing.guard, sample_time)
 
 
-def sliding_samples(rates: Array, processing: Processing, sample_time: float) -> NDArray[np.bool_]:
+def sliding_samples(
+    rates: Array, processing: Processing, sample_time: float, slowest: ArrayLike | None = None
+) -> NDArray[np.bool_]:
     """Samples in which every joint of `rates` (N, n) slides, before any filter of `cutoff`.
 
     The rates themselves come from positions filtered at `signal_cutoff`; that filter forgets as much sooner as it is
     faster.
+
+    Args:
+        rates: (N, n) [rad/s].
+        processing: filters.
+        sample_time: [s].
+        slowest: rate from which a joint slides, one or (n,) [rad/s]; None: `processing.moving`.
     """
     memory = processing.guard * processing.cutoff / processing.signal_cutoff
-    return _away_from_rest(rates, processing.moving, memory, sample_time)
+    slow = processing.moving if slowest is None else slowest
+    return _away_from_rest(rates, slow, memory, sample_time)
 
 
-def _away_from_rest(rates: Array, slow: float, memory: float, sample_time: float) -> NDArray[np.bool_]:
+def rate_noise(angles: Array, processing: Processing, sample_time: float, samples: int = THREE) -> Array:
+    """Standard deviation (n,) of the rates that `smooth` makes of measured angles (N, n) [rad/s].
+
+    What white noise is of angles shows in their fourth differences, where motion has died away.
+    """
+    impulse = np.zeros((2 * SETTLED + 1, 1))
+    impulse[SETTLED] = 1.0
+    gain = np.linalg.norm(smooth(impulse, processing, sample_time, samples).rates)
+    return np.asarray(gain * np.std(np.diff(angles, 4, axis=0), axis=0) / math.sqrt(math.comb(8, 4)))
+
+
+def _away_from_rest(rates: Array, slow: ArrayLike, memory: float, sample_time: float) -> NDArray[np.bool_]:
     moving = np.all(np.abs(rates) > slow, axis=1)
     # A joint may turn round between two samples, slow in neither.
     turns = np.flatnonzero(np.any(np.diff(rates > 0, axis=0), axis=1))

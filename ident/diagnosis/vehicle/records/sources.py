@@ -19,7 +19,7 @@ from ident.diagnosis.vehicle.records.signals import Signals, decimation, signals
 from ident.diagnosis.vehicle.records.wandering import wanders
 from ident.errors import RecordError
 from ident.estimate.equations import ROWS, RowsOfStep
-from ident.estimate.filters import Processing, sliding_samples, zero_phase
+from ident.estimate.filters import SEVEN, Processing, rate_noise, sliding_samples, zero_phase
 from ident.plant.modes import Mode
 from ident.records.record import Record, Step, base_step
 from ident.vehicle.geometry import Geometry
@@ -41,6 +41,9 @@ SIGNAL_SHARE: Final = 0.64
 
 SLIDING: Final = 2 * COULOMB_EPSILON
 """Joint rate from which dry friction is what (16) says, to a thirtieth [rad/s]: below, a joint may stick."""
+
+SURELY: Final = 3.0
+"""Standard deviations of a measured rate from which a joint surely moves."""
 
 SHOWN: Final = 0.5
 """Part of what the filter makes a row of that must be samples in which its equation holds."""
@@ -147,7 +150,7 @@ def sources_of(
 
 def processing_of(records: Sequence[Record]) -> Processing:
     """Filters of the estimate, but signals that still show a motor that rattles in its gear."""
-    usual = Processing(moving=SLIDING)
+    usual = Processing()
     nyquist = min((np.pi / segment.sample_time for record in records for segment in record.segments), default=0.0)
     return replace(usual, signal_cutoff=float(np.clip(SIGNAL_SHARE * nyquist, usual.signal_cutoff, SIGNAL_BANDWIDTH)))
 
@@ -182,8 +185,7 @@ def _sources(
         "time": segment.time[::stride],
         "rattles": loose.rattles[::stride],
     }
-    rates = [signals.joint_rates[:, _joints(spec, name)] for name in spec.coordinates]
-    slides = [sliding_samples(of_joints, processing, segment.sample_time) for of_joints in rates]
+    slides = [_slides(signals, _joints(spec, name), processing) for name in spec.coordinates]
     dynamic = tuple(_shown(samples, processing, segment.sample_time)[::stride] for samples in slides)
     holds = np.stack(slides, axis=1)[::stride]
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, holds=holds, **common)  # type: ignore[arg-type]
@@ -227,6 +229,15 @@ def _wandering(sources: Sequence[Source]) -> Iterator[Source]:
 def _throughout(moving: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
     """What rolls, or is loose, has equations that hold at rest as well."""
     return np.ones((len(moving[0]), len(moving)), dtype=bool)
+
+
+def _slides(signals: Signals, joints: Sequence[int], processing: Processing) -> NDArray[np.bool_]:
+    """Samples (N,) in which none of some joints, columns of `Signals.joint_rates`, may stick."""
+    segment = signals.segment
+    angles = np.hstack([segment.steering_angles, segment.wheel_angles])[:, joints]
+    noise = rate_noise(angles, processing, segment.sample_time, SEVEN)
+    slowest = np.maximum(SLIDING, SURELY * noise)
+    return sliding_samples(signals.joint_rates[:, joints], processing, segment.sample_time, slowest)
 
 
 def _shown(holds: NDArray[np.bool_], processing: Processing, sample_time: float) -> NDArray[np.bool_]:
