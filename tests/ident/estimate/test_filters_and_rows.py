@@ -12,12 +12,15 @@ from ident.estimate.equations import equations_of, motion_of, usable_equations
 from ident.estimate.filters import (
     FILTER_ORDER,
     SEVEN,
+    THREE,
     Processing,
     differentiate,
     mirrored,
     moving_rows,
+    rate_noise,
     second_derivative,
     sliding_samples,
+    smooth,
     zero_phase,
 )
 from ident.records.record import Record, Step
@@ -112,6 +115,15 @@ def test_a_joint_that_turns_round_between_two_samples_sticks_there() -> None:
     reach = round(0.1 * 40 / 500 / DT)
     left_out = np.flatnonzero(~sliding_samples(rates, processing, DT)[reach:-reach]) + reach
     np.testing.assert_array_equal(left_out, np.arange(49 - reach, 51 + reach))
+
+
+@pytest.mark.parametrize("samples", [THREE, SEVEN])
+def test_the_noise_of_rates_is_told_from_angles_that_move(samples: int) -> None:
+    """By what noise alone makes of rates; a swing of half a radian beside it changes nothing."""
+    noise = 3e-5 * np.random.default_rng(4).standard_normal((20_000, 2)) * [1.0, 2.0]
+    swing = 0.5 * np.sin(2 * np.pi * np.arange(20_000) * DT / 0.7)[:, None]
+    expected = smooth(noise, Processing(), DT, samples).rates.std(axis=0)
+    np.testing.assert_allclose(rate_noise(noise + swing, Processing(), DT, samples), expected, rtol=0.03)
 
 
 def test_stiction_and_the_memory_of_the_filter_around_it_are_dropped() -> None:
