@@ -17,14 +17,14 @@ from ident.diagnosis.vehicle.causes.bending import BristleCause
 from ident.diagnosis.vehicle.causes.library import every_unit
 from ident.diagnosis.vehicle.records import rows
 from ident.diagnosis.vehicle.records.sliding import SlidingCause, sliding_cause
-from ident.diagnosis.vehicle.records.sources import Source
+from ident.diagnosis.vehicle.records.sources import DRY, Source
 from ident.diagnosis.vehicle.records.transforms import Setting, TransformCause, transform_cause
 from ident.effects import Effect, EffectTerm, at_single_places, effect_term, terms_of
 from ident.estimate.filters import Processing, zero_phase
 from ident.vehicle.description import VehicleDescription
 from ident.vehicle.geometry import Geometry
 from ident.vehicle.lag import Lag
-from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES, Parameters
+from ident.vehicle.parameters import PARAMETER_NAMES, Parameters
 
 Array = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class Context:
     @property
     def constants(self) -> tuple[Array, Array, Array]:
         """What the formulas take beside the inputs."""
-        return self.geometry.as_vector(), np.array([COULOMB_EPSILON]), self.parameters
+        return self.geometry.as_vector(), np.array([DRY]), self.parameters
 
     def setting(self, source: Source) -> Setting:
         """What effects with a memory need beside the signals of a source."""

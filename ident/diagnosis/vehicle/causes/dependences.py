@@ -20,12 +20,11 @@ from ident.diagnosis.problem import Channel
 from ident.diagnosis.vehicle.causes.coarse import Coarse
 from ident.diagnosis.vehicle.causes.context import Context
 from ident.diagnosis.vehicle.records.inputs import SLICES
-from ident.diagnosis.vehicle.records.sources import Source
+from ident.diagnosis.vehicle.records.sources import DRY, Source
 from ident.plant import kinematics
 from ident.plant.kinematics import GENERALIZED_VELOCITIES
 from ident.plant.places import CHASSIS, STEERING, WHEEL_PLACES, rows_of
 from ident.vehicle.geometry import WHEELS, Geometry
-from ident.vehicle.parameters import COULOMB_EPSILON
 
 Array = NDArray[np.float64]
 
@@ -199,7 +198,7 @@ def _variable(inputs: Array, joint: int, law: _Law, time: Array, geometry: Geome
 def _partner(inputs: Array, joint: int, partner: Partner) -> Array | float:
     match partner:
         case Partner.DIRECTION:
-            return np.tanh(_joint(inputs, joint, "alpha_rate", "beta_rate") / COULOMB_EPSILON)
+            return np.tanh(_joint(inputs, joint, "alpha_rate", "beta_rate") / DRY)
         case Partner.RATE:
             return _joint(inputs, joint, "alpha_rate", "beta_rate")
         case Partner.ACCELERATION:

@@ -42,6 +42,9 @@ SIGNAL_SHARE: Final = 0.64
 SLIDING: Final = 2 * COULOMB_EPSILON
 """Joint rate from which dry friction is what (16) says, to a thirtieth [rad/s]: below, a joint may stick."""
 
+DRY: Final = SLIDING / 20
+"""ε of the friction in rows [rad/s]: what slides at `SLIDING` and above has all of it, whatever it is at rest."""
+
 SURELY: Final = 3.0
 """Standard deviations of a measured rate from which a joint surely moves."""
 

@@ -14,13 +14,13 @@ from ident.diagnosis.problem import Block, Channel, Problem
 from ident.diagnosis.vehicle.build import build_problem
 from ident.diagnosis.vehicle.causes.context import make_context
 from ident.diagnosis.vehicle.experiment.ideal import DIAGNOSTIC, FOUR, Drive, ideal_record
-from ident.diagnosis.vehicle.records.sources import DIAGNOSED, sources_of
+from ident.diagnosis.vehicle.records.sources import DIAGNOSED, DRY, SLIDING, sources_of
 from ident.effects import make_effect
-from ident.estimate.equations import usable_equations
+from ident.estimate.equations import equations_of
 from ident.estimate.filters import Processing
 from ident.records.record import Record, Segment, Step
 from ident.vehicle.description import VehicleDescription
-from ident.vehicle.parameters import COULOMB_EPSILON, PARAMETER_NAMES
+from ident.vehicle.parameters import PARAMETER_NAMES
 
 Array = NDArray[np.float64]
 Flaw = Callable[[Segment], Segment]
@@ -81,10 +81,10 @@ def test_a_load_that_the_record_does_not_state_is_found_as_a_payload(vehicle: Ve
 
 
 def test_dynamic_rows_are_those_of_the_estimator_and_some_beside_what_sticks(vehicle: VehicleDescription) -> None:
-    record, filters = ideal_record(FOUR, vehicle), Processing()
+    record, filters = ideal_record(FOUR, vehicle), Processing(moving=SLIDING, guard=0.2)
     every = build_problem([record], vehicle, vehicle.prior, effects=(EffectName.TORQUE_BIAS,), processing=filters)
     blocks = [block for block in every.blocks if block.channel is Channel.DYNAMIC]
-    estimated = usable_equations(list(record.segments), vehicle.geometry, filters)
+    estimated = [one for each in record.segments for one in equations_of(each, vehicle.geometry, filters, DRY)]
     for block, equations in zip(blocks, estimated, strict=True):
         step = round(block.sample_time / equations.sample_time)
         scale = np.abs(equations.regressor).max(axis=0) + 1e-12
@@ -139,7 +139,7 @@ def test_friction_that_rises_towards_rest_is_found_with_its_amplitude(
 
     def flaw(segment: Segment) -> Segment:
         rate = np.gradient(segment.steering_angles[:, 1], segment.sample_time)
-        extra = 4.0 * np.exp(-((rate / velocity) ** 2)) * np.tanh(rate / COULOMB_EPSILON)
+        extra = 4.0 * np.exp(-((rate / velocity) ** 2)) * np.sign(rate)
         wheels = extra * g.wheel_radius / (2 * g.wheel_offset * g.gear_ratio)
         change = np.stack([0 * wheels, 0 * wheels, wheels, -wheels], axis=1)
         return replace(segment, motor_torques=segment.motor_torques + change)
