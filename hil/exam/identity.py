@@ -7,7 +7,7 @@ the answers. What is scored of a name or a place depends on whether it can be to
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -23,8 +23,8 @@ from ident.campaign.plan import Plan
 from ident.campaign.reference import STEERING_LOOPS, sample_times
 from ident.diagnosis.observations.directions import VISIBLE
 from ident.diagnosis.observations.linear import least_squares, orthonormal
-from ident.diagnosis.observations.rows import Column, make_rows
-from ident.diagnosis.problem import Candidate, Problem
+from ident.diagnosis.observations.rows import Column, Rows, make_rows
+from ident.diagnosis.problem import Candidate, Problem, Series
 from ident.diagnosis.vehicle.build import build_problem
 from ident.diagnosis.vehicle.causes.library import DRIFTS, POSITIVE
 from ident.diagnosis.vehicle.experiment.advice import Driven, hidden_effects
@@ -134,14 +134,17 @@ def identities(problem: Problem, vehicle: VehicleDescription) -> Identities:
     """
     rows = make_rows(problem)
     scale = row_noise(rows)[:, None]
-    baseline, columns = orthonormal(rows.baseline / scale, RANK), rows.columns / scale
-    beside = columns - baseline @ (baseline.T @ columns)
+    baseline = orthonormal(rows.baseline / scale, RANK)
+
+    def beside(columns: Array) -> Array:
+        return np.asarray(columns - baseline @ (baseline.T @ columns))
+
     groups: Mapping[bool, list[_Cause]] = {
         drift: [
             cause
             for number, candidate in enumerate(problem.candidates)
             if (candidate.effect in DRIFTS) == drift
-            and (cause := _cause(candidate, rows.layout, number, columns if drift else beside, columns)) is not None
+            and (cause := _cause(_forms(problem, rows, number, scale), np.asarray if drift else beside)) is not None
         ]
         for drift in (False, True)
     }
@@ -186,18 +189,53 @@ class _Cause:
         return float(np.linalg.norm(wanted - space @ values)) < math.sqrt(1 - IDENTICAL**2) * length
 
 
-def _cause(candidate: Candidate, layout: Sequence[Column], number: int, left: Array, whole: Array) -> _Cause | None:
-    """None where nothing is to be seen of it."""
+@dataclass(frozen=True)
+class _Forms:
+    """What a cause may look like, over the noise of the rows.
+
+    Attributes:
+        candidate: the cause.
+        spaces: (n, k) columns of its variants, the size first.
+        signal: (n, 1) of unit size, its other numbers as the exam injects them; None: it has no such form.
+    """
+
+    candidate: Candidate
+    spaces: tuple[Array, ...]
+    signal: Array | None
+
+
+def _forms(problem: Problem, rows: Rows, number: int, scale: Array) -> _Forms:
+    candidate = problem.candidates[number]
     # What comes along with an effect, and shows by itself, is no form of that effect.
-    own = [column for column in layout if column.candidate == number and column.width > 0 and column.itself]
-    spaces = [left[:, column.place] for column in own]
-    injected = next((index for index, column in enumerate(own) if _is_injected(candidate, column)), None)
-    if injected is None:
+    own = [column for column in rows.layout if column.candidate == number and column.width > 0 and column.itself]
+    spaces = [rows.columns[:, column.place] / scale for column in own]
+    tried = next((space for space, column in zip(spaces, own, strict=True) if _is_injected(candidate, column)), None)
+    if tried is not None:
+        return _Forms(candidate, tuple(spaces), tried[:, :1])
+    exact = _as_injected(candidate, problem) if spaces else None
+    if exact is None:
+        return _Forms(candidate, tuple(spaces), None)
+    signal = rows.stack(exact)[:, None] / scale
+    return _Forms(candidate, (*spaces, signal), signal)
+
+
+def _cause(forms: _Forms, compared: Callable[[Array], Array]) -> _Cause | None:
+    """None where nothing is to be seen of it; `compared` is what is looked at of columns (n, k)."""
+    if forms.signal is None:
         return None
-    signal, full = spaces[injected][:, 0], whole[:, own[injected].place.start]
-    if np.linalg.norm(signal) <= VISIBLE * np.linalg.norm(full):
+    signal = compared(forms.signal)[:, 0]
+    if np.linalg.norm(signal) <= VISIBLE * np.linalg.norm(forms.signal):
         return None
-    return _Cause(candidate.key, candidate.effect in POSITIVE, signal, tuple(spaces))
+    spaces = tuple(compared(space) for space in forms.spaces)
+    return _Cause(forms.candidate.key, forms.candidate.effect in POSITIVE, signal, spaces)
+
+
+def _as_injected(candidate: Candidate, problem: Problem) -> Series | None:
+    """What an effect of size one adds to every block, its other numbers at their defaults; None: there is no such."""
+    others = [parameter.default for parameter in EFFECTS[candidate.effect].parameters[1:]]
+    if candidate.contribution is None or problem.nominal is None or None in others:
+        return None
+    return candidate.contribution(np.array([1.0, *others], dtype=float), problem.nominal.values)
 
 
 def _is_injected(candidate: Candidate, column: Column) -> bool:
