@@ -231,7 +231,10 @@ def _cause(forms: _Forms, compared: Callable[[Array], Array]) -> _Cause | None:
 
 
 def _as_injected(candidate: Candidate, problem: Problem) -> Series | None:
-    """What an effect of size one adds to every block, its other numbers at their defaults; None: there is no such."""
+    """What an effect of unit size, as it grows with that, adds to every block, its other numbers at their defaults.
+
+    None where it has no exact form, or a number that has no default.
+    """
     others = [parameter.default for parameter in EFFECTS[candidate.effect].parameters[1:]]
     if candidate.contribution is None or problem.nominal is None or None in others:
         return None

@@ -137,7 +137,7 @@ def _filtered(
 ) -> Equations:
     """Rows from unfiltered Θ (N, 11) and τ (N,), and the rates (N, n) of the joints whose friction is in them."""
     dt = segment.sample_time
-    slides = sliding_samples(rates, processing, dt)
+    slides = sliding_samples(rates, processing, dt, processing.moving)
     return Equations(
         step=segment.step,
         coordinate=coordinate,

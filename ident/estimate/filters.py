@@ -241,9 +241,14 @@ def moving_rows(rates: Array, processing: Processing, sample_time: float) -> NDA
     return _away_from_rest(rates, processing.moving, processing.guard, sample_time)
 
 
-def sliding_samples(
-    rates: Array, processing: Processing, sample_time: float, slowest: ArrayLike | None = None
-) -> NDArray[np.bool_]:
+def away_from_ends(rows: NDArray[np.bool_], processing: Processing, sample_time: float) -> NDArray[np.bool_]:
+    """Those of some rows (N, ...) that the filter's memory keeps from the ends of a record."""
+    ends, found = round(processing.guard / sample_time), rows.copy()
+    found[:ends] = found[len(found) - ends :] = False
+    return found
+
+
+def sliding_samples(rates: Array, processing: Processing, sample_time: float, slowest: ArrayLike) -> NDArray[np.bool_]:
     """Samples in which every joint of `rates` (N, n) slides, before any filter of `cutoff`.
 
     The rates themselves come from positions filtered at `signal_cutoff`; that filter forgets as much sooner as it is
@@ -253,11 +258,10 @@ def sliding_samples(
         rates: (N, n) [rad/s].
         processing: filters.
         sample_time: [s].
-        slowest: rate from which a joint slides, one or (n,) [rad/s]; None: `processing.moving`.
+        slowest: rate from which a joint slides, one or (n,) [rad/s].
     """
     memory = processing.guard * processing.cutoff / processing.signal_cutoff
-    slow = processing.moving if slowest is None else slowest
-    return _away_from_rest(rates, slow, memory, sample_time)
+    return _away_from_rest(rates, slowest, memory, sample_time)
 
 
 def rate_noise(angles: Array, processing: Processing, sample_time: float, samples: int = THREE) -> Array:

@@ -113,7 +113,7 @@ def test_a_joint_that_turns_round_between_two_samples_sticks_there() -> None:
     processing = Processing(moving=0.05, guard=0.1, cutoff=40.0, signal_cutoff=500.0)
     rates = np.where(np.arange(100) < 50, -3.0, 3.0)[:, None]
     reach = round(0.1 * 40 / 500 / DT)
-    left_out = np.flatnonzero(~sliding_samples(rates, processing, DT)[reach:-reach]) + reach
+    left_out = np.flatnonzero(~sliding_samples(rates, processing, DT, processing.moving)[reach:-reach]) + reach
     np.testing.assert_array_equal(left_out, np.arange(49 - reach, 51 + reach))
 
 

@@ -24,7 +24,7 @@ from ident.diagnosis.vehicle.records.signals import Signals
 from ident.diagnosis.vehicle.records.sliding import rolled_with_others, rolling_rates
 from ident.diagnosis.vehicle.records.wandering import wander_rows, wandering
 from ident.estimate.equations import RowsOfStep
-from ident.estimate.filters import Processing
+from ident.estimate.filters import Processing, away_from_ends
 from ident.plant import kinematics
 from ident.plant.modes import Mode
 from ident.vehicle.geometry import WHEELS, Geometry
@@ -75,7 +75,7 @@ def taken_apart(
     if not rattles.any():
         return Loose(recorded, rattles, rolls=True)
     motors = np.flatnonzero(rattles.any(axis=0)).tolist()
-    inside = _inside(rattles, processing, dt)
+    inside = away_from_ends(rattles, processing, dt)
     moving = tuple(inside[:, wheel] for wheel in motors)
     inputs = _hammered(recorded, rms, rattles, geometry, dt)
     return Loose(inputs, rattles, rolls=False, own=((rattle_rows(motors, geometry), moving),))
@@ -136,10 +136,3 @@ def _hammered(recorded: Array, rms: Array, rattles: Mask, geometry: Geometry, sa
     inputs[:, SLICES["hammer"]], inputs[:, SLICES["rattle"]] = weights, weights * moved
     inputs[:, SLICES["swing"]] = np.where(rattles, swing(rms), 0.0)
     return inputs
-
-
-def _inside(rattles: Mask, processing: Processing, sample_time: float) -> Mask:
-    """Where motors rattle (N, 4), away from the ends of the filter."""
-    ends, found = round(processing.guard / sample_time), rattles.copy()
-    found[:ends] = found[len(found) - ends :] = False
-    return found

@@ -19,7 +19,7 @@ from ident.diagnosis.vehicle.records.signals import Signals, decimation, signals
 from ident.diagnosis.vehicle.records.wandering import wanders
 from ident.errors import RecordError
 from ident.estimate.equations import ROWS, RowsOfStep
-from ident.estimate.filters import SEVEN, Processing, rate_noise, sliding_samples, zero_phase
+from ident.estimate.filters import SEVEN, Processing, away_from_ends, rate_noise, sliding_samples, zero_phase
 from ident.plant.modes import Mode
 from ident.records.record import Record, Step, base_step
 from ident.vehicle.geometry import Geometry
@@ -188,7 +188,10 @@ def _sources(
         "time": segment.time[::stride],
         "rattles": loose.rattles[::stride],
     }
-    slides = [_slides(signals, _joints(spec, name), processing) for name in spec.coordinates]
+    slowest, joints = _slowest(signals, processing), [_joints(spec, name) for name in spec.coordinates]
+    slides = [
+        sliding_samples(signals.joint_rates[:, own], processing, segment.sample_time, slowest[own]) for own in joints
+    ]
     dynamic = tuple(_shown(samples, processing, segment.sample_time)[::stride] for samples in slides)
     holds = np.stack(slides, axis=1)[::stride]
     yield Source(channel=Channel.DYNAMIC, moving=dynamic, holds=holds, **common)  # type: ignore[arg-type]
@@ -234,13 +237,12 @@ def _throughout(moving: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
     return np.ones((len(moving[0]), len(moving)), dtype=bool)
 
 
-def _slides(signals: Signals, joints: Sequence[int], processing: Processing) -> NDArray[np.bool_]:
-    """Samples (N,) in which none of some joints, columns of `Signals.joint_rates`, may stick."""
+def _slowest(signals: Signals, processing: Processing) -> Array:
+    """Rate of every joint (6,), as in `Signals.joint_rates`, from which it surely slides [rad/s]."""
     segment = signals.segment
-    angles = np.hstack([segment.steering_angles, segment.wheel_angles])[:, joints]
+    angles = np.hstack([segment.steering_angles, segment.wheel_angles])
     noise = rate_noise(angles, processing, segment.sample_time, SEVEN)
-    slowest = np.maximum(SLIDING, SURELY * noise)
-    return sliding_samples(signals.joint_rates[:, joints], processing, segment.sample_time, slowest)
+    return np.asarray(np.maximum(SLIDING, SURELY * noise))
 
 
 def _shown(holds: NDArray[np.bool_], processing: Processing, sample_time: float) -> NDArray[np.bool_]:
@@ -249,9 +251,7 @@ def _shown(holds: NDArray[np.bool_], processing: Processing, sample_time: float)
     Rows beside and among samples that stick hold as well: all of their terms are zero there (`Context.in_rows`).
     """
     shown = zero_phase(holds.astype(float), processing.cutoff, sample_time) > SHOWN
-    ends = round(processing.guard / sample_time)
-    shown[:ends] = shown[len(shown) - ends :] = False
-    return np.asarray(shown, dtype=np.bool_)
+    return away_from_ends(shown, processing, sample_time)
 
 
 def _joints(spec: RowsOfStep, coordinate: str) -> list[int]:
@@ -269,8 +269,7 @@ def _rolling(signals: Signals, spec: RowsOfStep, processing: Processing) -> NDAr
     dt = signals.segment.sample_time
     width = 2 * round(processing.guard / dt) + 1
     moving = np.any(np.abs(signals.joint_rates) > processing.moving, axis=1)
-    near = ndimage.binary_dilation(moving, np.ones(width, dtype=bool))
-    near[: width // 2] = near[-(width // 2) :] = False
+    near = away_from_ends(ndimage.binary_dilation(moving, np.ones(width, dtype=bool)), processing, dt)
     if spec.mode is Mode.ALIGNMENT:
         near &= near_middle(signals)
     return np.asarray(near)
