@@ -99,7 +99,7 @@ def _doubtful(standing: Standing) -> dict[str, float]:
 
     But of what was in the set and lost its place: it was refuted or passed over, whatever its evidence is.
     """
-    lost, hypotheses = standing.search.refuted | standing.search.passed_over, standing.design.hypotheses
+    lost, hypotheses = standing.search.barred, standing.design.hypotheses
     odds = {index: log for index, log in standing.odds_beside.items() if index not in lost}
     whole = float(logsumexp([0.0, *odds.values()]))
     return {hypotheses[one].key: math.exp(odds[one] - whole) for one in sorted(odds, key=lambda one: -odds[one])}

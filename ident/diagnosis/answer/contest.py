@@ -49,7 +49,7 @@ def _without(
 ) -> tuple[Search, State]:
     """The search and its set without members that have lost their places."""
     left = {index: one for index, one in standing.state.members.items() if index not in lost}
-    search = standing.search.without(refuted=refuted, passed_over=passed_over)
+    search = standing.search.without(refuted=refuted, passed_over=passed_over, beside=left)
     return search, search.further(search.fitter.state(left, standing.state))
 
 
@@ -58,12 +58,12 @@ def _corrected(standing: Standing) -> tuple[Search, State] | None:
 
     What has lost a place to another once does not get it back.
     """
-    ahead = {index: slot.ahead(standing.search.passed_over) for index, slot in standing.slots.items()}
+    ahead = {index: slot.ahead(standing.search.barred) for index, slot in standing.slots.items()}
     places = [(*one, index) for index, one in ahead.items() if one is not None]
     if not places:
         return None
     _, rival, index = max(places)
-    search = standing.search.without(passed_over=[index])
+    search = standing.search.without(passed_over=[index], beside=standing.state.without(index))
     return search, search.further(standing.slots[index].rivals[rival])
 
 
@@ -72,7 +72,7 @@ def _doubted(standing: Standing) -> list[int]:
 
     Or a law that the fitted rows do not show by themselves, which is not among those taken.
     """
-    lost = {index: slot.lost(standing.search.passed_over) for index, slot in standing.slots.items()}
+    lost = {index: slot.lost(standing.search.stands_for(index)) for index, slot in standing.slots.items()}
     doubted = [index for index in lost if lost[index] > DOUBTED or index not in standing.taken.variants]
     return sorted(doubted, key=lambda index: -lost[index])[:1]
 

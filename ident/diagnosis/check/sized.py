@@ -19,12 +19,17 @@ thousands of rows, and of many members, a number is worth that."""
 
 
 def is_sizeless(candidate: Candidate, part: Part) -> bool:
-    """Whether an effect may be of no size itself, and what comes along with it is the explanation."""
-    along = slice(len(part.values), None)
-    accompanied = np.abs(part.numbers[along]) > SURELY * part.scatter[along]
-    size = np.abs(part.values) if candidate.least is None else part.values - candidate.least
-    least = np.maximum(SURELY * part.std, ITS_OWN * part.scatter[: len(size)])
-    return bool(np.any(accompanied) and np.all(size < least))
+    """Whether an effect that something comes along with may be of no size itself.
+
+    What comes along is the explanation then, or neither is one. Where it is there, a size has to be its own beside it.
+    """
+    along, size = slice(len(part.values), None), slice(len(part.values))
+    if not part.numbers[along].size:
+        return False
+    least = SURELY * part.scatter[size]
+    if np.any(np.abs(part.numbers[along]) > SURELY * part.scatter[along]):
+        least = np.maximum(SURELY * part.std, ITS_OWN * part.scatter[size])
+    return bool(np.all(np.abs(part.values - (candidate.least or 0.0)) < least))
 
 
 def is_foreign(candidate: Candidate, part: Part) -> bool:

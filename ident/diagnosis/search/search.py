@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final
 
 from ident.diagnosis.evidence.fitting import Fitter
@@ -22,6 +23,9 @@ SURVIVORS: Final = 3
 """Hypotheses that are fitted exactly at every step, by either noise: of 1015 steps on four records of robots, whose
 sets are large, 3 took a later one, and none of 57 on vehicles."""
 
+ROUNDS: Final = 2
+"""Times that those which promise most are fitted: what promises most of all may keep none of it."""
+
 MARGIN: Final = 4.0
 """Log posterior below the best one's from which a hypothesis is not fitted exactly."""
 
@@ -36,19 +40,34 @@ class Search:
     Args:
         fitter: of the sets.
         refuted: hypotheses that the records speak against, or that make no difference held out.
-        passed_over: those that nothing, or another one, is more likely than; another may still be taken for them.
+        passed_over: those that nothing, or another one, is more likely than, and what stood beside each then; what did
+            not may still be taken for it.
     """
 
     def __init__(
-        self, fitter: Fitter, refuted: frozenset[int] = frozenset(), passed_over: frozenset[int] = frozenset()
+        self,
+        fitter: Fitter,
+        refuted: frozenset[int] = frozenset(),
+        passed_over: Mapping[int, frozenset[int]] = MappingProxyType({}),
     ) -> None:
         self.fitter, self.design = fitter, fitter.design
-        self.refuted = refuted | fitter.invisible
-        self.passed_over = passed_over
+        self.refuted, self.passed_over = refuted | fitter.invisible, passed_over
 
-    def without(self, *, refuted: Collection[int] = (), passed_over: Collection[int] = ()) -> Search:
-        """The same search, some hypotheses more refuted, or passed over."""
-        return Search(self.fitter, self.refuted | frozenset(refuted), self.passed_over | frozenset(passed_over))
+    def without(
+        self, *, refuted: Collection[int] = (), passed_over: Collection[int] = (), beside: Collection[int] = ()
+    ) -> Search:
+        """The same search, some hypotheses more refuted, or passed over beside what stands."""
+        further = dict.fromkeys(passed_over, frozenset(beside))
+        return Search(self.fitter, self.refuted | frozenset(refuted), {**self.passed_over, **further})
+
+    @property
+    def barred(self) -> frozenset[int]:
+        """Hypotheses that are not looked for any more."""
+        return self.refuted.union(self.passed_over)
+
+    def stands_for(self, index: int) -> frozenset[int]:
+        """Those passed over that a member may have been taken for: it did not stand beside them."""
+        return frozenset(one for one, beside in self.passed_over.items() if index not in beside)
 
     def run(self) -> State:
         """The best set that was found."""
@@ -80,15 +99,16 @@ class Search:
             named: only what has a name.
         """
         promises, doubted = self._promises(state, named), set[int]()
-        while True:
-            best = max(self._expanded(state, promises, doubted), key=lambda one: one.log_posterior, default=state)
-            if best.log_posterior <= state.log_posterior:
-                return state
-            best = self.fitter.state(best.members, best)
-            (index,) = best.members.keys() - state.members.keys()
-            if self.fitter.odds(best, index, state) > 0:
-                return best
-            doubted.add(index)
+        for _ in range(ROUNDS):
+            tried = self._expanded(state, promises, doubted)
+            for index, one in sorted(tried.items(), key=lambda entry: -entry[1].log_posterior):
+                if one.log_posterior <= state.log_posterior:
+                    break
+                further = self.fitter.state(one.members, one)
+                if self.fitter.odds(further, index, state) > 0:
+                    return further
+            doubted |= tried.keys()
+        return state
 
     def _against_rivals(self, state: State) -> State:
         """With the best hypothesis in the place of every member."""
@@ -101,8 +121,8 @@ class Search:
                 break
         return state
 
-    def _expanded(self, state: State, promises: Sequence[Promises], doubted: Collection[int]) -> Sequence[State]:
-        """Sets with one member more, of those that promise most of what is not doubted."""
+    def _expanded(self, state: State, promises: Sequence[Promises], doubted: Collection[int]) -> dict[int, State]:
+        """Sets with one member more, by its number, of those that promise most of what is not doubted."""
         found = dict[int, Member]()
         for one in promises:
             ordered = sorted((index for index in one if index not in doubted), key=lambda index: -one[index][0])
@@ -112,23 +132,30 @@ class Search:
                 # What is no more than its columns promises what it keeps.
                 if odds > (least if self.fitter.is_bent(index, member) else max(least, 0.0)):
                     found.setdefault(index, member)
-        return [self.fitter.state({**state.members, index: one}, state, state.members) for index, one in found.items()]
+        return {
+            index: self.fitter.state({**state.members, index: one}, state, state.members)
+            for index, one in found.items()
+        }
 
     def _promises(self, state: State, named: bool) -> Sequence[Promises]:
-        """Of all hypotheses, or of names, by the noise that is left, and by that of which nothing is lacking.
+        """Of names and of laws, by the noise that is left, and by that of which nothing is lacking.
 
-        What a model lacks may be as large as what is looked for, and hide it.
+        What a model lacks may be as large as what is looked for, and hide it. A law, which is free to follow anything,
+        promises more than names do, and keeps less.
         """
-        hypotheses, barred = self.design.hypotheses, self.refuted | self.passed_over
         whole, usual = self.fitter.among_all(state), self.fitter.with_nothing_lacking(state)
-        return [
-            {
+        noises = (whole, usual) if usual.evidence is not whole.evidence else (whole,)
+        return [kind for one in noises for kind in self._promised(one, (False,) if named else (False, True))]
+
+    def _promised(self, state: State, laws: Sequence[bool]) -> Iterator[Promises]:
+        """Of every kind."""
+        hypotheses, barred, tables = self.design.hypotheses, self.barred, state.tables()
+        for law in laws:
+            yield {
                 index: (table.total - hypotheses[index].price, table.best)
-                for index, table in one.tables().items()
-                if table.is_there and index not in barred and not (named and hypotheses[index].free)
+                for index, table in tables.items()
+                if table.is_there and index not in barred and hypotheses[index].free is law
             }
-            for one in ((whole, usual) if usual.evidence is not whole.evidence else (whole,))
-        ]
 
     def _pruned(self, state: State) -> State:
         """Without members that the others make needless."""

@@ -7,6 +7,9 @@ So in one drive it follows the side that is askew and in another the side that i
 it shows twice in one and not at all in the other. Every kind of drive therefore has a share of its own; over driving
 straight and turning on the spot, in which the same side drags the other way, shares are one on average.
 
+No contact is all dry: up to some speed of sliding it creeps, so every vehicle that drives slowly takes the middle.
+What a share adds to the middle begins there, and lacks that speed beyond it.
+
 That is so of an angle that stays. What a coupling gives way by follows the traction, and has no share; but the wheel
 behind it drags as well, by the grip of the ground times the angle by which it stands askew.
 """
@@ -21,6 +24,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.diagnosis.observations.linear import rms
 from ident.diagnosis.problem import Candidate, Contribution, Variant
 from ident.plant.modes import Mode
 from ident.vehicle.geometry import Geometry
@@ -41,6 +45,13 @@ Dry contacts, integrated for offsets of 1 to 5 mrad of either side and sign and 
 1.06 (`tests/ident/diagnosis/vehicle/causes/test_shares_of_an_askew_wheel.py`).
 """
 
+CREEPING_STD: Final = 5e-4
+"""Of the speed up to which a vehicle on contacts that slide aside stays in the middle [m/s].
+
+Dry contacts, integrated as for `MEAN_STD`, have 0.1 mm/s where they slip by 0.01, and 0.9 where they slip by 0.05; from
+0.1 on vehicles take the middle anyway.
+"""
+
 MODES: Final = (Mode.STEERED, Mode.ROTATION, Mode.LATERAL)
 """In which wheels roll; the shares of the first two are one on average."""
 
@@ -51,7 +62,7 @@ RATE: Final = 4.0
 """Rate of the wheels for which their drag is told [rad/s]."""
 
 SLOW: Final = 0.2
-"""Rate from which a dry drag is taken to be there where it is first looked for [rad/s]."""
+"""Rate from which a dry drag, or what a share lacks, is taken to be there where it is first looked for [rad/s]."""
 
 NONE: Final = float(np.finfo(float).eps)
 """Of an offset, or of the bend of a drag, which is in proportion to the rate then: not zero, to divide by."""
@@ -92,7 +103,7 @@ def with_shares(candidate: Candidate, blocks: Blocks, dragging: float) -> Candid
     """An offset of the steering that may have a share in the rolling rows of every mode, its wheels then dragging.
 
     Behind the offset come the friction at every wheel that drags as much at `RATE` [Nm], how it bends up to that [-],
-    and by how much the share of every mode is above one.
+    the speed up to which contacts creep in every mode [m/s], and by how much its share is above one.
 
     Args:
         candidate: linear in its one number.
@@ -114,12 +125,12 @@ def _shared(variant: Variant, blocks: Blocks) -> Variant:
         return variant
 
     def numbers(found: Array) -> Array:
-        offset, line, apart = found[0], found[1:3], found[3:]
+        offset, line, lacking, apart = found[0], found[1:3], found[3 : 3 + len(MODES)], found[3 + len(MODES) :]
         above = APART @ apart / offset if offset else np.zeros(len(MODES))
-        return np.concatenate([[offset], _bent(*line.tolist()), above])
+        return np.concatenate([[offset], _bent(*line.tolist()), np.maximum(-np.sign(above) * lacking, 0.0), above])
 
     columns = [_joined(column, block) for column, block in zip(variant.columns, blocks, strict=True)]
-    return Variant(tuple(columns), numbers, beside=2 + APART.shape[1], itself=False)
+    return Variant(tuple(columns), numbers, beside=2 + sum(APART.shape), itself=False)
 
 
 def _bent(dry: float, viscous: float) -> Array:
@@ -133,7 +144,7 @@ def _joined(column: Array | None, block: Travelling | None) -> Array | None:
     there = column if column is not None or block is None else block.friction
     if there is None:
         return None
-    joined = np.zeros((len(there), 3 + APART.shape[1]))
+    joined = np.zeros((len(there), 3 + sum(APART.shape)))
     if column is not None:
         joined[:, :1] = column
     if block is None:
@@ -141,7 +152,8 @@ def _joined(column: Array | None, block: Travelling | None) -> Array | None:
     if block.friction is not None:
         joined[:, 1:3] = block.friction[:, None] * np.stack([np.ones_like(block.rate), block.rate], axis=1)
     elif column is not None:
-        joined[:, 3:] = column * APART[block.mode]
+        joined[:, 3 + block.mode] = np.tanh(column[:, 0] * rms(block.rate) / (SLOW * max(rms(column), NONE)))
+        joined[:, 3 + len(MODES) :] = column * APART[block.mode]
     return joined
 
 
@@ -156,23 +168,30 @@ def _contribution(variant: Variant, blocks: Blocks) -> Contribution:
 
 
 def _with_share(series: Array | None, block: Travelling | None, along: Array) -> Array | None:
-    drag, bend, *above = (float(number) for number in along)
+    drag, bend = (float(number) for number in along[:2])
     if block is None:
         return series
     if block.friction is None:
-        return None if series is None else (1 + above[block.mode]) * series
+        creeping, above = along[2:].reshape(2, -1)[:, block.mode]
+        return None if series is None else beyond_creeping(series, float(above), abs(float(creeping)))
     bend = max(abs(bend), NONE)
     dragged = drag / math.tanh(bend) * block.friction * np.tanh(bend * block.rate / RATE)
     return dragged if series is None else series + dragged
 
 
+def beyond_creeping(middle: Array, above: float, creeping: float) -> Array:
+    """What a vehicle shows (N,), by what it does in the middle, a share above one and how fast contacts creep."""
+    beyond = above * middle
+    return np.asarray(middle + beyond - creeping * np.tanh(beyond / max(creeping, NONE)))
+
+
 def _expected(values: Array, dragging: float) -> Array:
-    """How far a drag is from what wheels at that angle drag, and shares from one, in standard deviations."""
+    """How far a drag is from what wheels at that angle drag, creep from none and shares from one, in deviations."""
     if len(values) == 1:
         return np.zeros(0)
-    offset, drag, above = float(values[0]), float(values[1]), values[3:]
+    offset, drag, (creeping, above) = float(values[0]), float(values[1]), values[3:].reshape(2, -1)
     beyond = _beyond_expected(drag, offset, dragging)
-    return np.concatenate([[beyond], above / SHARE_STD, [above[:2].mean() / MEAN_STD]])
+    return np.concatenate([[beyond], creeping / CREEPING_STD, above / SHARE_STD, [above[:2].mean() / MEAN_STD]])
 
 
 def _beyond_expected(drag: float, angle: float, dragging: float) -> float:

@@ -15,7 +15,7 @@ from ident.diagnosis.answer.judge import judge
 from ident.diagnosis.answer.standing import Standing
 from ident.diagnosis.diagnosis import Verdict
 from ident.diagnosis.problem import Nominal, Problem, Variant
-from ident.diagnosis.search.asked import asked_of
+from ident.diagnosis.search.asked import Asked, asked_of
 from ident.diagnosis.search.search import Search
 from ident.diagnosis.search.slots import UNLISTED
 from ident.effects import EffectParameter
@@ -242,7 +242,27 @@ def test_what_is_known_to_come_and_go_stays_known_beside_a_cause(world: World) -
 def test_what_is_hardly_what_stands_there_is_not_named_though_its_likelier_rival_has_lost_the_place(
     world: World,
 ) -> None:
-    """A column that is four fifths of the true one: much likelier than nothing, and than nothing alone."""
+    asked, lost = _blended(world)
+    search = Search(asked.fitter).without(passed_over=lost)
+    state = search.run()
+    assert [asked.design.hypotheses[index].name for index in state.members] == ["a"]
+    left = better(Standing(asked, search, state, seed=1))
+    assert left is not None
+    assert not left[1].members
+
+
+def test_what_stood_beside_its_rival_as_that_lost_its_place_is_not_taken_for_it(world: World) -> None:
+    asked, lost = _blended(world)
+    members = Search(asked.fitter).without(passed_over=lost).run().members
+    search = Search(asked.fitter).without(passed_over=lost, beside=members)
+    assert all(not search.stands_for(index) for index in members)
+    slots = Standing(asked, search, search.run(), seed=1).slots
+    assert all(slots[index].lost(lost) > 0.99 for index in members)
+    assert all(slots[index].lost(search.stands_for(index)) < 0.01 for index in members)
+
+
+def _blended(world: World) -> tuple[Asked, set[int]]:
+    """A world of a cause, and another whose column is four fifths of it: much likelier than nothing, but hardly it."""
 
     def blended(problem: Problem) -> Problem:
         first, second, *rest = problem.candidates
@@ -252,10 +272,4 @@ def test_what_is_hardly_what_stands_there_is_not_named_though_its_likelier_rival
 
     made = world(7, true={"b": 0.5})
     asked = asked_of((blended(made.problem(0)), blended(made.problem(1))))
-    lost = {index for index, one in enumerate(asked.design.hypotheses) if one.name == "b"}
-    search = Search(asked.fitter).without(passed_over=lost)
-    state = search.run()
-    assert [asked.design.hypotheses[index].name for index in state.members] == ["a"]
-    left = better(Standing(asked, search, state, seed=1))
-    assert left is not None
-    assert not left[1].members
+    return asked, {index for index, one in enumerate(asked.design.hypotheses) if one.name == "b"}

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
 
 from ident.campaign.steps import EXCITATIONS
 from ident.diagnosis.problem import Candidate, Variant
-from ident.diagnosis.vehicle.causes.askew import MEAN_STD, RATE, Travelling, sliding_aside, with_shares
+from ident.diagnosis.vehicle.causes.askew import (
+    CREEPING_STD,
+    MEAN_STD,
+    RATE,
+    Travelling,
+    beyond_creeping,
+    sliding_aside,
+    with_shares,
+)
 from ident.plant import kinematics
 from ident.plant.modes import Mode
 from ident.records.record import Step
@@ -25,12 +34,39 @@ MODES = {Step.STRAIGHT: Mode.STEERED, Step.ROTATION: Mode.ROTATION}
 MASS, INERTIA, ADHESION = 842.0, 150.0, 0.8
 FASTEST, PERIOD = 0.5, 3.0
 DRAGGING = 100.0
+STILL = (0.0, 0.0, 0.0)
 
 
-def driven(step: Step, geometry: Geometry, offset: Array, slip: float, *, creeps: bool = False) -> tuple[float, float]:
-    """Share of what vehicles in the middle would show between left and right, and what drags over 2 μ N δ.
+@dataclass(frozen=True)
+class Drive:
+    """What a vehicle that stands askew does.
 
-    What drags is a force, or goes with the speed of the wheels where contacts creep: it is that at 1 m/s then.
+    Attributes:
+        shown, middle: (N,) between left and right, and what it would show in the middle [m/s].
+        lost: (N,) power that the contacts take by sliding aside [W].
+        speed: (N,) of the wheels [m/s].
+        grip: of all contacts on one side, times the angle [N].
+    """
+
+    shown: Array
+    middle: Array
+    lost: Array
+    speed: Array
+    grip: float
+
+    @property
+    def share(self) -> float:
+        """Of what it would show in the middle."""
+        return float(self.shown @ self.middle / (self.middle @ self.middle))
+
+    def drag(self, *, creeps: bool = False) -> float:
+        """What drags over 2 μ N δ: a force, or where contacts creep one that is so large at 1 m/s."""
+        rolled = self.speed**2 if creeps else self.speed
+        return float(self.lost @ rolled / (rolled @ rolled) / self.grip)
+
+
+def driven(step: Step, geometry: Geometry, offset: Array, slip: float) -> Drive:
+    """A drive of a vehicle whose steering has offsets.
 
     A rigid body on four contacts that carry μ N across the wheels from a slip of some `slip` [m/s] on, and along them
     the same traction each, so large that its coordinate moves as a sinusoid.
@@ -65,9 +101,7 @@ def driven(step: Step, geometry: Geometry, offset: Array, slip: float, *, creeps
     middle = told_left - true_left
     lost = -np.einsum("ni,ni->n", [across(twist) for twist in twists], twists @ true[:4, :3].T)
     speed = np.abs(twists @ true[4:, :3].T).mean(axis=1)
-    share = float(told_left @ middle / (middle @ middle))
-    rolled_off = speed**2 if creeps else speed
-    return share, float(lost @ rolled_off / (rolled_off @ rolled_off) / (2 * grip * np.abs(offset).sum()))
+    return Drive(told_left, middle, np.asarray(lost), np.asarray(speed), float(2 * grip * np.abs(offset).sum()))
 
 
 def _left_right(matrix: Array, rolled: Array, senses: Array) -> Array:
@@ -80,7 +114,7 @@ def _left_right(matrix: Array, rolled: Array, senses: Array) -> Array:
 def test_shares_of_driving_straight_and_of_turning_are_one_on_average(
     offset: tuple[float, float], slip: float, geometry: Geometry
 ) -> None:
-    shares = [driven(step, geometry, np.array(offset), slip)[0] for step in (Step.STRAIGHT, Step.ROTATION)]
+    shares = [driven(step, geometry, np.array(offset), slip).share for step in (Step.STRAIGHT, Step.ROTATION)]
     assert np.mean(shares) == pytest.approx(1.0, abs=2 * MEAN_STD)
     assert all(-0.1 < share < 2.1 for share in shares)
 
@@ -89,14 +123,39 @@ def test_a_vehicle_follows_the_side_that_drags_where_contacts_slide_and_takes_th
     geometry: Geometry,
 ) -> None:
     outward, inward = np.array([5e-3, 0.0]), np.array([-5e-3, 0.0])
-    assert driven(Step.STRAIGHT, geometry, outward, 1e-5)[0] > 1.6
-    assert driven(Step.STRAIGHT, geometry, inward, 1e-5)[0] < 0.4
-    assert driven(Step.STRAIGHT, geometry, outward, 1e-2)[0] == pytest.approx(1.0, abs=0.01)
+    assert driven(Step.STRAIGHT, geometry, outward, 1e-5).share > 1.6
+    assert driven(Step.STRAIGHT, geometry, inward, 1e-5).share < 0.4
+    assert driven(Step.STRAIGHT, geometry, outward, 1e-2).share == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("step", [Step.STRAIGHT, Step.ROTATION])
+@pytest.mark.parametrize("offset", [5e-3, -5e-3])
+def test_where_contacts_slide_the_share_is_none_or_two_but_at_speeds_at_which_they_creep(
+    offset: float, step: Step, geometry: Geometry
+) -> None:
+    drive = driven(step, geometry, np.array([offset, 0.0]), 1e-5)
+
+    def left(numbers: Array) -> Array:
+        return (beyond_creeping(drive.middle, numbers[0], numbers[1] * CREEPING_STD) - drive.shown) / CREEPING_STD
+
+    alone = drive.shown - drive.share * drive.middle
+    found = least_squares(left, [drive.share - 1, 0.1])
+    above, creeping = found.x
+    assert abs(above) == pytest.approx(1.0, abs=0.02)
+    assert creeping * CREEPING_STD == pytest.approx(1e-4, rel=0.3)
+    assert np.linalg.norm(found.fun) * CREEPING_STD < 0.3 * np.linalg.norm(alone)
+
+
+def test_up_to_the_speed_of_creep_a_vehicle_takes_the_middle_and_beyond_lacks_it() -> None:
+    slow, fast = beyond_creeping(np.array([1e-6, 1.0]), 0.9, 1e-4)
+    assert slow == pytest.approx(1e-6, rel=1e-3)
+    assert fast == pytest.approx(1.9 - 1e-4)
+    assert beyond_creeping(np.array([0.3]), -0.5, 0.0) == pytest.approx(0.15)
 
 
 def test_wheels_that_slide_aside_drag_by_their_grip_and_the_angle_in_every_drive(geometry: Geometry) -> None:
     for step in (Step.STRAIGHT, Step.ROTATION):
-        lost = driven(step, geometry, np.array([5e-3, 0.0]), 1e-5)[1]
+        lost = driven(step, geometry, np.array([5e-3, 0.0]), 1e-5).drag()
         assert lost == pytest.approx(sliding_aside(MODES[step], geometry), rel=0.01)
 
 
@@ -104,7 +163,7 @@ def test_where_contacts_creep_the_drag_goes_with_the_square_of_how_fast_axes_are
     geometry: Geometry,
 ) -> None:
     straight, turning = (
-        driven(step, geometry, np.array([5e-3, 0.0]), 1e-2, creeps=True)[1] for step in (Step.STRAIGHT, Step.ROTATION)
+        driven(step, geometry, np.array([5e-3, 0.0]), 1e-2).drag(creeps=True) for step in (Step.STRAIGHT, Step.ROTATION)
     )
     assert turning / straight == pytest.approx(sliding_aside(Mode.ROTATION, geometry) ** 2, rel=0.03)
 
@@ -134,7 +193,7 @@ def test_a_cause_without_shares_is_itself(shared: Candidate) -> None:
 
 
 def test_a_share_belongs_to_the_rolling_rows_of_its_drive_and_a_drag_to_its_travel(shared: Candidate) -> None:
-    first, second, travel, rest = _form(shared)(np.array([0.5, 0.25, 1e3, 0.8, -0.8, 0.0]))
+    first, second, travel, rest = _form(shared)(np.array([0.5, 0.25, 1e3, *STILL, 0.8, -0.8, 0.0]))
     assert first == pytest.approx([0.9, 1.8])
     assert second == pytest.approx([0.1, 0.2])
     assert travel == pytest.approx([0.5, -0.5])
@@ -142,14 +201,14 @@ def test_a_share_belongs_to_the_rolling_rows_of_its_drive_and_a_drag_to_its_trav
 
 
 def test_a_drag_without_a_bend_goes_with_the_rate(shared: Candidate) -> None:
-    slow, fast = (abs(float(_form(shared)(np.array([0.0, 0.25, bend, 0.0, 0.0, 0.0]))[2][0])) for bend in (0.0, 1e3))  # type: ignore[index]
+    slow, fast = (abs(float(_form(shared)(np.array([0.0, 0.25, bend, *STILL, *STILL]))[2][0])) for bend in (0.0, 1e3))  # type: ignore[index]
     assert slow == pytest.approx(0.25 * 2.0 / RATE, rel=1e-3)
     assert fast == pytest.approx(0.25 * 2.0)
 
 
 def test_columns_and_form_of_shares_agree_where_wheels_are_fast(shared: Candidate) -> None:
     wide = shared.variants[-1]
-    coefficients = np.array([0.3, 0.2, 0.0, 0.1, 0.0])
+    coefficients = np.array([0.3, 0.2, 0.0, -1e-3, 2e-3, 0.0, 0.1, 0.0])
     assert wide.start is not None
     numbers = wide.start(coefficients)
     for column, series in zip(wide.columns, _form(shared)(numbers), strict=True):
@@ -161,7 +220,7 @@ def test_columns_and_form_of_shares_agree_where_wheels_are_fast(shared: Candidat
 def test_a_drag_is_expected_to_be_that_of_wheels_turned_aside_so_far(shared: Candidate) -> None:
     assert shared.expected is not None
     none, half, whole = (
-        float(shared.expected(np.array([0.01, share * DRAGGING * 0.01, 1.0, 0.0, 0.0, 0.0]))[0])
+        float(shared.expected(np.array([0.01, share * DRAGGING * 0.01, 1.0, *STILL, *STILL]))[0])
         for share in (0, 0.5, 1)
     )
     assert (none, half, whole) == pytest.approx((-1.0, 0.0, 1.0))
@@ -175,7 +234,9 @@ def test_what_no_row_shows_of_an_offset_stays_nothing(shared: Candidate) -> None
 
 def test_a_mean_share_other_than_one_is_unexpected(shared: Candidate) -> None:
     assert shared.expected is not None
-    apart, both = (shared.expected(np.array([0.5, 0.1, 1.0, *above, 0.0])) for above in ((0.9, -0.9), (0.5, 0.5)))
+    apart, both = (
+        shared.expected(np.array([0.5, 0.1, 1.0, *STILL, *above, 0.0])) for above in ((0.9, -0.9), (0.5, 0.5))
+    )
     assert apart[-1] == pytest.approx(0.0)
     assert both[-1] == pytest.approx(0.5 / MEAN_STD)
     assert len(shared.expected(np.array([0.5]))) == 0
