@@ -20,7 +20,7 @@ INSTEAD: Final = 2
 """Names that may stand for a law."""
 
 SURVIVORS: Final = 3
-"""Hypotheses that are fitted exactly at every step, by either noise: of 1015 steps on four records of robots, whose
+"""Names, and laws, that are fitted exactly in a round, by either noise: of 1015 steps on four records of robots, whose
 sets are large, 3 took a later one, and none of 57 on vehicles."""
 
 ROUNDS: Final = 2

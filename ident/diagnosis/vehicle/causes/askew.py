@@ -8,7 +8,7 @@ it shows twice in one and not at all in the other. Every kind of drive therefore
 straight and turning on the spot, in which the same side drags the other way, shares are one on average.
 
 No contact is all dry: up to some speed of sliding it creeps, so every vehicle that drives slowly takes the middle.
-What a share adds to the middle begins there, and lacks that speed beyond it.
+What a share adds to the middle begins there, and lacks some speed beyond it, against the share.
 
 That is so of an angle that stays. What a coupling gives way by follows the traction, and has no share; but the wheel
 behind it drags as well, by the grip of the ground times the angle by which it stands askew.
@@ -38,17 +38,18 @@ ADHESION: Final = 0.5
 """Of the friction of the floor, and its deviation: what wheels that slide aside drag with is between none of it and dry
 concrete's [-]."""
 
-MEAN_STD: Final = 0.05
+MEAN_STD: Final = 0.1
 """Of the mean share of driving straight and turning on the spot about one [-].
 
 Dry contacts, integrated for offsets of 1 to 5 mrad of either side and sign and slips from 0.01 to 10 mm/s, have 0.93 to
-1.06 (`tests/ident/diagnosis/vehicle/causes/test_shares_of_an_askew_wheel.py`).
+1.06 (`tests/ident/diagnosis/vehicle/causes/test_shares_of_an_askew_wheel.py`); five offsets in MuJoCo, at speeds at
+which contacts do not creep, 0.84 to 0.91.
 """
 
-CREEPING_STD: Final = 5e-4
-"""Of the speed up to which a vehicle on contacts that slide aside stays in the middle [m/s].
+LACKING_STD: Final = 5e-4
+"""Of the speed that what a share adds lacks, because contacts that slide aside creep at first [m/s].
 
-Dry contacts, integrated as for `MEAN_STD`, have 0.1 mm/s where they slip by 0.01, and 0.9 where they slip by 0.05; from
+Dry contacts, integrated as for `MEAN_STD`, lack 0.1 mm/s where they slip by 0.01, and 0.9 where they slip by 0.05; from
 0.1 on vehicles take the middle anyway.
 """
 
@@ -103,7 +104,7 @@ def with_shares(candidate: Candidate, blocks: Blocks, dragging: float) -> Candid
     """An offset of the steering that may have a share in the rolling rows of every mode, its wheels then dragging.
 
     Behind the offset come the friction at every wheel that drags as much at `RATE` [Nm], how it bends up to that [-],
-    the speed up to which contacts creep in every mode [m/s], and by how much its share is above one.
+    the speed that every mode lacks beyond creeping [m/s], and by how much its share is above one.
 
     Args:
         candidate: linear in its one number.
@@ -127,7 +128,7 @@ def _shared(variant: Variant, blocks: Blocks) -> Variant:
     def numbers(found: Array) -> Array:
         offset, line, lacking, apart = found[0], found[1:3], found[3 : 3 + len(MODES)], found[3 + len(MODES) :]
         above = APART @ apart / offset if offset else np.zeros(len(MODES))
-        return np.concatenate([[offset], _bent(*line.tolist()), np.maximum(-np.sign(above) * lacking, 0.0), above])
+        return np.concatenate([[offset], _bent(*line.tolist()), lacking, above])
 
     columns = [_joined(column, block) for column, block in zip(variant.columns, blocks, strict=True)]
     return Variant(tuple(columns), numbers, beside=2 + sum(APART.shape), itself=False)
@@ -152,7 +153,7 @@ def _joined(column: Array | None, block: Travelling | None) -> Array | None:
     if block.friction is not None:
         joined[:, 1:3] = block.friction[:, None] * np.stack([np.ones_like(block.rate), block.rate], axis=1)
     elif column is not None:
-        joined[:, 3 + block.mode] = np.tanh(column[:, 0] * rms(block.rate) / (SLOW * max(rms(column), NONE)))
+        joined[:, 3 + block.mode] = -beyond_creeping(column[:, 0], block.rate)
         joined[:, 3 + len(MODES) :] = column * APART[block.mode]
     return joined
 
@@ -172,26 +173,25 @@ def _with_share(series: Array | None, block: Travelling | None, along: Array) ->
     if block is None:
         return series
     if block.friction is None:
-        creeping, above = along[2:].reshape(2, -1)[:, block.mode]
-        return None if series is None else beyond_creeping(series, float(above), abs(float(creeping)))
+        lacking, above = along[2:].reshape(2, -1)[:, block.mode]
+        return None if series is None else (1 + above) * series - lacking * beyond_creeping(series, block.rate)
     bend = max(abs(bend), NONE)
     dragged = drag / math.tanh(bend) * block.friction * np.tanh(bend * block.rate / RATE)
     return dragged if series is None else series + dragged
 
 
-def beyond_creeping(middle: Array, above: float, creeping: float) -> Array:
-    """What a vehicle shows (N,), by what it does in the middle, a share above one and how fast contacts creep."""
-    beyond = above * middle
-    return np.asarray(middle + beyond - creeping * np.tanh(beyond / max(creeping, NONE)))
+def beyond_creeping(shown: Array, rate: Array) -> Array:
+    """The direction (N,) of what a vehicle shows, where its wheels are faster than contacts creep; `rate` is theirs."""
+    return np.asarray(np.tanh(shown * rms(rate) / (SLOW * max(rms(shown), NONE))))
 
 
 def _expected(values: Array, dragging: float) -> Array:
-    """How far a drag is from what wheels at that angle drag, creep from none and shares from one, in deviations."""
+    """How far a drag is from what wheels at that angle drag, what is lacking from none and shares from one."""
     if len(values) == 1:
         return np.zeros(0)
-    offset, drag, (creeping, above) = float(values[0]), float(values[1]), values[3:].reshape(2, -1)
+    offset, drag, (lacking, above) = float(values[0]), float(values[1]), values[3:].reshape(2, -1)
     beyond = _beyond_expected(drag, offset, dragging)
-    return np.concatenate([[beyond], creeping / CREEPING_STD, above / SHARE_STD, [above[:2].mean() / MEAN_STD]])
+    return np.concatenate([[beyond], lacking / LACKING_STD, above / SHARE_STD, [above[:2].mean() / MEAN_STD]])
 
 
 def _beyond_expected(drag: float, angle: float, dragging: float) -> float:
