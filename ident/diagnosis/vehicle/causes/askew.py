@@ -159,22 +159,28 @@ def _joined(column: Array | None, block: Travelling | None) -> Array | None:
 
 
 def _contribution(variant: Variant, blocks: Blocks) -> Contribution:
+    directions = [
+        None if column is None or block is None else beyond_creeping(column[:, 0], block.rate)
+        for column, block in zip(variant.columns, blocks, strict=True)
+    ]
+
     def contribution(values: Array, _parameters: Array) -> Sequence[Array | None]:
         found = [None if column is None else values[0] * column[:, 0] for column in variant.columns]
         if len(values) == 1:
             return found
-        return [_with_share(series, block, values[1:]) for series, block in zip(found, blocks, strict=True)]
+        every = zip(found, directions, blocks, strict=True)
+        return [_with_share(series, direction, block, values[1:]) for series, direction, block in every]
 
     return contribution
 
 
-def _with_share(series: Array | None, block: Travelling | None, along: Array) -> Array | None:
+def _with_share(series: Array | None, direction: Array | None, block: Travelling | None, along: Array) -> Array | None:
     drag, bend = (float(number) for number in along[:2])
     if block is None:
         return series
     if block.friction is None:
         lacking, above = along[2:].reshape(2, -1)[:, block.mode]
-        return None if series is None else (1 + above) * series - lacking * beyond_creeping(series, block.rate)
+        return None if series is None or direction is None else (1 + above) * series - lacking * direction
     bend = max(abs(bend), NONE)
     dragged = drag / math.tanh(bend) * block.friction * np.tanh(bend * block.rate / RATE)
     return dragged if series is None else series + dragged
