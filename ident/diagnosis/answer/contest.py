@@ -40,7 +40,11 @@ def better(standing: Standing) -> tuple[Search, State] | None:
     # What follows asks for exact refits, which a set that loses a member before is not worth.
     if trifling := _trifling(standing):
         return _without(standing, trifling, passed_over=trifling)
-    refuted = _sizeless(standing) or _contradicted(standing) or _needless(standing)
+    if sizeless := _sizeless(standing):
+        lost = _closing_least(standing, sizeless)
+        # What trades for another has no size beside it, and may be what is there.
+        return _without(standing, lost, passed_over=lost) if sizeless[1:] else _without(standing, lost, refuted=lost)
+    refuted = _contradicted(standing) or _needless(standing)
     return _without(standing, refuted, refuted=refuted) if refuted else None
 
 
@@ -78,8 +82,8 @@ def _doubted(standing: Standing) -> list[int]:
 
 
 def _sizeless(standing: Standing) -> list[int]:
-    """All members that are of no size of their own."""
-    return [index for place, index in enumerate(standing.taken.variants) if not _has_size(standing, place)]
+    """Places of all members that are of no size of their own."""
+    return [place for place in range(standing.fitted.count) if not _has_size(standing, place)]
 
 
 def _trifling(standing: Standing) -> list[int]:
