@@ -11,7 +11,7 @@ import numpy as np
 from ident.diagnosis.answer.standing import OPEN, Standing
 from ident.diagnosis.check.against import deviations_against
 from ident.diagnosis.check.remainder import mostly_tolerated
-from ident.diagnosis.check.sized import ITS_OWN, SURELY, is_foreign, is_nothing, is_sizeless
+from ident.diagnosis.check.sized import ITS_OWN, SURELY, is_alone, is_foreign, is_sizeless
 from ident.diagnosis.evidence.state import State
 from ident.diagnosis.law.answer import curve_of
 from ident.diagnosis.search.search import Search
@@ -40,12 +40,13 @@ def better(standing: Standing) -> tuple[Search, State] | None:
     # What follows asks for exact refits, which a set that loses a member before is not worth.
     if trifling := _trifling(standing):
         return _without(standing, trifling, passed_over=trifling)
-    if sizeless := _sizeless(standing):
-        lost = _closing_least(standing, sizeless)
-        # What trades for another has no size beside it, and may be what is there.
-        return _without(standing, lost, passed_over=lost) if sizeless[1:] else _without(standing, lost, refuted=lost)
-    refuted = _contradicted(standing) or _needless(standing)
-    return _without(standing, refuted, refuted=refuted) if refuted else None
+    if contradicted := _contradicted(standing):
+        return _without(standing, contradicted, refuted=contradicted)
+    if vain := _closing_least(standing, _sizeless(standing) or _needless(standing)):
+        # What trades for another has no size beside it and closes nothing more, and may be what is there.
+        alone = len(standing.state.members) == 1
+        return _without(standing, vain, refuted=vain) if alone else _without(standing, vain, passed_over=vain)
+    return None
 
 
 def _without(
@@ -119,9 +120,9 @@ def _contradicted(standing: Standing) -> list[int]:
 
 
 def _needless(standing: Standing) -> list[int]:
-    """The member that closes least, if that is next to nothing beside others, or where there is a gap to close."""
+    """Places of members that close next to nothing beside others, or where there is a gap to close."""
     trifles = [place for place in range(standing.fitted.count) if not _pays(standing, place)]
-    return _closing_least(standing, trifles) if standing.fitted.count > 1 or standing.is_measurable else []
+    return trifles if standing.fitted.count > 1 or standing.is_measurable else []
 
 
 def _closing_least(standing: Standing, places: Sequence[int]) -> list[int]:
@@ -136,12 +137,14 @@ def _pays(standing: Standing, place: int) -> bool:
 
 
 def _has_size(standing: Standing, place: int) -> bool:
-    """Whether a size is surely not zero, and its own, and the numbers are of the effect's family.
+    """Whether the numbers are of the effect's family, and the size is surely not zero, and its own.
 
     Numbers that trade for each other, as a friction and the speed at which it falls off, have wide deviations each:
     an effect of the family without which most of the held-out gap stays is surely not zero.
     """
     candidate, part = standing.fitted.candidate(place), standing.fitted.after.parts[place]
-    if is_nothing(candidate, part):
-        return not is_foreign(candidate, part) and standing.is_measurable and standing.fitted.lacking[place] > OPEN
-    return not is_sizeless(candidate, part)
+    if is_foreign(candidate, part):
+        return False
+    if not is_sizeless(candidate, part):
+        return True
+    return is_alone(part) and standing.is_measurable and standing.fitted.lacking[place] > OPEN

@@ -14,7 +14,7 @@ from ident.diagnosis.answer.findings import Findings
 from ident.diagnosis.answer.judge import judge
 from ident.diagnosis.answer.standing import Standing
 from ident.diagnosis.diagnosis import Verdict
-from ident.diagnosis.problem import Nominal, Problem, Variant
+from ident.diagnosis.problem import Candidate, Nominal, Problem, Variant
 from ident.diagnosis.search.asked import Asked, asked_of
 from ident.diagnosis.search.search import Search
 from ident.diagnosis.search.slots import UNLISTED
@@ -259,6 +259,26 @@ def test_what_stood_beside_its_rival_as_that_lost_its_place_is_not_taken_for_it(
     slots = Standing(asked, search, search.run(), seed=1).slots
     assert all(slots[index].lost(lost) > 0.99 for index in members)
     assert all(slots[index].lost(search.stands_for(index)) < 0.01 for index in members)
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_of_two_that_trade_for_each_other_one_is_named_with_the_size_of_both(world: World, seed: int) -> None:
+    """Both give way to their own size, so that two of half of it are nearer to what is there than one."""
+
+    def giving_way(problem: Problem) -> Problem:
+        less = problem.candidate("d@place").variants[0].columns
+
+        def bent(candidate: Candidate) -> Candidate:
+            pairs = list(zip(candidate.variants[0].columns, less, strict=True))
+            return replace(candidate, contribution=lambda v, _: [v[0] * (x - v[0] * y)[:, 0] for x, y in pairs])
+
+        candidates = [bent(one) for one in problem.candidates if one.effect in ("b", "c")]
+        return replace(problem, candidates=tuple(candidates))
+
+    made = world(seed, true={"b": 1.0, "d": -0.5}, alike={"c": "b"})
+    findings = judge(giving_way(made.problem(0)), giving_way(made.problem(1)), seed=1)
+    assert named(findings) == ["c"]
+    assert findings.causes[0].part.values[0] > 10 * findings.causes[0].part.std[0]
 
 
 def _blended(world: World) -> tuple[Asked, set[int]]:
