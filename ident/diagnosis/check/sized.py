@@ -30,7 +30,7 @@ def is_foreign(candidate: Candidate, part: Part) -> bool:
 def is_sizeless(candidate: Candidate, part: Part) -> bool:
     """Whether the size of an effect may be zero: of linear ones any number is a size, of others the first.
 
-    What comes along is the explanation then, or neither is one. Where that is there, a size has to be its own beside it.
+    What comes along is the explanation then, or neither is one. Where that is there, a size has to be its own.
     """
     along, size = slice(len(part.values), None), slice(None if candidate.contribution is None else 1)
     least = SURELY * part.scatter[: len(part.values)]
