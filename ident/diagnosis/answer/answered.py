@@ -118,7 +118,7 @@ def _verdict(standing: Standing) -> Verdict:
 
 def _nameless(standing: Standing) -> bool:
     """Whether something that the records refuted is likelier than nothing: what came along with it is there."""
-    refuted = standing.search.refuted - standing.search.fitter.invisible
+    refuted = standing.search.refuted.keys() - standing.search.fitter.invisible
     return any(log > 0 for index, log in standing.odds_beside.items() if index in refuted)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 import numpy as np
@@ -13,6 +13,7 @@ from ident.diagnosis.check.against import deviations_against
 from ident.diagnosis.check.remainder import mostly_tolerated
 from ident.diagnosis.check.sized import ITS_OWN, SURELY, is_alone, is_foreign, is_sizeless
 from ident.diagnosis.evidence.state import State
+from ident.diagnosis.evidence.tables import Member
 from ident.diagnosis.law.answer import curve_of
 from ident.diagnosis.search.search import Search
 
@@ -34,28 +35,37 @@ def better(standing: Standing) -> tuple[Search, State] | None:
     """
     # The search, in whose other places something else stood, would take again what is doubted.
     if doubted := _doubted(standing):
-        return _without(standing, doubted, passed_over=doubted)
+        return _passed_over(standing, doubted)
     if (corrected := _corrected(standing)) is not None:
         return corrected
     # What follows asks for exact refits, which a set that loses a member before is not worth.
     if trifling := _trifling(standing):
-        return _without(standing, trifling, passed_over=trifling)
+        return _passed_over(standing, trifling)
     if contradicted := _contradicted(standing):
-        return _without(standing, contradicted, refuted=contradicted)
+        return _refuted(standing, contradicted, beside=())
     if vain := _closing_least(standing, _sizeless(standing) or _needless(standing)):
         # What trades for another has no size beside it and closes nothing more, and may be what is there.
-        alone = len(standing.state.members) == 1
-        return _without(standing, vain, refuted=vain) if alone else _without(standing, vain, passed_over=vain)
+        return _refuted(standing, vain, beside=_others(standing, vain))
     return None
 
 
-def _without(
-    standing: Standing, lost: Sequence[int], *, refuted: Sequence[int] = (), passed_over: Sequence[int] = ()
-) -> tuple[Search, State]:
-    """The search and its set without members that have lost their places."""
-    left = {index: one for index, one in standing.state.members.items() if index not in lost}
-    search = standing.search.without(refuted=refuted, passed_over=passed_over, beside=left)
-    return search, search.further(search.fitter.state(left, standing.state))
+def _others(standing: Standing, lost: Sequence[int]) -> dict[int, Member]:
+    """Members that have not lost their places."""
+    return {index: one for index, one in standing.state.members.items() if index not in lost}
+
+
+def _passed_over(standing: Standing, lost: Sequence[int]) -> tuple[Search, State]:
+    """The search and its set without members that are less likely than something else there."""
+    return _gone_on(standing, lost, standing.search.passing_over(lost, _others(standing, lost)))
+
+
+def _refuted(standing: Standing, lost: Sequence[int], beside: Collection[int]) -> tuple[Search, State]:
+    """The search and its set without members that are refuted, but as rivals of some."""
+    return _gone_on(standing, lost, standing.search.refuting(lost, beside))
+
+
+def _gone_on(standing: Standing, lost: Sequence[int], search: Search) -> tuple[Search, State]:
+    return search, search.further(search.fitter.state(_others(standing, lost), standing.state))
 
 
 def _corrected(standing: Standing) -> tuple[Search, State] | None:
@@ -68,7 +78,7 @@ def _corrected(standing: Standing) -> tuple[Search, State] | None:
     if not places:
         return None
     _, rival, index = max(places)
-    search = standing.search.without(passed_over=[index], beside=standing.state.without(index))
+    search = standing.search.passing_over([index], standing.state.without(index))
     return search, search.further(standing.slots[index].rivals[rival])
 
 

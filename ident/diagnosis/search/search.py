@@ -30,6 +30,9 @@ MARGIN: Final = 4.0
 """Log posterior below the best one's from which a hypothesis is not fitted exactly."""
 
 
+Beside = Mapping[int, frozenset[int]]
+"""Hypotheses that lost their places, and what stood beside each then, by number."""
+
 Promises = Mapping[int, tuple[float, Member]]
 """Log odds of a hypothesis by its columns, and its numbers, by number of the hypothesis."""
 
@@ -39,35 +42,39 @@ class Search:
 
     Args:
         fitter: of the sets.
-        refuted: hypotheses that the records speak against, or that make no difference held out.
+        refuted: hypotheses that the records speak against, or that have no size or make no difference beside others,
+            and those others, whose rivals they still are.
         passed_over: those that nothing, or another one, is more likely than, and what stood beside each then; what did
             not may still be taken for it.
     """
 
     def __init__(
-        self,
-        fitter: Fitter,
-        refuted: frozenset[int] = frozenset(),
-        passed_over: Mapping[int, frozenset[int]] = MappingProxyType({}),
+        self, fitter: Fitter, refuted: Beside = MappingProxyType({}), passed_over: Beside = MappingProxyType({})
     ) -> None:
         self.fitter, self.design = fitter, fitter.design
-        self.refuted, self.passed_over = refuted | fitter.invisible, passed_over
+        self.refuted: Beside = {**dict.fromkeys(fitter.invisible, frozenset[int]()), **refuted}
+        self.passed_over = passed_over
 
-    def without(
-        self, *, refuted: Collection[int] = (), passed_over: Collection[int] = (), beside: Collection[int] = ()
-    ) -> Search:
-        """The same search, some hypotheses more refuted, or passed over beside what stands."""
-        further = dict.fromkeys(passed_over, frozenset(beside))
-        return Search(self.fitter, self.refuted | frozenset(refuted), {**self.passed_over, **further})
+    def refuting(self, lost: Collection[int], beside: Collection[int] = ()) -> Search:
+        """The same search, some hypotheses more refuted; what they trade for has them for rivals."""
+        return Search(self.fitter, {**self.refuted, **dict.fromkeys(lost, frozenset(beside))}, self.passed_over)
+
+    def passing_over(self, lost: Collection[int], beside: Collection[int] = ()) -> Search:
+        """The same search, some hypotheses more passed over beside what stands."""
+        return Search(self.fitter, self.refuted, {**self.passed_over, **dict.fromkeys(lost, frozenset(beside))})
 
     @property
     def barred(self) -> frozenset[int]:
         """Hypotheses that are not looked for any more."""
-        return self.refuted.union(self.passed_over)
+        return frozenset({**self.refuted, **self.passed_over})
 
     def stands_for(self, index: int) -> frozenset[int]:
         """Those passed over that a member may have been taken for: it did not stand beside them."""
         return frozenset(one for one, beside in self.passed_over.items() if index not in beside)
+
+    def may_stand(self, one: int, index: int) -> bool:
+        """Whether a hypothesis is a rival in the place of a member."""
+        return one not in self.refuted or index in self.refuted[one]
 
     def run(self) -> State:
         """The best set that was found."""

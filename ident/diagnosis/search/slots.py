@@ -156,7 +156,7 @@ class _Place:
         base = without.log_posterior - self._bare if math.isfinite(without.log_posterior) else 0.0
         self.logs, self._costs, self.rivals = dict[int, float](), dict[int, float](), dict[int, State]()
         hypotheses = search.design.hypotheses
-        possible = [one for one in range(len(hypotheses)) if one not in others and one not in search.refuted]
+        possible = [one for one in range(len(hypotheses)) if one not in others and search.may_stand(one, index)]
         for number, table in self._target.tables(possible, self._beside).items():
             if table.is_there:
                 self.logs[number] = base + table.total - hypotheses[number].price

@@ -243,7 +243,7 @@ def test_what_is_hardly_what_stands_there_is_not_named_though_its_likelier_rival
     world: World,
 ) -> None:
     asked, lost = _blended(world)
-    search = Search(asked.fitter).without(passed_over=lost)
+    search = Search(asked.fitter).passing_over(lost)
     state = search.run()
     assert [asked.design.hypotheses[index].name for index in state.members] == ["a"]
     left = better(Standing(asked, search, state, seed=1))
@@ -253,8 +253,8 @@ def test_what_is_hardly_what_stands_there_is_not_named_though_its_likelier_rival
 
 def test_what_stood_beside_its_rival_as_that_lost_its_place_is_not_taken_for_it(world: World) -> None:
     asked, lost = _blended(world)
-    members = Search(asked.fitter).without(passed_over=lost).run().members
-    search = Search(asked.fitter).without(passed_over=lost, beside=members)
+    members = Search(asked.fitter).passing_over(lost).run().members
+    search = Search(asked.fitter).passing_over(lost, beside=members)
     assert all(not search.stands_for(index) for index in members)
     slots = Standing(asked, search, search.run(), seed=1).slots
     assert all(slots[index].lost(lost) > 0.99 for index in members)

@@ -37,7 +37,19 @@ def test_what_promises_most_and_keeps_none_of_it_does_not_hide_what_is_there(wor
 
 def test_what_stood_beside_another_as_that_lost_its_place_is_not_taken_for_it(world: World) -> None:
     made = world(7)
-    search = Search(asked_of((made.problem(0), made.problem(1))).fitter).without(passed_over=[1], beside=[0])
+    search = Search(asked_of((made.problem(0), made.problem(1))).fitter).passing_over([1], beside=[0])
     assert search.barred >= {1}
     assert search.stands_for(0) == frozenset()
     assert search.stands_for(2) == {1}
+
+
+def test_what_is_refuted_beside_another_is_a_rival_of_that_alone(world: World) -> None:
+    made = world(7)
+    search = Search(asked_of((made.problem(0), made.problem(1))).fitter).refuting([1], beside=[0]).refuting([3])
+    assert search.barred >= {1, 3}
+    assert [search.may_stand(one, index) for one, index in ((1, 0), (1, 2), (3, 0), (4, 0))] == [
+        True,
+        False,
+        False,
+        True,
+    ]
