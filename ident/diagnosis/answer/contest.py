@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -13,7 +13,6 @@ from ident.diagnosis.check.against import deviations_against
 from ident.diagnosis.check.remainder import mostly_tolerated
 from ident.diagnosis.check.sized import ITS_OWN, SURELY, is_alone, is_foreign, is_sizeless
 from ident.diagnosis.evidence.state import State
-from ident.diagnosis.evidence.tables import Member
 from ident.diagnosis.law.answer import curve_of
 from ident.diagnosis.search.search import Search
 
@@ -33,39 +32,27 @@ def better(standing: Standing) -> tuple[Search, State] | None:
     Less likely there than nothing or than a rival, a trifle, of no size, what confirming rows speak against, or making
     no difference.
     """
+    search, members = standing.search, standing.state.members
     # The search, in whose other places something else stood, would take again what is doubted.
     if doubted := _doubted(standing):
-        return _passed_over(standing, doubted)
+        return _without(standing, doubted, search.passing_over(doubted, members))
     if (corrected := _corrected(standing)) is not None:
         return corrected
     # What follows asks for exact refits, which a set that loses a member before is not worth.
     if trifling := _trifling(standing):
-        return _passed_over(standing, trifling)
+        return _without(standing, trifling, search.passing_over(trifling, members))
     if contradicted := _contradicted(standing):
-        return _refuted(standing, contradicted, beside=())
+        return _without(standing, contradicted, search.refuting(contradicted))
     if vain := _closing_least(standing, _sizeless(standing) or _needless(standing)):
         # What trades for another has no size beside it and closes nothing more, and may be what is there.
-        return _refuted(standing, vain, beside=_others(standing, vain))
+        return _without(standing, vain, search.refuting(vain, members))
     return None
 
 
-def _others(standing: Standing, lost: Sequence[int]) -> dict[int, Member]:
-    """Members that have not lost their places."""
-    return {index: one for index, one in standing.state.members.items() if index not in lost}
-
-
-def _passed_over(standing: Standing, lost: Sequence[int]) -> tuple[Search, State]:
-    """The search and its set without members that are less likely than something else there."""
-    return _gone_on(standing, lost, standing.search.passing_over(lost, _others(standing, lost)))
-
-
-def _refuted(standing: Standing, lost: Sequence[int], beside: Collection[int]) -> tuple[Search, State]:
-    """The search and its set without members that are refuted, but as rivals of some."""
-    return _gone_on(standing, lost, standing.search.refuting(lost, beside))
-
-
-def _gone_on(standing: Standing, lost: Sequence[int], search: Search) -> tuple[Search, State]:
-    return search, search.further(search.fitter.state(_others(standing, lost), standing.state))
+def _without(standing: Standing, lost: Sequence[int], search: Search) -> tuple[Search, State]:
+    """The search and its set without members that have lost their places."""
+    left = {index: one for index, one in standing.state.members.items() if index not in lost}
+    return search, search.further(search.fitter.state(left, standing.state))
 
 
 def _corrected(standing: Standing) -> tuple[Search, State] | None:
@@ -78,7 +65,7 @@ def _corrected(standing: Standing) -> tuple[Search, State] | None:
     if not places:
         return None
     _, rival, index = max(places)
-    search = standing.search.passing_over([index], standing.state.without(index))
+    search = standing.search.passing_over([index], standing.state.members)
     return search, search.further(standing.slots[index].rivals[rival])
 
 

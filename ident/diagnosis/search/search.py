@@ -30,8 +30,8 @@ MARGIN: Final = 4.0
 """Log posterior below the best one's from which a hypothesis is not fitted exactly."""
 
 
-Beside = Mapping[int, frozenset[int]]
-"""Hypotheses that lost their places, and what stood beside each then, by number."""
+Lost = Mapping[int, frozenset[int]]
+"""Hypotheses that lost their places, and the set of each then, by number."""
 
 Promises = Mapping[int, tuple[float, Member]]
 """Log odds of a hypothesis by its columns, and its numbers, by number of the hypothesis."""
@@ -49,10 +49,10 @@ class Search:
     """
 
     def __init__(
-        self, fitter: Fitter, refuted: Beside = MappingProxyType({}), passed_over: Beside = MappingProxyType({})
+        self, fitter: Fitter, refuted: Lost = MappingProxyType({}), passed_over: Lost = MappingProxyType({})
     ) -> None:
         self.fitter, self.design = fitter, fitter.design
-        self.refuted: Beside = {**dict.fromkeys(fitter.invisible, frozenset[int]()), **refuted}
+        self.refuted: Lost = {**dict.fromkeys(fitter.invisible, frozenset[int]()), **refuted}
         self.passed_over = passed_over
 
     def refuting(self, lost: Collection[int], beside: Collection[int] = ()) -> Search:
@@ -66,7 +66,7 @@ class Search:
     @property
     def barred(self) -> frozenset[int]:
         """Hypotheses that are not looked for any more."""
-        return frozenset({**self.refuted, **self.passed_over})
+        return frozenset(self.refuted.keys() | self.passed_over.keys())
 
     def stands_for(self, index: int) -> frozenset[int]:
         """Those passed over that a member may have been taken for: it did not stand beside them."""
